@@ -1,0 +1,82 @@
+"""The few operations that equations of motion may use, for plain floats, for JAX and for CasADi.
+
+An equation is written once, on named scalars, and takes one of these as `xp`. What is not here (data-dependent loops,
+in-place changes, Python branches on values) cannot be traced by all three and does not belong in an equation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+Scalar = Any
+"""A number: `float`, a JAX tracer or array, or a CasADi expression."""
+
+
+class Backend(Protocol):
+    """The operations of an equation."""
+
+    def sin(self, x: Scalar, /) -> Scalar: ...
+    def cos(self, x: Scalar, /) -> Scalar: ...
+    def tan(self, x: Scalar, /) -> Scalar: ...
+    def sqrt(self, x: Scalar, /) -> Scalar: ...
+    def atan2(self, y: Scalar, x: Scalar, /) -> Scalar: ...
+    def abs(self, x: Scalar, /) -> Scalar: ...
+    def where(self, condition: Scalar, x: Scalar, y: Scalar, /) -> Scalar: ...
+    def minimum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
+    def maximum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
+
+
+class FloatBackend:
+    """Plain Python floats: slow, and good for looking at one evaluation by hand."""
+
+    sin = staticmethod(math.sin)
+    cos = staticmethod(math.cos)
+    tan = staticmethod(math.tan)
+    sqrt = staticmethod(math.sqrt)
+    atan2 = staticmethod(math.atan2)
+    abs = staticmethod(abs)
+    minimum = staticmethod(min)
+    maximum = staticmethod(max)
+
+    @staticmethod
+    def where(condition: bool, x: float, y: float) -> float:
+        return x if condition else y
+
+
+class JaxBackend:
+    """JAX arrays and tracers: simulation, fitting, batches."""
+
+    def __init__(self) -> None:
+        import jax.numpy as jnp
+
+        self.sin, self.cos, self.tan, self.sqrt = jnp.sin, jnp.cos, jnp.tan, jnp.sqrt
+        self.atan2, self.abs, self.where = jnp.arctan2, jnp.abs, jnp.where
+        self.minimum, self.maximum = jnp.minimum, jnp.maximum
+
+
+class CasadiBackend:
+    """CasADi expressions: export to C and FMU (needs the extra `export`)."""
+
+    def __init__(self) -> None:
+        import casadi
+
+        self.sin, self.cos, self.tan, self.sqrt = casadi.sin, casadi.cos, casadi.tan, casadi.sqrt
+        self.atan2, self.abs, self.where = casadi.atan2, casadi.fabs, casadi.if_else
+        self.minimum, self.maximum = casadi.fmin, casadi.fmax
+
+
+def newton(residual: Callable[[Scalar], tuple[Scalar, Scalar]], start: Scalar, *, steps: int) -> Scalar:
+    """A fixed number of Newton steps, unrolled so that every backend can trace them.
+
+    Args:
+        residual: returns the residual and its derivative at a point.
+        start: first guess.
+        steps: how many steps; choose it so that the last one no longer moves the answer.
+    """
+    x = start
+    for _ in range(steps):
+        value, slope = residual(x)
+        x = x - value / slope
+    return x

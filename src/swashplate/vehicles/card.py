@@ -1,0 +1,188 @@
+"""Parameter cards: every number of a vehicle with its unit, source and status, in a readable TOML file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from swashplate.errors import CardError
+
+CARD_SCHEMA = 1
+STATUSES = ("measured", "published", "identified", "derived", "assumed")
+_FIELDS = {"value", "unit", "source", "status", "sigma", "lower", "upper", "note"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a card.
+
+    Attributes:
+        value: the number, in `unit`.
+        unit: SI unit, "1" where there is none.
+        source: paper, table and equation, or "derived: ...".
+        status: measured, published, identified, derived or assumed.
+        sigma: standard deviation, where known.
+        lower, upper: what physics allows, where known.
+        note: anything a reader must know.
+    """
+
+    value: float
+    unit: str
+    source: str
+    status: str
+    sigma: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A vehicle's numbers and what may be believed of them.
+
+    Attributes:
+        vehicle: which equations they are for ("coax").
+        title: what this aircraft is.
+        trust: where the card may be trusted, and where not.
+        options: the switches of the equations.
+        parameters: the numbers by name.
+        observer: what an identification learnt beside the parameters (noise, delays), by section.
+        path: the file it came from.
+    """
+
+    vehicle: str
+    title: str
+    trust: str
+    options: Mapping[str, Any]
+    parameters: Mapping[str, Parameter]
+    observer: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    path: str = ""
+
+    def values(self) -> dict[str, float]:
+        return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    def with_values(self, values: Mapping[str, float], **changes: Any) -> Card:
+        """A copy with other numbers; `changes` go to each changed `Parameter` (status, source, ...)."""
+        unknown = sorted(set(values) - set(self.parameters))
+        if unknown:
+            raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.path or self.vehicle)
+        changed = {
+            name: replace(self.parameters[name], value=float(value), **changes) for name, value in values.items()
+        }
+        return replace(self, parameters={**self.parameters, **changed})
+
+    def checked_against(self, units: Mapping[str, str]) -> Card:
+        """The card itself, if it has exactly the parameters in `units`, each in its unit and within its bounds.
+
+        Raises:
+            CardError: naming the first parameter that is missing, unknown, in another unit or impossible.
+        """
+        where = self.path or self.vehicle
+        for name in units:
+            if name not in self.parameters:
+                raise CardError("is missing.", where=where, channel=name, hint=f"Add [parameters.{name}].")
+        for name, parameter in self.parameters.items():
+            if name not in units:
+                raise CardError(
+                    f"is not a parameter of '{self.vehicle}'.", where=where, channel=name, hint="Is it misspelt?"
+                )
+            if parameter.unit != units[name]:
+                raise CardError(f"unit is '{parameter.unit}', expected '{units[name]}'.", where=where, channel=name)
+            low, high = parameter.lower, parameter.upper
+            if (low is not None and parameter.value < low) or (high is not None and parameter.value > high):
+                raise CardError(f"{parameter.value} lies outside [{low}, {high}].", where=where, channel=name)
+        return self
+
+    def to_toml(self) -> str:
+        """The card as the text of a TOML file."""
+        parameters = {
+            name: {
+                key: value
+                for key, value in vars(parameter).items()
+                if value is not None and not (key == "note" and not value)
+            }
+            for name, parameter in self.parameters.items()
+        }
+        document: dict[str, Any] = {
+            "kind": "vehicle",
+            "schema": CARD_SCHEMA,
+            "vehicle": self.vehicle,
+            "title": self.title,
+            "trust": self.trust,
+            "options": dict(self.options),
+            "parameters": parameters,
+        }
+        if self.observer:
+            document["observer"] = {section: dict(numbers) for section, numbers in self.observer.items()}
+        return tomli_w.dumps(document)
+
+
+def parse_card(text: str, *, path: str = "") -> Card:
+    """A card from the text of its file.
+
+    Raises:
+        CardError: where it is not TOML, not a vehicle card, or an entry is incomplete.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CardError(f"is not TOML: {error}.", where=path) from None
+    if document.get("kind") != "vehicle":
+        raise CardError(f"kind is {document.get('kind')!r}, expected 'vehicle'.", where=path)
+    if document.get("schema", 0) > CARD_SCHEMA:
+        raise CardError(
+            f"schema {document['schema']} is newer than {CARD_SCHEMA}.", where=path, hint="Update swashplate."
+        )
+    missing = sorted({"vehicle", "title", "parameters"} - document.keys())
+    if missing or not isinstance(document["parameters"], dict):
+        raise CardError(f"lacks {', '.join(missing) or 'a table of parameters'}.", where=path)
+    return Card(
+        vehicle=str(document["vehicle"]),
+        title=str(document["title"]),
+        trust=str(document.get("trust", "")),
+        options=document.get("options", {}),
+        parameters={name: _parameter(name, entry, path) for name, entry in document["parameters"].items()},
+        observer=document.get("observer", {}),
+        path=path,
+    )
+
+
+def _parameter(name: str, entry: Any, path: str) -> Parameter:
+    if not isinstance(entry, dict):
+        raise CardError("is not a table with value, unit, source and status.", where=path, channel=name)
+    missing = sorted({"value", "unit", "source", "status"} - entry.keys())
+    unknown = sorted(entry.keys() - _FIELDS)
+    if missing or unknown:
+        raise CardError(f"lacks {missing} and has unknown {unknown}.", where=path, channel=name)
+    for key in ("value", "sigma", "lower", "upper"):
+        if key in entry and (isinstance(entry[key], bool) or not isinstance(entry[key], int | float)):
+            raise CardError(f"{key} is {entry[key]!r}, expected a number.", where=path, channel=name)
+    if not float("-inf") < float(entry["value"]) < float("inf"):
+        raise CardError(f"value is {entry['value']}, expected a finite number.", where=path, channel=name)
+    if entry["status"] not in STATUSES:
+        raise CardError(f"status is {entry['status']!r}, expected one of {STATUSES}.", where=path, channel=name)
+    numbers = {key: float(entry[key]) for key in ("value", "sigma", "lower", "upper") if key in entry}
+    texts = {key: str(entry[key]) for key in ("unit", "source", "status", "note") if key in entry}
+    return Parameter(**numbers, **texts)  # type: ignore[arg-type]
+
+
+def read_card(path: str | Path) -> Card:
+    """A card from a file."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CardError(f"cannot be read: {error}.", where=path) from None
+    return parse_card(text, path=str(path))
+
+
+def packaged_cards() -> dict[str, Card]:
+    """The cards that come with swashplate, by name."""
+    folder = resources.files("swashplate.vehicles") / "data"
+    files = sorted((entry for entry in folder.iterdir() if entry.name.endswith(".toml")), key=lambda entry: entry.name)
+    return {f.name.removesuffix(".toml"): parse_card(f.read_text(encoding="utf-8"), path=f.name) for f in files}

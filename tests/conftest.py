@@ -1,0 +1,36 @@
+"""What every test may ask for: the real data, where it is found, and double precision."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def _shared_data() -> Path | None:
+    places = [os.environ.get("SWASHPLATE_DATA"), ROOT.parent / "shared" / "data"]
+    return next((Path(place) for place in places if place and Path(place).is_dir()), None)
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real flights and bench records; the test is skipped where it is missing."""
+    found = _shared_data()
+    if found is None:
+        pytest.skip("the real data is not here: set SWASHPLATE_DATA or put shared/data beside the checkout")
+    return found
+
+
+@pytest.fixture(scope="session")
+def flight_july(shared_data: Path) -> Path:
+    """The July hover flight (closed loop, crash at its end)."""
+    return shared_data / "coax56" / "flight_2011-07-25_hover_crash.mat"
+
+
+@pytest.fixture(scope="session")
+def flight_august(shared_data: Path) -> Path:
+    """The August vertical flight."""
+    return shared_data / "coax56" / "flight_2011-08-01_vertical.mat"
