@@ -1,0 +1,262 @@
+"""What is in a flight and what is wrong with it: `swash inspect`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import CHANNELS, QUATERNION, channel
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+Array = NDArray[np.float64]
+
+_GAP = 3.0  # median steps; a step longer than this has lost at least two samples
+_JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
+_OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
+_MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
+
+
+@dataclass(frozen=True)
+class StreamSummary:
+    """Time base of a stream.
+
+    Attributes:
+        rate: sample rate [Hz] from the median step; NaN for a single sample.
+        jitter: scatter of the steps that are no gaps: 1.4826 times the median absolute deviation [s].
+        gaps: steps longer than three median steps; longest_gap: the longest of them [s] (0 where there is none).
+    """
+
+    name: str
+    n: int
+    start: float
+    stop: float
+    rate: float
+    jitter: float
+    gaps: int
+    longest_gap: float
+
+
+@dataclass(frozen=True)
+class ChannelSummary:
+    """Values of a channel, in the unit shown on screens.
+
+    Attributes:
+        unit: the screen's unit (deg where a pilot expects it).
+        low, high, median: over the finite samples.
+        missing: samples that are not finite.
+        constant: never moves.
+        outliers: sample-to-sample changes beyond 12 robust standard deviations (1.4826 MAD) of all of them; for the
+            four channels of a quaternion, those of the rotation between samples.
+    """
+
+    name: str
+    stream: str
+    unit: str
+    low: float
+    median: float
+    high: float
+    missing: int
+    constant: bool
+    outliers: int
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What `inspect` found; prints as tables in a terminal (rich) and as text."""
+
+    source: str
+    simulated: bool
+    duration: float
+    streams: tuple[StreamSummary, ...]
+    channels: tuple[ChannelSummary, ...]
+    notes: tuple[str, ...]
+    problems: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as plain JSON types (NaN becomes None)."""
+
+        def plain(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {key: plain(entry) for key, entry in value.items()}
+            if isinstance(value, list | tuple):
+                return [plain(entry) for entry in value]
+            return None if isinstance(value, float) and not np.isfinite(value) else value
+
+        return {key: plain(value) for key, value in asdict(self).items()}
+
+    def stream_rows(self) -> list[tuple[str, ...]]:
+        """Cells of the streams' table, its heading first."""
+        head = ("stream", "samples", "from [s]", "to [s]", "rate [Hz]", "jitter [ms]", "gaps", "longest gap [ms]")
+        rows = [
+            (
+                *(s.name, f"{s.n}", f"{s.start:.3f}", f"{s.stop:.3f}", f"{s.rate:.1f}", f"{1e3 * s.jitter:.2f}"),
+                *(f"{s.gaps}", f"{1e3 * s.longest_gap:.0f}" if s.gaps else "-"),
+            )
+            for s in self.streams
+        ]
+        return [head, *rows]
+
+    def channel_rows(self) -> list[tuple[str, ...]]:
+        """Cells of the channels' table, its heading first."""
+        head = ("channel", "unit", "stream", "min", "median", "max", "outliers", "remark")
+        rows = []
+        for c in self.channels:
+            remarks = ["never moves"] * c.constant + [f"{c.missing} missing"] * bool(c.missing)
+            remarks += ["not in the schema"] * (c.name not in CHANNELS)
+            numbers = (f"{c.low:.4g}", f"{c.median:.4g}", f"{c.high:.4g}", f"{c.outliers or '-'}")
+            rows.append((c.name, c.unit, c.stream, *numbers, ", ".join(remarks)))
+        return [head, *rows]
+
+    def _title(self) -> str:
+        return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{', simulated' if self.simulated else ''}"
+
+    def __str__(self) -> str:
+        lines = [self._title()]
+        for rows in (self.stream_rows(), self.channel_rows()):
+            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+            lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
+        for heading, texts in (("problems", self.problems), ("notes", self.notes)):
+            lines += ["", f"{heading}: {'' if texts else 'none'}".rstrip(), *(f"  - {text}" for text in texts)]
+        return "\n".join(lines)
+
+    def __rich__(self) -> Group:
+        from rich.console import Group, RenderableType
+        from rich.markup import escape
+        from rich.table import Table
+
+        parts: list[RenderableType] = [f"[bold]{escape(self._title())}[/bold]"]
+        for heading, *rows in (self.stream_rows(), self.channel_rows()):
+            table = Table(box=None, pad_edge=False)
+            for i, cell in enumerate(heading):
+                table.add_column(escape(cell), justify="right" if rows and _is_number(rows[0][i]) else "left")
+            for row in rows:
+                table.add_row(*map(escape, row))
+            parts += ["", table]
+        parts += ["", "[bold]problems[/bold]", *(f"  • {escape(text)}" for text in self.problems or ("none",))]
+        parts += ["", "[bold]notes[/bold]", *(f"  • {escape(text)}" for text in self.notes or ("none",))]
+        return Group(*parts)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
+    time = np.asarray(data["time"].values, dtype=np.float64)
+    if time.size < 2:
+        edge = float(time[0]) if time.size else float("nan")
+        return StreamSummary(name, time.size, edge, edge, float("nan"), float("nan"), 0, 0.0)
+    steps = np.diff(time)
+    median = float(np.median(steps))
+    gaps = steps[steps > _GAP * median]
+    usual = steps[steps <= _GAP * median]
+    jitter = _MAD_TO_SIGMA * float(np.median(np.abs(usual - median)))
+    longest = float(gaps.max()) if gaps.size else 0.0
+    return StreamSummary(name, time.size, float(time[0]), float(time[-1]), 1.0 / median, jitter, gaps.size, longest)
+
+
+def _jumps(changes: Array) -> NDArray[np.bool_]:
+    """Changes between samples that are far outside the scatter of all changes (Hampel's identifier on differences).
+
+    A channel that is held between updates has a scatter of zero; only channels that move at most samples are judged.
+    """
+    off = np.abs(changes - np.median(changes)) if changes.size else changes
+    sigma = _MAD_TO_SIGMA * float(np.median(off)) if changes.size else 0.0
+    return np.asarray(off > _OUTLIER * sigma) if sigma > 0.0 else np.zeros(changes.shape, dtype=np.bool_)
+
+
+def _attitude_jumps(flight: Flight) -> int:
+    """Jumps of the attitude: outliers in any component of the rotation from sample to sample, blind to sign flips."""
+    quaternion = np.stack([flight.values(name) for name in QUATERNION])
+    quaternion = quaternion[:, np.isfinite(quaternion).all(axis=0)]
+    (w0, x0, y0, z0), (w1, x1, y1, z1) = quaternion[:, :-1], quaternion[:, 1:]
+    sign = np.sign(w0 * w1 + x0 * x1 + y0 * y1 + z0 * z1)
+    # Vector part of conj(q0) * q1, which is half the rotation vector where the step is small.
+    turned = (
+        sign * (w0 * x1 - x0 * w1 - y0 * z1 + z0 * y1),
+        sign * (w0 * y1 - y0 * w1 - z0 * x1 + x0 * z1),
+        sign * (w0 * z1 - z0 * w1 - x0 * y1 + y0 * x1),
+    )
+    return int(np.sum(np.any([_jumps(component) for component in turned], axis=0)))
+
+
+def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
+    values = flight.values(name)
+    known = channel(name)
+    inside = str(flight[name].attrs.get("units", ""))
+    shown = values * known.shown_factor
+    finite = shown[np.isfinite(shown)]
+    low, median, high = (finite.min(), np.median(finite), finite.max()) if finite.size else (np.nan,) * 3
+    if name in QUATERNION and all(other in flight for other in QUATERNION):
+        outliers = _attitude_jumps(flight)
+    else:
+        outliers = int(np.sum(_jumps(np.diff(values[np.isfinite(values)]))))
+    return ChannelSummary(
+        name=name,
+        stream=home,
+        unit=known.shown_unit or inside,
+        low=float(low),
+        median=float(median),
+        high=float(high),
+        missing=int(values.size - finite.size),
+        constant=bool(finite.size > 1 and low == high),
+        outliers=outliers,
+    )
+
+
+def _stream_problems(stream: StreamSummary) -> list[str]:
+    problems = []
+    if stream.gaps:
+        problems.append(
+            f"{stream.name}: {stream.gaps} gaps in the time stamps, the longest {1e3 * stream.longest_gap:.0f} ms "
+            f"(usual step {1e3 / stream.rate:.1f} ms)"
+        )
+    if stream.jitter * stream.rate > _JITTER:
+        problems.append(
+            f"{stream.name}: time stamps jitter by {1e3 * stream.jitter:.2f} ms; bring them to one rate before a fit"
+        )
+    return problems
+
+
+def _channel_problems(summary: ChannelSummary) -> list[str]:
+    problems = []
+    if summary.missing:
+        problems.append(f"{summary.name}: {summary.missing} samples are not finite")
+    if summary.constant:
+        problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
+    if summary.outliers:
+        name = "attitude" if summary.name in QUATERNION else summary.name
+        jumps = "jump" if summary.outliers == 1 else "jumps"
+        problems.append(f"{name}: {summary.outliers} {jumps} beyond {_OUTLIER:g} robust sigmas (outliers?)")
+    return problems
+
+
+def inspect(flight: Flight) -> Inspection:
+    """Summary of a flight: channels, units, rates, gaps, jitter, constant channels, jumps, and the problems in words.
+
+    Nothing is repaired; conditioning does that.
+    """
+    streams = tuple(_summarise_stream(name, data) for name, data in flight.streams.items())
+    channels = tuple(_summarise_channel(flight, name, flight.stream_of(name)) for name in flight.channels)
+    problems = [text for stream in streams for text in _stream_problems(stream)]
+    problems += [text for summary in channels for text in _channel_problems(summary)]
+    return Inspection(
+        source=flight.provenance.source,
+        simulated=flight.provenance.simulated,
+        duration=flight.duration if any(stream.n for stream in streams) else 0.0,
+        streams=streams,
+        channels=channels,
+        notes=flight.provenance.notes,
+        problems=tuple(dict.fromkeys(problems)),  # the attitude's jumps stand at each of its four channels
+    )

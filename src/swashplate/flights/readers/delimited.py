@@ -1,0 +1,240 @@
+"""CSV logs: one time column, one column a channel, units in the header (`phi [deg]`) or in a small mapping file.
+
+A mapping file is TOML; with one, only the channels it names are read:
+
+    delimiter = ","          # optional: comma, semicolon and tab are told apart without it
+    header = true            # false where the first line is data already; then columns are numbers from 1
+
+    [channels]
+    time = {column = "TimeUS", unit = "us"}
+    phi = {column = "Roll", unit = "deg"}
+    servo_pitch = {column = 7, unit = "1", factor = -0.002, offset = 3.0}
+
+A value inside is (cell * factor + offset), then converted from `unit`. Axes are not turned: a CSV log is expected in
+the schema's own axes (NED, FRD), or brought there with factors of -1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import FlightError, UnitError
+from swashplate.flights import units
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.readers import checks, tables
+from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.source import Source
+from swashplate.flights.schema import CHANNELS, channel
+
+NAME = "csv"
+VERSION = "1"
+
+Array = NDArray[np.float64]
+
+_HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?$", re.DOTALL)
+_COLUMN_KEYS = {"column", "unit", "factor", "offset"}
+_MAPPING_KEYS = {"delimiter", "header", "channels", "mocap"}
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Where a channel comes from: column index, unit in the file (None: not said), factor and offset before it."""
+
+    index: int
+    unit: str | None
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def recognises(source: Source) -> bool:
+    """Any text with more than one column; the motion capture exports are asked first."""
+    text = source.text
+    return text is not None and any(mark in text[:65536] for mark in ",;\t")
+
+
+def _split(cell: str) -> tuple[str, str | None]:
+    """Name and unit of a header cell `name [unit]` or `name (unit)`; unit None where there is none."""
+    found = _HEADER_CELL.match(cell)
+    if found is None:
+        return cell, None
+    unit = found["square"] if found["square"] is not None else found["round"]
+    return found["name"], unit
+
+
+def _from_header(header: Sequence[str], source: Source) -> dict[str, _Column]:
+    columns: dict[str, _Column] = {}
+    for index, cell in enumerate(header):
+        name, unit = _split(cell)
+        if not name:
+            raise FlightError(
+                f"column {index + 1} has no name.", where=source.name, hint="Name it, or use a mapping file."
+            )
+        if name in columns:
+            raise FlightError(
+                "the name stands twice in the header.", where=source.name, channel=name, hint="Rename one of them."
+            )
+        columns[name] = _Column(index, unit)
+    return columns
+
+
+def _number_of(entry: Mapping[str, Any], key: str, default: float, *, name: str, source: Source) -> float:
+    value = entry.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FlightError(f"{key} = {value!r} in the mapping is not a number.", where=source.name, channel=name)
+    return float(value)
+
+
+def _from_mapping(mapping: Mapping[str, Any], header: Sequence[str] | None, source: Source) -> dict[str, _Column]:
+    wanted = mapping.get("channels")
+    if not isinstance(wanted, Mapping) or not wanted or set(mapping) - _MAPPING_KEYS:
+        raise FlightError(
+            f"the mapping must have a table [channels], and beside it only {', '.join(sorted(_MAPPING_KEYS))}.",
+            where=source.name,
+            hint="For example: [channels] time = {column = 't', unit = 'ms'}.",
+        )
+    places: dict[str, int] = {}
+    for index, cell in enumerate(header or ()):
+        places.setdefault(cell, index)
+        places.setdefault(_split(cell)[0], index)
+    columns: dict[str, _Column] = {}
+    for name, entry in wanted.items():
+        if not isinstance(entry, Mapping) or set(entry) - _COLUMN_KEYS or "column" not in entry:
+            raise FlightError(
+                f"the mapping says {entry!r}, expected column, unit and if needed factor and offset.",
+                where=source.name,
+                channel=name,
+            )
+        place = entry["column"]
+        index = place - 1 if isinstance(place, int) else places.get(place, -1) if isinstance(place, str) else -1
+        if index < 0:
+            raise FlightError(
+                f"there is no column {place!r}; the file has {', '.join(header or ()) or 'no header'}.",
+                where=source.name,
+                channel=name,
+                hint="Correct the mapping; columns may also be numbers from 1.",
+            )
+        unit = entry.get("unit")
+        if unit is None and header is not None and index < len(header):
+            unit = _split(header[index])[1]
+        if unit is not None and not isinstance(unit, str):
+            raise UnitError(f"unit = {unit!r} in the mapping is not text.", where=source.name, channel=name)
+        columns[name] = _Column(
+            index,
+            unit,
+            _number_of(entry, "factor", 1.0, name=name, source=source),
+            _number_of(entry, "offset", 0.0, name=name, source=source),
+        )
+    return columns
+
+
+def _inside(values: Array, name: str, unit: str | None, source: Source) -> tuple[Array, str]:
+    """Values and their unit inside; the schema's channels need a unit that fits, others keep a unit nobody knows."""
+    expected = "s" if name == "time" else channel(name).unit
+    if unit is None:
+        if expected not in ("", "1"):
+            raise UnitError(
+                f"has no unit, expected one of [{expected}].",
+                where=source.name,
+                channel=name,
+                hint=f"Write it in the header, as '{name} [{expected}]', or give units={{'{name}': '{expected}'}}.",
+            )
+        return values, expected
+    if not expected and not units.is_known(unit):
+        return values, unit
+    converted = units.to_inside(values, unit, expected=expected, channel=name, where=source.name)
+    return converted, units.inside_unit(unit)
+
+
+def _table(source: Source, mapping: Mapping[str, Any]) -> tuple[list[str] | None, list[list[str]], int]:
+    """Header cells (None without one), rows of data, and the line number of the first row."""
+    delimiter = mapping.get("delimiter")
+    if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
+        raise FlightError(f"delimiter = {delimiter!r} in the mapping is not one character.", where=source.name)
+    rows = tables.rows_of(source.text or "", where=source.name, delimiter=delimiter)
+    start = 0
+    while start < len(rows) and (not any(rows[start]) or rows[start][0].startswith("#")):
+        start += 1
+    while len(rows) > start and not any(rows[-1]):
+        rows.pop()
+    if start == len(rows):
+        raise FlightError("holds no table.", where=source.name, hint="Export it again.")
+    if mapping.get("header", True) is False:
+        return None, rows[start:], start + 1
+    header = rows[start]
+    while header and not header[-1]:
+        header = header[:-1]  # a separator at the end of each line
+    return header, rows[start + 1 :], start + 2
+
+
+def read(source: Source, options: Options) -> Flight:
+    """A CSV log as a flight with one stream, "log".
+
+    Args:
+        source: the file.
+        options: `units` by channel where the header has none; `mapping`; `bad_stamps`.
+
+    Raises:
+        FlightError, UnitError: naming the file, the channel or line, what was found and what to do.
+    """
+    header, rows, first_line = _table(source, options.mapping)
+    if header is not None and all(_is_number(cell) for cell in header):
+        raise FlightError(
+            "the first line holds numbers, expected names.",
+            where=source.name,
+            hint="Add a header such as 'time [s],phi [deg]', or use a mapping file with header = false.",
+        )
+    columns = _from_mapping(options.mapping, header, source) if options.mapping else _from_header(header or [], source)
+    if "time" not in columns:
+        raise FlightError(
+            f"there is no time column; found {', '.join(columns) or 'nothing'}.",
+            where=source.name,
+            channel="time",
+            hint="Name it 'time [s]' in the header, or in a mapping file.",
+        )
+    unknown = set(options.units) - set(columns)
+    if unknown:
+        raise UnitError(
+            "units are given for a column that the file lacks.", where=source.name, channel=", ".join(sorted(unknown))
+        )
+    width = max(column.index for column in columns.values()) + 1
+    for i, row in enumerate(rows):
+        if len(row) < width:
+            raise FlightError(
+                f"line {first_line + i} has {len(row)} cells, expected {width}.",
+                where=source.name,
+                hint="The line is cut off: remove or complete it.",
+            )
+    channels: dict[str, Array] = {}
+    labels: dict[str, str] = {}
+    for name, place in columns.items():
+        raw = tables.column(rows, place.index, name=name, where=source.name, first_line=first_line)
+        checks.finite(raw, channel=name, where=source.name)
+        with np.errstate(over="ignore"):  # what overflows is refused below, by name
+            scaled = raw if (place.factor, place.offset) == (1.0, 0.0) else raw * place.factor + place.offset
+        channels[name], labels[name] = _inside(scaled, name, options.units.get(name, place.unit), source)
+        checks.finite(channels[name], channel=name, where=source.name)  # a factor can overflow
+    time = channels.pop("time")
+    if not channels:
+        raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
+    keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
+    channels = {name: values[keep] for name, values in channels.items()}
+    foreign = {name: labels[name] for name in channels if name not in CHANNELS}
+    notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
+    return Flight(
+        streams={"log": stream(time[keep], channels, foreign)},
+        provenance=source.provenance(NAME, VERSION, notes=notes),
+    )
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        tables.number(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,64 @@
+"""What a user may tell a reader that the file itself does not say."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from swashplate.errors import FlightError
+
+_MOCAP_KEYS = ("body", "rotation", "body_axes", "world_axes")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Arguments of `read` as the readers see them.
+
+    Attributes:
+        units: units by column or field name, where the file has none or wrong ones.
+        mapping: the parsed mapping file (see `readers/delimited.py`).
+        body: the tracked body, where a motion capture file has several.
+        rotation: "helical", "euler_xyz" or "quaternion", where the file does not say.
+        body_axes: where the logged body axes x, y, z point, for example "forward-left-up".
+        world_axes: where the logged world axes x, y, z point, for example "north-west-up".
+        bad_stamps: "error", or "drop" to leave out samples whose time does not increase.
+    """
+
+    units: Mapping[str, str] = field(default_factory=dict)
+    mapping: Mapping[str, Any] = field(default_factory=dict)
+    body: str | None = None
+    rotation: str | None = None
+    body_axes: str | None = None
+    world_axes: str | None = None
+    bad_stamps: str = "error"
+
+
+def load_mapping(mapping: str | Path | Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """The mapping as a dictionary, read from a TOML file where a path is given."""
+    if mapping is None:
+        return {}
+    if isinstance(mapping, Mapping):
+        return mapping
+    try:
+        return tomllib.loads(Path(mapping).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FlightError("there is no such mapping file.", where=mapping, hint="Check the path.") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FlightError(f"the mapping file does not read as TOML: {error}.", where=mapping) from None
+
+
+def with_mocap_table(options: Options) -> Options:
+    """Options completed from the mapping's table `[mocap]`; arguments win over the file."""
+    table = options.mapping.get("mocap", {})
+    if not isinstance(table, Mapping) or set(table) - set(_MOCAP_KEYS):
+        raise FlightError(
+            f"the mapping's table [mocap] may hold {', '.join(_MOCAP_KEYS)}; found {table!r}.", hint="Correct the key."
+        )
+    given = {key: getattr(options, key) or table.get(key) for key in _MOCAP_KEYS}
+    wrong = [key for key, value in given.items() if not isinstance(value, str | None)]
+    if wrong:
+        raise FlightError(f"'{wrong[0]}' in the mapping's table [mocap] must be text.", channel=wrong[0])
+    return Options(units=options.units, mapping=options.mapping, bad_stamps=options.bad_stamps, **given)

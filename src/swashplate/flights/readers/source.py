@@ -1,0 +1,111 @@
+"""A file that is being read: its bytes, its hash, and the errors before a reader sees it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Provenance
+
+# The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
+LARGEST_FILE = 1 << 30
+LARGEST_CONTENT = 2 << 30
+# Deflate can shrink constants a thousandfold, so small files may claim this much more than they weigh. Measured
+# numbers hardly shrink; beyond this ratio the sizes in the header are nonsense.
+_FREE_CONTENT = 16 << 20
+_LARGEST_RATIO = 40
+
+
+@dataclass(frozen=True)
+class Source:
+    """A log file.
+
+    Attributes:
+        path: where it lies.
+        content: its bytes.
+    """
+
+    path: Path
+    content: bytes
+
+    @property
+    def name(self) -> str:
+        return str(self.path)
+
+    @property
+    def size(self) -> int:
+        return len(self.content)
+
+    @cached_property
+    def sha256(self) -> str:
+        return hashlib.sha256(self.content).hexdigest()
+
+    @cached_property
+    def text(self) -> str | None:
+        """The content as text, None where it is binary."""
+        if b"\0" in self.content:
+            return None
+        try:
+            return self.content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            # Motion capture programs on Windows write subject names in the local code page.
+            control = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in self.content[:4096])
+            return None if control else self.content.decode("latin-1")
+
+    def provenance(self, reader: str, version: str, *, vehicle: str = "", notes: tuple[str, ...] = ()) -> Provenance:
+        return Provenance(
+            source=self.path.name,
+            sha256=self.sha256,
+            reader=reader,
+            reader_version=version,
+            vehicle=vehicle,
+            notes=notes,
+        )
+
+
+def refuse_oversized(claimed: int, *, size: int, where: str, what: str) -> None:
+    """Refuses a header that claims more bytes than its file can hold, before anything is allocated for it.
+
+    Args:
+        claimed: bytes that the header asks for.
+        size: bytes of the file.
+        where: the file, for the error.
+        what: the part that claims them, for the error.
+    """
+    if claimed > min(LARGEST_CONTENT, _FREE_CONTENT + _LARGEST_RATIO * size):
+        raise FlightError(
+            f"{what} claims {claimed:,} bytes in a file of {size:,} bytes: the header is damaged or forged.",
+            where=where,
+            hint="Copy or export the file again.",
+        )
+
+
+def open_source(path: str | Path) -> Source:
+    """Reads a file's bytes.
+
+    Raises:
+        FlightError: where it is missing, a folder, unreadable, empty or too large.
+    """
+    place = Path(path)
+    try:
+        if place.is_dir():
+            raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
+        size = place.stat().st_size
+        if size > LARGEST_FILE:
+            raise FlightError(
+                f"has {size:,} bytes; the largest file that is read has {LARGEST_FILE:,}.",
+                where=place,
+                hint="Split it into shorter flights.",
+            )
+        content = place.read_bytes()
+    except FileNotFoundError:
+        raise FlightError("there is no such file.", where=place, hint="Check the path.") from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FlightError(f"cannot be read: {reason}.", where=place) from None
+    if not content:
+        raise FlightError("the file is empty.", where=place, hint="Export or copy it again.")
+    return Source(place, content)

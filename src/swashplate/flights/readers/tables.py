@@ -1,0 +1,67 @@
+"""Rows of cells from text with separators, and numbers from cells, with the place of what does not parse."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import FlightError
+
+Array = NDArray[np.float64]
+
+
+def separator(line: str) -> str:
+    """The separator of a line: the one of comma, semicolon and tab that it has most of."""
+    return max(",;\t", key=line.count)
+
+
+def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list[str]]:
+    """Cells by line, stripped of spaces; empty lines stay as empty rows.
+
+    Args:
+        delimiter: the separator; found in the first lines where None.
+    """
+    chosen = delimiter or separator("\n".join(text.split("\n", 40)[:40]))
+    try:
+        return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text, newline=""), delimiter=chosen)]
+    except (csv.Error, TypeError) as error:  # TypeError: a delimiter that is not one character
+        raise FlightError(f"does not read as a table: {error}.", where=where, hint="Export it again.") from None
+
+
+def number(cell: str) -> float:
+    """A cell as a number, NaN where it is blank.
+
+    Raises:
+        ValueError: where it is neither.
+    """
+    if "_" in cell:
+        raise ValueError(cell)  # Python reads 1_0 as ten; no log means that
+    return float(cell) if cell else float("nan")
+
+
+def column(rows: Sequence[Sequence[str]], index: int, *, name: str, where: str, first_line: int) -> Array:
+    """One column as numbers, shape (n,); blank or missing cells are NaN.
+
+    Args:
+        first_line: line number of the first row in the file, for the error.
+
+    Raises:
+        FlightError: where a cell is not a number, naming its line.
+    """
+    values = np.empty(len(rows))
+    for i, row in enumerate(rows):
+        cell = row[index] if index < len(row) else ""
+        try:
+            values[i] = number(cell)
+        except ValueError:
+            raise FlightError(
+                f"'{cell[:40]}' in line {first_line + i} is not a number.",
+                where=where,
+                channel=name,
+                hint="Correct the cell; decimals are written with a point.",
+            ) from None
+    return values

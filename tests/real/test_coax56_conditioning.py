@@ -1,0 +1,106 @@
+"""Conditioning of the two real CoaX flights: what is found there is what the plots show."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate.flights.condition import condition, replay
+from swashplate.flights.derive import derive
+from swashplate.flights.flight import Flight
+from swashplate.flights.ground import flying_interval
+from swashplate.flights.lever_arm import lever_arm, move_to_cg, percussion_offset
+from swashplate.flights.outliers import remove_outliers
+from swashplate.flights.readers import read
+from swashplate.flights.reconstruction import reconstruct
+
+# Card values (params_coax.csv): inertia, hub stiffness of both rotors, thrust times height of both rotors in hover.
+PERCUSSION = percussion_offset(
+    inertia=1.837e-3, hub_stiffness=0.1084 + 0.4278, thrust_moment=1.801 * 0.103 + 1.162 * 0.165
+)
+
+
+@cache
+def conditioned(path: Path) -> Flight:
+    return condition(read(path))
+
+
+def test_july_ends_before_the_yaw_breaks_away(flight_july: Path) -> None:
+    found = flying_interval(remove_outliers(read(flight_july)))
+    assert found.start == 0.0
+    assert 17.5 < found.stop < 18.0
+    assert "crash" in found.reasons[0]
+    flight = conditioned(flight_july)
+    assert len(flight.segments) == 1
+    assert np.max(np.abs(flight.array(("phi", "theta")))) < np.radians(10)
+    assert np.max(np.abs(flight.values("r"))) < 2.0
+
+
+def test_august_ends_where_something_holds_it(flight_august: Path) -> None:
+    """From 40 s it is tilted by 7 degrees at 5 cm/s without accelerating, with a tenth less thrust: no free flight."""
+    found = flying_interval(remove_outliers(read(flight_august)))
+    assert 39.0 < found.stop < 41.0
+    assert "held" in found.reasons[-1]
+    rest = condition(read(flight_august), trim_ground=False).between(42.0, 44.0)
+    free = conditioned(flight_august)
+    for flight, low, high in ((rest, 0.8, 1.5), (free, 0.0, 0.15)):
+        assert low < np.linalg.norm(np.mean(flight.array(("ax", "ay")), axis=0)) < high
+    thrust = [np.mean(f.array(("motor_lower", "motor_upper"))) ** 2 for f in (rest, free)]
+    assert thrust[0] < 0.92 * thrust[1]
+
+
+def test_august_loses_its_spikes_and_little_else(flight_august: Path) -> None:
+    flight = conditioned(flight_august)
+    removed = flight.history[0].details["removed"]
+    assert 0 < removed["motion"] < 40
+    assert 30 < removed["inputs"] < 100
+    late = flight.array(("motor_lower", "motor_upper"))[flight.time("x") > 16.0]
+    assert late.min() > 0.47
+    assert late.max() < 0.59
+    longest = max(b - a for a, b in flight.segments)
+    assert longest > 30.0
+    assert sum(b - a for a, b in flight.segments) > 39.0
+
+
+@pytest.mark.parametrize("name", ["flight_july", "flight_august"])
+def test_the_history_redoes_it_from_the_file(name: str, request: pytest.FixtureRequest) -> None:
+    path = request.getfixturevalue(name)
+    flight = conditioned(path)
+    again = replay(read(path), flight.history)
+    assert all(np.array_equal(again.values(c), flight.values(c)) for c in flight.channels)
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("flight_july", 0.15, 0.18), ("flight_august", 0.17, 0.21)])
+def test_the_tracked_point_lies_far_to_the_right(
+    name: str, least: float, most: float, request: pytest.FixtureRequest
+) -> None:
+    path = request.getfixturevalue(name)
+    found = lever_arm(conditioned(path), percussion=PERCUSSION)
+    assert least < found.y.value < most
+    assert found.y.t > 10
+    # Two independent equations: ax against the yaw acceleration, az against the roll acceleration.
+    for value, sigma, partial, coherence in found.y.equations.values():
+        assert least < value < most
+        assert value > 10 * sigma
+        assert partial > 0.5
+        assert coherence > 0.7
+    assert abs(found.x.value) < 0.04
+    assert abs(found.z.value) < 0.02
+    moved = derive(move_to_cg(condition(read(path), derive=False), found.vector))
+    left = lever_arm(moved)
+    assert abs(left.y.value) < 0.01
+    assert np.std(moved.values("ax")) < 0.6 * np.std(conditioned(path).values("ax"))
+
+
+def test_both_flights_agree_on_the_height_of_the_tracked_point(flight_july: Path, flight_august: Path) -> None:
+    july, august = (lever_arm(conditioned(path)).z for path in (flight_july, flight_august))
+    assert abs(july.value - august.value) < 3 * np.hypot(july.sigma, august.sigma)
+
+
+def test_the_controller_is_seen_in_july(flight_july: Path) -> None:
+    found = reconstruct(conditioned(flight_july))
+    shifts = {(shift.source, shift.response): shift for shift in found.time_shifts}
+    assert not shifts["motor_lower", "r"].identifiable
+    assert not shifts["servo_roll", "p"].identifiable
+    assert not found.biases

@@ -1,0 +1,91 @@
+"""`inspect`: rates, gaps, jitter, constants and outliers of flights in which each is put by hand."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.inspect import inspect
+
+N = 400
+
+
+def _flight(time: np.ndarray | None = None, **channels: np.ndarray) -> Flight:
+    stamps = np.arange(N) / 100.0 if time is None else time
+    waves = {"phi": 0.1 * np.sin(3 * stamps), "servo_roll": np.cos(5 * stamps)} | channels
+    return Flight({"log": stream(stamps, waves, {"odd": "furlong"})}, Provenance("a.csv", notes=("a note",)))
+
+
+def test_a_clean_flight_has_no_problems() -> None:
+    found = inspect(_flight())
+    assert found.problems == ()
+    assert found.notes == ("a note",)
+    (log,) = found.streams
+    assert (log.n, log.gaps, log.longest_gap) == (N, 0, 0.0)
+    assert log.rate == pytest.approx(100.0)
+    assert log.jitter == pytest.approx(0.0, abs=1e-12)
+    phi = found.channels[0]
+    assert (phi.name, phi.unit) == ("phi", "deg")
+    assert phi.high == pytest.approx(np.rad2deg(0.1), rel=1e-3)
+
+
+def test_gaps_are_counted_and_measured() -> None:
+    time = np.arange(N) / 100.0
+    time[100:] += 0.15
+    time[300:] += 0.05
+    found = inspect(_flight(time))
+    assert (found.streams[0].gaps, found.streams[0].longest_gap) == (2, pytest.approx(0.16))
+    assert "log: 2 gaps in the time stamps, the longest 160 ms (usual step 10.0 ms)" in found.problems
+
+
+def test_jitter_is_the_scatter_of_the_steps() -> None:
+    steps = 0.01 + 0.001 * np.random.default_rng(3).standard_normal(20_000)
+    time = np.cumsum(steps)
+    found = inspect(Flight({"log": stream(time, {"x": np.sin(time)})}))
+    assert found.streams[0].jitter == pytest.approx(0.001, rel=0.05)
+    assert any("jitter by 1.0" in problem for problem in found.problems)
+
+
+def test_constant_missing_and_outlying_channels_are_named() -> None:
+    time = np.arange(N) / 100.0
+    spiked, holed = np.sin(time), np.cos(time)
+    spiked[50] += 5.0
+    holed[7] = np.nan
+    found = inspect(_flight(x=spiked, y=holed, motor_lower=np.full(N, 0.5)))
+    assert "x: 2 jumps beyond 12 robust sigmas (outliers?)" in found.problems  # there and back
+    assert "y: 1 samples are not finite" in found.problems
+    assert "motor_lower: never moves, so nothing can be learnt from it" in found.problems
+    assert len(found.problems) == 3
+
+
+def test_a_quaternion_that_flips_its_sign_has_no_outliers_but_one_that_jumps_has() -> None:
+    half = 0.1 * np.sin(np.arange(N) / 30.0)
+    half[200:] += 0.5
+    sign = np.where(np.arange(N) % 90 < 45, 1.0, -1.0)
+    quaternion = {"qw": sign * np.cos(half), "qx": sign * np.sin(half), "qy": 0 * half, "qz": 0 * half}
+    problems = inspect(_flight(**quaternion)).problems
+    assert [text for text in problems if "jump" in text] == ["attitude: 1 jump beyond 12 robust sigmas (outliers?)"]
+
+
+def test_it_prints_as_text_as_tables_and_as_json() -> None:
+    found = inspect(_flight(odd=np.sqrt(np.arange(N)), motor_lower=np.zeros(N)))
+    console = Console(width=120, file=io.StringIO())
+    console.print(found)
+    for text in (str(found), console.file.getvalue()):  # type: ignore[attr-defined]
+        for shown in ("a.csv: 4.0 s", "furlong", "not in the schema", "never moves", "a note"):
+            assert shown in text
+    assert json.loads(json.dumps(found.as_dict(), allow_nan=False))["streams"][0]["n"] == N
+
+
+def test_single_samples_and_nothing_at_all() -> None:
+    found = inspect(Flight({"log": stream([1.0], {"x": [2.0]})}))
+    assert found.streams[0].n == 1
+    assert found.as_dict()["streams"][0]["rate"] is None
+    assert "x" in str(found)
+    assert inspect(Flight({})).channels == ()
+    assert "problems: none" in str(inspect(Flight({})))
