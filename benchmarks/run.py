@@ -1,0 +1,85 @@
+"""What swashplate promises about the simulation's speed, side by side with its peers, measured in one run.
+
+python -m benchmarks.run [--short] [--out FILE.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import many, peers, single
+from benchmarks.timing import Result
+from swashplate.simulation.compilation import enable_compilation_cache
+
+JSBSIM_RATIO = 2.0
+"""How many times faster than JSBSim's helicopter one CoaX has to be."""
+
+
+def measure(*, short: bool) -> list[Result]:
+    """Every benchmark; the short form takes about ten seconds beyond compilation."""
+    scale, repeats = (1, 3) if short else (5, 10)
+    results = [
+        peers.jsbsim_ah1s(steps=4_000 * scale, repeats=repeats),
+        single.scan(steps=20_000 * scale, repeats=2 * repeats),
+        single.numpy_loop(steps=100 * scale, repeats=repeats),
+        single.c_loop(steps=100_000 * scale, repeats=repeats),
+        many.batch("float64", steps=50 * scale, repeats=repeats),
+        many.batch("float32", steps=50 * scale, repeats=repeats),
+    ]
+    jsbsim, scan = results[0], results[1]
+    results[0] = replace(jsbsim, note=f"{jsbsim.note}; the scan is {scan.rate / jsbsim.rate:.1f} times faster")
+    required = max(scan.target or 0.0, JSBSIM_RATIO * jsbsim.rate)
+    results[1] = replace(scan, target=required)
+    return results
+
+
+def machine() -> dict[str, object]:
+    """What the numbers were measured on."""
+    packages = {name: metadata.version(name) for name in ("swashplate", "jax", "jaxlib", "numpy", "casadi", "jsbsim")}
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "load_before": os.getloadavg()[0],
+        "python": platform.python_version(),
+        "packages": packages,
+    }
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--short", action="store_true", help="fewer steps and repeats")
+    parser.add_argument("--out", type=Path, help="also write the results as JSON")
+    options = parser.parse_args()
+    enable_compilation_cache()
+    where, results = machine(), measure(short=options.short)
+    table = Table(title=f"Steps per second, best of several ({where['processor']}, {where['cores']} cores)")
+    for heading in ("what", "rate", "promised", "", "note"):
+        table.add_column(heading, justify="right" if heading in ("rate", "promised") else "left")
+    for result in results:
+        promised = "" if result.target is None else f"{result.target:,.0f}"
+        verdict = "" if result.target is None else ("met" if result.met else "MISSED")
+        table.add_row(result.name, f"{result.rate:,.0f}", promised, verdict, result.note)
+    Console().print(table)
+    if options.out is not None:
+        document = {"machine": where, "results": [result.as_json() for result in results]}
+        options.out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

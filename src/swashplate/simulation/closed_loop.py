@@ -1,0 +1,205 @@
+"""Closed loop: a controller at its own rate in the same compiled loop as the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers import Maneuver
+from swashplate.flights.maneuvers import parse as parse_maneuver
+from swashplate.physics.environment import Environment
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    rk4_step_looped,
+    row_rates,
+)
+from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.trim import Trim, start_row, trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
+
+REFERENCES = ("x", "y", "z", "psi")
+"""What a controller is asked to hold, in the order of the reference row."""
+
+
+class Controller(Protocol):
+    """Something that turns measured states into inputs.
+
+    Attributes:
+        rate: how often it runs [Hz]; a whole part of the simulation's rate.
+        memory: its state at the start, a row of numbers.
+        gains: its numbers, a row, so that other gains compile nothing anew.
+        step: a module's function `(memory, time, measured, reference, gains) -> (memory, inputs)`; `measured` is the
+            vehicle's state row, `reference` the row of `REFERENCES`. JAX traces it.
+    """
+
+    @property
+    def rate(self) -> float: ...
+    @property
+    def memory(self) -> Array: ...
+    @property
+    def gains(self) -> Array: ...
+    @property
+    def step(self) -> Step: ...
+
+
+def simulate_closed_loop(
+    vehicle: Vehicle,
+    controller: Controller,
+    *,
+    duration: float,
+    reference: Mapping[str, ArrayLike] | None = None,
+    excitation: Mapping[str, ArrayLike] | None = None,
+    voltage: ArrayLike | None = None,
+    wind: Mapping[str, ArrayLike] | None = None,
+    start: Trim | Mapping[str, float] | None = None,
+    rate: float = 100.0,
+    environment: Environment | None = None,
+) -> Flight:
+    """Fly a vehicle under a controller, with an excitation added to what the controller commands.
+
+    Args:
+        vehicle, start, rate, environment: as in `simulate`; inputs are held over a step.
+        controller: see `Controller`.
+        duration: [s].
+        reference: numbers or series (n,) of `REFERENCES`; what is not given stays at the start's value.
+        excitation: series (n,) by input name, added to the commands before the limits.
+        voltage: battery voltage [V], a number or series (n,).
+        wind: "wind_north", "wind_east", "wind_down" [m/s], numbers or series (n,).
+
+    Returns:
+        The true flight; its inputs are what the actuators got: command and excitation, limited.
+
+    Raises:
+        DivergenceError: with the time, the state that went first and the flight up to there.
+    """
+    enable_double_precision()
+    every = rate / controller.rate
+    if every < 1.0 or abs(every - round(every)) > 1e-9:
+        raise SwashError(f"the controller runs at {controller.rate:g} Hz, expected a whole part of {rate:g} Hz.")
+    n = round(duration * rate) + 1
+    if n < 2:
+        raise SwashError(f"duration is {duration} s, expected at least one step of {1.0 / rate:g} s.")
+    surroundings = environment or Environment()
+    given = {**(wind or {}), **({} if voltage is None else {"voltage": voltage})}
+    around = _table(SURROUNDINGS, given, n, [getattr(surroundings, name) for name in SURROUNDINGS])
+    x0 = start_row(vehicle, start, surroundings._replace(**dict(zip(SURROUNDINGS, around[0], strict=True))))
+    wanted = _table(REFERENCES, reference or {}, n, [x0[vehicle.index(name)] for name in REFERENCES])
+    added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
+    states, inputs = _fly(
+        equations_of(vehicle),
+        controller.step,
+        round(every),
+        x0,
+        jnp.asarray(controller.memory),
+        jnp.asarray(controller.gains),
+        (around, wanted, added),
+        parameter_row(vehicle, surroundings),
+        np.array(vehicle.input_limits).T,
+        1.0 / rate,
+    )
+    time, rows = np.arange(n) / rate, np.concatenate([np.asarray(inputs), around], axis=1)
+    flight = simulated_flight(
+        vehicle, time, np.asarray(states), rows, details={"rate": rate, "controller_rate": controller.rate}
+    )
+    check_divergence(vehicle, time, np.asarray(states), flight)
+    return flight
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _fly(
+    equations: Equations,
+    control: Step,
+    every: int,
+    x0: Any,
+    memory: Any,
+    gains: Any,
+    tables: Any,
+    p: Any,
+    limits: Any,
+    dt: Any,
+) -> tuple[Any, Any]:
+    rates = row_rates(equations, padded=True)
+    around, wanted, added = tables
+
+    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+        x, memory, command, k = carry
+        surroundings, reference, excitation = now
+        fresh_memory, fresh = control(memory, k * dt, x, reference, gains)
+        due = k % every == 0
+        memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
+        inputs = jnp.clip(command + excitation, limits[0], limits[1])
+        w = jnp.concatenate([inputs, surroundings])
+        after = rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
+        return (after, memory, command, k + 1), (x, inputs)
+
+    nothing = jnp.zeros(added.shape[1])
+    _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, 0), (around, wanted, added))
+    return record  # type: ignore[no-any-return]
+
+
+def _table(names: tuple[str, ...], given: Mapping[str, ArrayLike], n: int, default: list[Any]) -> Array:
+    for name, values in given.items():
+        if name not in names:
+            raise SwashError(f"is not known here; expected {', '.join(names)}.", channel=name)
+        if np.ndim(values) and np.shape(values) != (n,):
+            raise SwashError(f"has shape {np.shape(values)}, expected ({n},).", channel=name)
+    return np.stack(
+        [np.broadcast_to(np.asarray(given.get(k, d), float), (n,)) for k, d in zip(names, default, strict=True)], 1
+    )
+
+
+def simulate_maneuver(
+    vehicle: Vehicle,
+    maneuver: Maneuver | str,
+    *,
+    controller: Callable[[Vehicle, Trim], Controller],
+    lead: float = 3.0,
+    tail: float = 3.0,
+    voltage: float | None = None,
+    sag: float = 0.0,
+    rate: float = 100.0,
+    wind: Mapping[str, ArrayLike] | None = None,
+    environment: Environment | None = None,
+) -> Flight:
+    """A maneuver flown from hover with a controller that keeps the vehicle around.
+
+    Args:
+        vehicle: what flies.
+        maneuver: a `Maneuver` or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
+        controller: makes the controller for the vehicle and its trim, e.g. `swashplate.control.hold.hover_hold`.
+        lead, tail: hover before and after [s].
+        voltage: battery voltage at the start [V].
+        sag: how much the voltage falls per second [V/s].
+        rate: samples per second [Hz].
+        wind, environment: as in `simulate_closed_loop`.
+    """
+    excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
+    duration = lead + excitation.duration + tail
+    time = np.arange(round(duration * rate) + 1) / rate
+    start = trim(vehicle, voltage=voltage, environment=environment)
+    return simulate_closed_loop(
+        vehicle,
+        controller(vehicle, start),
+        duration=duration,
+        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names),
+        voltage=float(start.environment.voltage) - sag * time,
+        wind=wind,
+        start=start,
+        rate=rate,
+        environment=environment,
+    )

@@ -1,0 +1,125 @@
+"""`simulate`: fixed-step Runge-Kutta in one compiled loop, from inputs to a `Flight`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.physics.environment import Environment
+from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    rk4_step_looped,
+    row_rates,
+)
+from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.trim import Trim, start_row
+from swashplate.vehicles.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from swashplate.simulation.sensors import Sensors
+
+Array = NDArray[np.float64]
+
+
+def simulate(
+    vehicle: Vehicle,
+    inputs: Inputs,
+    *,
+    start: Trim | Mapping[str, float] | None = None,
+    rate: float = 100.0,
+    substeps: int = 1,
+    interpolation: Interpolation = "held",
+    environment: Environment | None = None,
+    sensors: Sensors | None = None,
+    seed: int | None = None,
+) -> Flight:
+    """Fly a vehicle through given inputs; classical Runge-Kutta of order 4, float64.
+
+    Args:
+        vehicle: what flies.
+        inputs: a flight, a mapping from input names to series (or numbers) at `rate`, or an array (n, n_inputs).
+            Channels "voltage", "wind_north", "wind_east" and "wind_down" replace the environment's constants.
+        start: a `Trim`, or states by name (the others as at hover), or None for hover in the first sample's
+            surroundings.
+        rate: samples and steps per second [Hz].
+        substeps: Runge-Kutta steps per sample.
+        interpolation: inputs "held" from sample to sample (as a digital controller does) or "linear" between them.
+        environment: air, gravity, and wind and voltage where `inputs` has none.
+        sensors: sensor models that turn the true flight into a log; they need a `seed`.
+        seed: of the sensors' noise; the same call with the same seed gives the same bits on the same machine.
+
+    Returns:
+        The true flight, stream "uniform" (time, all states, inputs, voltage, wind), or what the sensors make of it.
+
+    Raises:
+        DivergenceError: with the time, the state that went first and the flight up to there.
+        FlightError: where an input is missing or not finite.
+    """
+    enable_double_precision()
+    if substeps < 1:
+        raise SwashError(f"substeps is {substeps}, expected at least 1.")
+    surroundings = environment or Environment()
+    time, rows = driving_rows(vehicle, inputs, rate=rate, environment=surroundings, interpolation=interpolation)
+    first = dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True))
+    x0 = start_row(vehicle, start, surroundings._replace(**first))
+    states = np.asarray(
+        trajectory(
+            equations_of(vehicle),
+            x0,
+            rows,
+            parameter_row(vehicle, surroundings),
+            1.0 / rate,
+            substeps=substeps,
+            held=interpolation == "held",
+        )
+    )
+    flight = simulated_flight(
+        vehicle, time, states, rows, details={"rate": rate, "substeps": substeps, "interpolation": interpolation}
+    )
+    check_divergence(vehicle, time, states, flight)
+    if sensors is None:
+        return flight
+    from swashplate.simulation.sensors import observe
+
+    if seed is None:
+        raise SwashError("sensors need a seed, so that the same call gives the same numbers.", hint="Pass seed=0.")
+    return observe(flight, vehicle, sensors=sensors, seed=seed)
+
+
+@partial(jax.jit, static_argnums=0, static_argnames=("substeps", "held"))
+def trajectory(equations: Equations, x0: Any, rows: Any, p: Any, dt: Any, *, substeps: int, held: bool) -> Any:
+    """States at every sample, shape (n, n_states), from driving rows of shape (n, n_inputs + 4).
+
+    Compiled once per vehicle equations and shape; the card's numbers are arguments.
+    """
+    rates = row_rates(equations, padded=True)
+    h = dt / substeps
+
+    def sample(x: Any, ends: tuple[Any, Any]) -> tuple[Any, Any]:
+        w0, w1 = ends
+
+        def substep(x: Any, i: Any) -> Any:
+            def drive(fraction: Any) -> Any:
+                return w0 if held else w0 + ((i + fraction) / substeps) * (w1 - w0)
+
+            return rk4_step_looped(lambda x, w: rates(x, w, p), x, drive, h)
+
+        after = substep(x, 0.0) if substeps == 1 else jax.lax.fori_loop(0, substeps, lambda i, x: substep(x, i), x)
+        return after, after
+
+    ends = (rows[:-1], rows[:-1] if held else rows[1:])
+    _, later = jax.lax.scan(sample, jnp.asarray(x0), ends)
+    return jnp.concatenate([jnp.asarray(x0)[None], later])

@@ -1,0 +1,148 @@
+"""Linear models about a trim, by automatic differentiation, with named states and inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    row_rates,
+)
+from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import trim as find_trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+_ORIGIN = 1e-6
+"""1/s; chains of integrators leave eigenvalues of rounding's root about the origin, which are no modes."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One real eigenvalue or one conjugate pair.
+
+    Attributes:
+        eigenvalue: with the positive imaginary part [1/s].
+        frequency: its modulus, the natural frequency [rad/s].
+        damping: damping ratio; 1 for a stable real mode, -1 for an unstable one, 0 at the origin.
+        time_constant: -1 / real part [s]; negative where the mode grows, infinite where it does neither.
+        states: the states that take part most, largest first, with their share (participation factors).
+    """
+
+    eigenvalue: complex
+    frequency: float
+    damping: float
+    time_constant: float
+    states: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """dx/dt = A x + B u, y = C x + D u, for deviations from a trim.
+
+    Attributes:
+        A, B, C, D: matrices; the outputs are the states.
+        G: effect of wind (north, east, down) and voltage, columns in that order.
+        states, inputs, disturbances: names of the columns.
+        trim: what the deviations are counted from.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    G: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    disturbances: tuple[str, ...]
+    trim: Trim
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Eigenvalues with damping and frequency, fastest first."""
+        values, right = np.linalg.eig(self.A)
+        # Defective matrices (the chains of integrators of a hovering vehicle) have no left eigenvectors by inversion.
+        left = np.linalg.pinv(right).T
+        share = np.abs(right * left)
+        share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
+        found = []
+        for i in np.argsort(-np.abs(values), kind="stable"):
+            value = complex(values[i]) if abs(values[i]) > _ORIGIN else 0j
+            if value.imag < 0.0:
+                continue
+            order = np.argsort(-share[:, i], kind="stable")[:3]
+            frequency = abs(value)
+            found.append(
+                Mode(
+                    value,
+                    frequency,
+                    -value.real / frequency if frequency > 0.0 else 0.0,
+                    -1.0 / value.real if value.real != 0.0 else np.inf,
+                    tuple((self.states[j], float(share[j, i])) for j in order),
+                )
+            )
+        return tuple(found)
+
+    def to_control(self) -> Any:
+        """The model as a `control.StateSpace` of python-control with named signals."""
+        import control
+
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            states=list(self.states),
+            inputs=list(self.inputs),
+            outputs=list(self.states),
+        )
+
+    def __repr__(self) -> str:
+        lines = [f"LinearModel: {len(self.states)} states, inputs {', '.join(self.inputs)}"]
+        lines.append(f"  {'eigenvalue [1/s]':<22}{'frequency [rad/s]':>18}{'damping':>9}  states")
+        for mode in self.modes():
+            value = mode.eigenvalue
+            text = f"{value.real:+.3f}" + (f" +/- {value.imag:.3f}j" if value.imag > 0.0 else "")
+            taking_part = ", ".join(name for name, share in mode.states if share > 0.1)
+            lines.append(f"  {text:<22}{mode.frequency:>18.3f}{mode.damping:>9.3f}  {taking_part}")
+        return "\n".join(lines)
+
+
+def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
+    """The linear model of a vehicle about a trim (hover where none is given), by exact forward differentiation.
+
+    Quadratic terms such as u |u| have no slope at hover; about a trim in forward flight they have.
+    """
+    enable_double_precision()
+    about = trim if trim is not None else find_trim(vehicle)
+    surroundings = [getattr(about.environment, name) for name in SURROUNDINGS]
+    w = np.array([*about.inputs, *surroundings], dtype=np.float64)
+    A, W = _jacobians(equations_of(vehicle), about.state, w, parameter_row(vehicle, about.environment))
+    n, m = len(vehicle.state_names), len(vehicle.input_names)
+    return LinearModel(
+        A=np.asarray(A),
+        B=np.asarray(W)[:, :m],
+        C=np.eye(n),
+        D=np.zeros((n, m)),
+        G=np.asarray(W)[:, m:],
+        states=vehicle.state_names,
+        inputs=vehicle.input_names,
+        disturbances=SURROUNDINGS,
+        trim=about,
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def _jacobians(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    return jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))(x, w, p)  # type: ignore[no-any-return]

@@ -1,0 +1,228 @@
+"""Equilibria: the attitude, inputs and inner states with which a vehicle flies steadily."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import TrimError
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, local_to_body
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    jax_backend,
+    parameter_row,
+    row_rates,
+)
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_BODY = len(RigidBody._fields)
+_ACCELERATIONS = slice(3, 6)
+_ANGULAR_ACCELERATIONS = slice(9, 12)
+_STEPS = 60
+_TOLERANCE = 1e-10
+"""m/s^2 and rad/s^2 (and inner rates): far below any sensor, far above rounding."""
+
+
+@dataclass(frozen=True)
+class Trim:
+    """A steady flight.
+
+    Attributes:
+        state, inputs: rows in the order of the names.
+        state_names, input_names: their names.
+        environment: wind, air, gravity and voltage that it holds for.
+        speed, lateral, climb: velocity ahead, to the right (both level, in the direction of heading) and up [m/s].
+        residual: the largest rate of change left [SI units].
+    """
+
+    state: Array
+    inputs: Array
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    environment: Environment
+    speed: float
+    lateral: float
+    climb: float
+    residual: float
+
+    def states(self) -> dict[str, float]:
+        """The states by name."""
+        return dict(zip(self.state_names, self.state.tolist(), strict=True))
+
+    def commands(self) -> dict[str, float]:
+        """The inputs by name."""
+        return dict(zip(self.input_names, self.inputs.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        head = f"Trim at {self.speed:g} m/s ahead, {self.lateral:g} m/s right, {self.climb:g} m/s up, "
+        head += f"{float(self.environment.voltage):g} V (residual {self.residual:.1e})"
+        lines = [
+            f"  {name:<14}{round(value, 5) + 0.0: .5f}" for name, value in {**self.commands(), **self.states()}.items()
+        ]
+        return "\n".join([head, *lines])
+
+
+def trim(
+    vehicle: Vehicle,
+    *,
+    speed: float = 0.0,
+    lateral: float = 0.0,
+    climb: float = 0.0,
+    heading: float = 0.0,
+    voltage: float | None = None,
+    environment: Environment | None = None,
+) -> Trim:
+    """The steady straight flight of a vehicle at a given ground velocity, by Newton's method with exact derivatives.
+
+    Attitude, inputs and inner states (disc tilt, bar, rotor speeds) are solved for so that every rate but that of
+    the position vanishes.
+
+    Args:
+        vehicle: whose state begins with a `RigidBody`.
+        speed, lateral, climb: velocity ahead and to the right in the level plane of the heading, and up [m/s].
+        heading: psi [rad].
+        voltage: battery voltage [V], instead of the environment's.
+        environment: surroundings; wind enters as it should (a trim in wind is not a trim in calm air).
+
+    Raises:
+        TrimError: naming the input whose limit prevents it, or the state that does not come to rest.
+    """
+    enable_double_precision()
+    surroundings = environment or Environment()
+    if voltage is not None:
+        surroundings = surroundings._replace(voltage=voltage)
+    if vehicle.state_names[:_BODY] != RigidBody._fields:
+        raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
+    equations = equations_of(vehicle)
+    course = np.array([speed, lateral, -climb, heading])
+    row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
+    p = parameter_row(vehicle, surroundings)
+
+    def residual(z: Array) -> tuple[Array, Array]:
+        value, slope = _residual(equations, z, course, row, p)
+        return np.asarray(value), np.asarray(slope)
+
+    z = _first_guess(vehicle, residual)
+    z, value = _newton(z, residual)
+    state, inputs = (np.asarray(part) for part in _assemble(equations, z, course))
+    largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
+    where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up at {float(surroundings.voltage):g} V"
+    if not largest < _TOLERANCE:
+        worst = _residual_names(vehicle)[int(np.argmax(np.nan_to_num(np.abs(value), nan=np.inf)))]
+        raise TrimError(
+            f"no equilibrium was found for {where}: {worst} keeps changing at {largest:.2g} per second.",
+            where=vehicle.name,
+            channel=worst,
+            hint="Ask for a slower flight, or check the card.",
+        )
+    _check_limits(vehicle, inputs, where)
+    return Trim(state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest)
+
+
+def _assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
+    """State and input rows from the unknowns: roll, pitch, inputs, inner states."""
+    n_inputs = len(equations.vehicle.input_names)
+    attitude = Euler(z[0], z[1], course[3])
+    c, s = jnp.cos(course[3]), jnp.sin(course[3])
+    local = Vector(c * course[0] - s * course[1], s * course[0] + c * course[1], course[2])
+    velocity = local_to_body(local, attitude, jax_backend())
+    zero = jnp.zeros(3)
+    state = jnp.concatenate([zero, jnp.stack(velocity), jnp.stack(attitude), zero, z[2 + n_inputs :]])
+    return state, z[2 : 2 + n_inputs]
+
+
+@partial(jax.jit, static_argnums=0)
+def _residual(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple[Any, Any]:
+    """What should vanish, and its derivatives by the unknowns."""
+
+    def rest(z: Any) -> tuple[Any, Any]:
+        state, inputs = _assemble(equations, z, course)
+        rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
+        value = jnp.concatenate([rates[_ACCELERATIONS], rates[_ANGULAR_ACCELERATIONS], rates[_BODY:]])
+        return value, value
+
+    slope, value = jax.jacfwd(rest, has_aux=True)(z)
+    return value, slope
+
+
+def _residual_names(vehicle: Vehicle) -> tuple[str, ...]:
+    names = vehicle.state_names
+    return (*names[_ACCELERATIONS], *names[_ANGULAR_ACCELERATIONS], *names[_BODY:])
+
+
+def _first_guess(vehicle: Vehicle, residual: Any) -> Array:
+    """Level, inputs in the middle of their ranges, and the inner states where these inputs hold them."""
+    middle = [0.5 * (low + high) for low, high in vehicle.input_limits]
+    inner = len(vehicle.state_names) - _BODY
+    z = np.array([0.0, 0.0, *middle, *np.zeros(inner)])
+    for _ in range(5):
+        value, slope = residual(z)
+        z[z.size - inner :] -= np.linalg.lstsq(slope[6:, z.size - inner :], value[6:], rcond=None)[0]
+    return z
+
+
+def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
+    """Newton's method; a step is halved until the residual shrinks."""
+    value, slope = residual(z)
+    for _ in range(_STEPS):
+        if not np.all(np.isfinite(slope)) or np.max(np.abs(value)) < 1e-3 * _TOLERANCE:
+            break
+        step = -np.linalg.lstsq(slope, value, rcond=None)[0]
+        for fraction in 0.5 ** np.arange(12):
+            tried, tried_slope = residual(z + fraction * step)
+            if np.linalg.norm(tried) < np.linalg.norm(value):
+                break
+        else:
+            break
+        z, value, slope = z + fraction * step, tried, tried_slope
+    return z, value
+
+
+def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
+    for name, value, (low, high) in zip(vehicle.input_names, inputs, vehicle.input_limits, strict=True):
+        if not low <= value <= high:
+            limit = high if value > high else low
+            raise TrimError(
+                f"{where} needs {name} = {value:.3f}, but its limit is {limit:g}.",
+                where=vehicle.name,
+                channel=name,
+                hint="Ask for a slower flight, less payload or a fuller battery.",
+            )
+
+
+def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, environment: Environment) -> Array:
+    """The state row that a simulation starts from: a trim's, hover's, or hover's with some states replaced.
+
+    Raises:
+        TrimError: where a named state is not one of the vehicle's.
+    """
+    if isinstance(start, Trim):
+        if start.state_names != vehicle.state_names:
+            raise TrimError("the start is a trim of another vehicle.", where=vehicle.name)
+        return np.array(start.state)
+    named = dict(start or {})
+    for name in named:
+        if name not in vehicle.state_names:
+            raise TrimError(
+                f"is not a state; expected {', '.join(vehicle.state_names)}.", where=vehicle.name, channel=name
+            )
+    if set(named) == set(vehicle.state_names):
+        return np.array([named[name] for name in vehicle.state_names], dtype=np.float64)
+    row = np.array(trim(vehicle, environment=environment).state)
+    for name, value in named.items():
+        row[vehicle.index(name)] = value
+    return row
