@@ -1,0 +1,92 @@
+"""Ties between parameters: a small arithmetic grammar that is parsed and walked, never evaluated as code.
+
+expression = number | name | expression (+ - * /) expression | -expression | (expression)
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from swashplate.errors import ExpressionError
+
+_OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: lambda a, b: a / b,
+}
+_LONGEST = 500
+
+
+class Expression:
+    """A parsed expression.
+
+    Attributes:
+        text: as the user wrote it.
+        names: the parameters that it uses.
+    """
+
+    def __init__(self, text: str) -> None:
+        if len(text) > _LONGEST:
+            raise ExpressionError(f"an expression of {len(text)} characters is too long (at most {_LONGEST}).")
+        try:
+            tree = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise _refused(text) from None
+        self.text = text.strip()
+        self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+        self._tree = tree
+        _check(tree, text)
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        """The expression's value for the parameters' values (numbers or traced numbers)."""
+        return _walk(self._tree, values)
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text!r})"
+
+
+def _refused(text: str) -> ExpressionError:
+    return ExpressionError(
+        f"'{text.strip()}' is not an expression of numbers, parameter names, + - * / and brackets.",
+        hint="An example: 'a_beta_u = a_alpha_v' or 'Lw = 2 * Mu'.",
+    )
+
+
+def _check(node: ast.expr, text: str) -> None:
+    match node:
+        case ast.Name():
+            return
+        case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(value, bool):
+            return
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
+            _check(operand, text)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            _check(left, text)
+            _check(right, text)
+        case _:
+            raise _refused(text)
+
+
+def _walk(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.Name(id=name):
+            return values[name]
+        case ast.Constant(value=value):
+            return float(value)  # type: ignore[arg-type]
+        case ast.UnaryOp(op=op, operand=operand):
+            inner = _walk(operand, values)
+            return -inner if isinstance(op, ast.USub) else inner
+        case ast.BinOp(left=left, op=op, right=right):
+            return _OPERATORS[type(op)](_walk(left, values), _walk(right, values))
+    raise AssertionError("checked when parsed")
+
+
+def parse_tie(text: str) -> tuple[str, Expression]:
+    """`"name = expression"` as the tied name and what it is tied to."""
+    name, equals, right = text.partition("=")
+    if not equals or not name.strip().isidentifier():
+        raise ExpressionError(f"'{text}' is not of the form 'name = expression'.")
+    return name.strip(), Expression(right)

@@ -1,0 +1,131 @@
+"""Does a record move each axis by itself, or is the command only a controller's answer to the motion?
+
+A command that past motion explains carries no information of its own: whatever relates it to the motion is the
+controller, and a fit of the aircraft to it may well find minus the controller's inverse (Ljung 1999, ch. 13).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, coherence, csd, sosfiltfilt
+
+from swashplate.flights.flight import Array
+from swashplate.identification.fit import AxisExcitation
+from swashplate.identification.kinematics import PREDICTED
+from swashplate.identification.records import Record
+from swashplate.vehicles.vehicle import Vehicle
+
+EXPLAINED = 0.99
+"""Share of a command's variance that past motion may explain before the axis counts as not excited."""
+
+WEAK = 0.90
+"""Share above which the excitation is called weak: what the axis tells then rests on the noise model and the priors."""
+
+_BAND = (0.3, 8.0)
+_LAGS = 0.3
+_MOVED = 1e-4
+
+
+@dataclass(frozen=True)
+class _Axis:
+    name: str
+    weights: dict[str, float]
+    motion: tuple[str, ...]
+    response: str
+    parameters: tuple[str, ...]
+
+
+AXES = (
+    _Axis("roll", {"servo_roll": 1.0}, ("phi", "p", "lateral", "v"), "p", ()),
+    _Axis("pitch", {"servo_pitch": 1.0}, ("theta", "q", "forward", "u"), "q", ()),
+    _Axis("yaw", {"motor_upper": 1.0, "motor_lower": -1.0}, ("psi", "r"), "r", ("damping_r", "inertia_zz")),
+    _Axis("heave", {"motor_upper": 0.5, "motor_lower": 0.5}, ("z", "w"), "w", ("damping_w",)),
+)
+"""The axes of a coaxial helicopter, what drives them, and the parameters that only they can tell."""
+
+
+def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExcitation, ...]:
+    """Independent excitation of each axis of a record.
+
+    Args:
+        states: body states (n, 12) of the record.
+    """
+    motion = {name: states[:, i] for i, name in enumerate(PREDICTED)}
+    heading = motion["psi"]
+    motion["forward"] = np.cos(heading) * motion["x"] + np.sin(heading) * motion["y"]
+    motion["lateral"] = -np.sin(heading) * motion["x"] + np.cos(heading) * motion["y"]
+    found = []
+    for axis in AXES:
+        command = np.zeros(record.time.size)
+        for name, weight in axis.weights.items():
+            command = command + weight * record.inputs[:, vehicle.input_names.index(name)]
+        found.append(_judge(record, axis, command, motion))
+    return tuple(found)
+
+
+def _judge(record: Record, axis: _Axis, command: Array, motion: dict[str, Array]) -> AxisExcitation:
+    rate = 1.0 / record.dt
+    high = min(_BAND[1], 0.4 * rate)
+    sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
+    banded = sosfiltfilt(sos, command)
+    power = float(np.std(banded))
+    explained = _explained(command, [motion[name] for name in axis.motion], rate)
+    peak, phase = _coherence(command, motion[axis.response], rate, high)
+    still = power < _MOVED
+    identifiable = not still and explained < EXPLAINED
+    return AxisExcitation(
+        record=record.name,
+        axis=axis.name,
+        command=" - ".join(axis.weights) if axis.name == "yaw" else " + ".join(axis.weights),
+        explained=explained,
+        coherence=peak,
+        phase=phase,
+        power=power,
+        identifiable=identifiable,
+        words=_words(axis.name, explained, peak, phase, still=still, identifiable=identifiable),
+    )
+
+
+def _explained(command: Array, motion: list[Array], rate: float) -> float:
+    """Adjusted R^2 of the command on present and past motion, everything low-passed to the band and decimated."""
+    keep = max(1, round(rate / (4.0 * _BAND[1])))
+    sos = butter(4, min(_BAND[1], 0.4 * rate), fs=rate, output="sos")
+    slow = [sosfiltfilt(sos, signal)[::keep] for signal in (command, *motion)]
+    lags = max(1, round(_LAGS * rate / keep))
+    n = slow[0].size - lags
+    if n < 4 * lags * len(motion):
+        return float("nan")
+    columns = [signal[lags - lag : lags - lag + n] for signal in slow[1:] for lag in range(lags + 1)]
+    trend = np.linspace(-1.0, 1.0, n)
+    table = np.column_stack([np.ones(n), trend, trend**2, *columns])
+    target = slow[0][lags:]
+    residual = target - table @ np.linalg.lstsq(table, target, rcond=None)[0]
+    base = target - table[:, :3] @ np.linalg.lstsq(table[:, :3], target, rcond=None)[0]
+    freedom = (n - 3) / max(n - table.shape[1], 1)
+    return float(max(0.0, 1.0 - freedom * (residual @ residual) / max(base @ base, 1e-30)))
+
+
+def _coherence(command: Array, response: Array, rate: float, high: float) -> tuple[float, float]:
+    length = int(min(command.size, 4.0 * rate))
+    frequency, squared = coherence(command, response, rate, nperseg=length)
+    cross = csd(command, response, rate, nperseg=length)[1]
+    band = (frequency >= _BAND[0]) & (frequency <= high)
+    best = np.flatnonzero(band)[np.argmax(squared[band])]
+    return float(squared[best]), float(np.angle(cross[best]))
+
+
+def _words(axis: str, explained: float, peak: float, phase: float, *, still: bool, identifiable: bool) -> str:
+    if still:
+        return f"{axis}: the command does not move. Fly a sweep or a multisine in {axis}."
+    share = f"past motion explains {100 * explained:.0f} % of the command (coherence up to {peak:.2f}"
+    share += f" at {np.degrees(phase):+.0f} deg)"
+    if identifiable and explained > WEAK:
+        return f"{axis}: {share}: mostly a controller's answer; the axis is weakly excited, believe it with its bound."
+    if identifiable:
+        return f"{axis}: {share}; the rest moves the axis independently."
+    return (
+        f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
+        f"controller. Add an independent sweep or multisine to the {axis} reference and log rotor speed and voltage."
+    )

@@ -1,0 +1,258 @@
+"""Maximum likelihood by output errors over many short shots: right where no gust disturbs and no loop is closed.
+
+Each record is cut into windows that start from their own free initial state (multiple shooting), so that neither an
+unstable mode nor a long record lets the simulation run away. The cost is 1/2 sum v' R^-1 v + N/2 ln |R| with R from the
+residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Array
+from swashplate.identification import robust
+from swashplate.identification.parameters import Parameterization
+from swashplate.identification.prediction_error import parameter_entries, stack_records
+from swashplate.identification.records import Record
+from swashplate.identification.rows import Entry, Row
+from swashplate.identification.start_states import slopes, start_state
+from swashplate.identification.stochastic import N_DISTURBANCES, Nuisance, commands, stochastic_model
+
+WINDOW = 4.0
+"""Seconds of one shot: many periods of the fast modes, and short against the growth of the slow unstable ones."""
+
+_NUISANCE = {
+    # name: scale, prior sigma
+    "delay_servo": (0.05, 0.05),
+    "delay_motor": (0.05, 0.05),
+    "trim_motor_lower": (0.02, 0.05),
+    "trim_motor_upper": (0.02, 0.05),
+    "trim_servo_roll": (0.02, 0.1),
+    "trim_servo_pitch": (0.02, 0.1),
+    "lever_x": (0.05, 0.1),
+    "lever_y": (0.05, 0.1),
+    "lever_z": (0.05, 0.1),
+    "level_phi": (0.02, 0.1),
+    "level_theta": (0.02, 0.1),
+}
+
+_INITIAL = {
+    # state: scale, prior sigma of its correction; pose and velocities are free, hidden states stay near their guess
+    **dict.fromkeys(("x", "y", "z", "phi", "theta", "psi"), (0.01, 1.0)),
+    **dict.fromkeys(("u", "v", "w", "p", "q", "r"), (0.1, 10.0)),
+    **dict.fromkeys(("alpha_lower", "beta_lower", "eta_bar", "zeta_bar"), (0.02, 0.1)),
+    **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
+}
+
+
+class OutputError:
+    """The residuals' likelihood of windows simulated from their own initial states.
+
+    Args:
+        table: free parameters and ties.
+        pieces: the records, all at one rate.
+        window: length of one shot [s].
+        nuisances: which of the records' own numbers to estimate (names of `Nuisance`).
+    """
+
+    def __init__(
+        self,
+        table: Parameterization,
+        pieces: Sequence[Record],
+        *,
+        window: float = WINDOW,
+        nuisances: Sequence[str] = tuple(_NUISANCE),
+    ) -> None:
+        self.table = table
+        self.pieces = tuple(pieces)
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
+        self.nuisances = tuple(nuisances)
+        self.length = round(window / self.model.dt)
+        self._places = [
+            (number, first)
+            for number, piece in enumerate(pieces)
+            for first in range(0, piece.time.size - self.length, self.length)
+        ]
+        if not self._places:
+            longest = max(piece.time.size for piece in pieces) * self.model.dt
+            raise IdentificationError(
+                f"the longest record has {longest:.1f} s, expected more than one window of {window:g} s.",
+                hint="Choose a shorter window.",
+            )
+        states = table.vehicle.state_names
+        entries = parameter_entries(table)
+        for number in range(len(pieces)):
+            for name in self.nuisances:
+                scale, sigma = _NUISANCE[name]
+                low = -0.02 if name.startswith("delay") else -np.inf
+                entries.append(Entry(f"{name}[{number}]", "nuisance", 0.0, scale, low, np.inf, 0.0, sigma))
+        self._shared = len(entries)
+        for place in range(len(self._places)):
+            for name in states:
+                scale, sigma = _INITIAL[name]
+                entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
+        self.row = Row(tuple(entries))
+        self._scale = jnp.asarray(self.row.scale[: self._shared])
+        self._initial_scale = jnp.asarray([_INITIAL[name][0] for name in states])
+        self._data = self._windows()
+        self._residuals = jax.jit(self.residuals)
+        self._linearised = jax.jit(self._with_tangents)
+        self._L = np.eye(len(pieces[0].output_names))
+
+    def _windows(self) -> dict[str, Any]:
+        n = self.length
+        outputs, values, rates, offsets = [], [], [], []
+        for number, first in self._places:
+            piece = self.pieces[number]
+            value, rate = slopes(piece, np.array([first]))
+            outputs.append(piece.outputs[first : first + n])
+            values.append(value[0])
+            rates.append(rate[0])
+            offsets.append(first)
+        stacked = stack_records(self.pieces)
+        return {
+            "outputs": jnp.asarray(np.stack(outputs)),
+            "value": jnp.asarray(np.stack(values)),
+            "rate": jnp.asarray(np.stack(rates)),
+            "first": jnp.asarray(offsets),
+            "record": jnp.asarray([number for number, _ in self._places]),
+            "inputs": jnp.asarray(stacked["inputs"]),
+            "voltage": jnp.asarray(stacked["voltage"]),
+        }
+
+    # ---- traced ------------------------------------------------------------------------------------------------
+    def unpack(self, shared: Any) -> tuple[Any, Nuisance]:
+        """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
+        numbers = shared * self._scale
+        k, r, m = len(self.table.free), len(self.pieces), len(self.nuisances)
+        block = numbers[k : k + r * m].reshape(r, m)
+        nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+            **{name: block[:, i] for i, name in enumerate(self.nuisances)}
+        )
+        return self.table.values(numbers[:k]), nuisance
+
+    def _shoot(self, shared: Any, initial: Any, place: Any) -> tuple[Any, Any]:
+        """Outputs and states of one window."""
+        parameters, nuisances = self.unpack(shared)
+        record = self._data["record"][place]
+        nuisance = jax.tree.map(lambda values: values[record], nuisances)
+        reaching = commands(self.table.vehicle, self.model.dt, self._data["inputs"][record], nuisance)
+        first = self._data["first"][place]
+        cut = tuple(jax.lax.dynamic_slice_in_dim(u, first, self.length) for u in reaching)
+        voltage = jax.lax.dynamic_slice_in_dim(self._data["voltage"][record], first, self.length)
+        start = start_state(
+            self.table.vehicle,
+            self.model.output_names,
+            parameters,
+            nuisance,
+            value=self._data["value"][place],
+            rate=self._data["rate"][place],
+            inputs=cut[0][0] * 1.0,
+            voltage=voltage[0],
+        )
+        calm = jnp.zeros(N_DISTURBANCES)
+
+        def sample(x: Any, now: Any) -> tuple[Any, Any]:
+            u, volts = now
+            return self.model.step(x, calm, u, parameters, volts), x
+
+        _, states = jax.lax.scan(sample, start + initial * self._initial_scale, (cut, voltage))
+        return jax.vmap(lambda x: self.model.measure(x, nuisance))(states), states
+
+    def residuals(self, row: Any) -> tuple[Any, Any]:
+        """Residuals (windows, n, outputs) and states (windows, n, states)."""
+        shared = row[: self._shared]
+        initial = row[self._shared :].reshape(len(self._places), -1)
+        outputs, states = jax.vmap(lambda i, x0: self._shoot(shared, x0, i))(jnp.arange(len(self._places)), initial)
+        return self._data["outputs"] - outputs, states
+
+    def _with_tangents(self, row: Any) -> tuple[Any, Any]:
+        """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
+        shared = row[: self._shared]
+        initial = row[self._shared :].reshape(len(self._places), -1)
+        count = self._shared + initial.shape[1]
+
+        def one(place: Any, x0: Any) -> Any:
+            def outputs(both: Any) -> Any:
+                return self._shoot(both[: self._shared], both[self._shared :], place)[0]
+
+            both = jnp.concatenate([shared, x0])
+            return jax.vmap(lambda t: jax.jvp(outputs, (both,), (t,)), out_axes=(None, 0))(jnp.eye(count))
+
+        values, tangents = jax.vmap(one)(jnp.arange(len(self._places)), initial)
+        return self._data["outputs"] - values, -tangents
+
+    # ---- likelihood --------------------------------------------------------------------------------------------
+    def cost(self, row: Array) -> float:
+        """Negative log-likelihood with the covariance of the last accepted row."""
+        residual = np.asarray(self._residuals(jnp.asarray(row))[0])
+        return self._cost(residual)
+
+    def _cost(self, residual: Array) -> float:
+        flat = residual.reshape(-1, residual.shape[-1])
+        if not np.isfinite(flat).all():
+            return np.inf
+        white = np.linalg.solve(self._L, flat.T)
+        return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
+
+    def refresh(self, row: Array) -> None:
+        """Covariance of the residuals at an accepted row, outliers weighed down."""
+        flat = np.asarray(self._residuals(jnp.asarray(row))[0]).reshape(-1, self._L.shape[0])
+        if not np.isfinite(flat).all():
+            return
+        scale = 1.4826 * np.median(np.abs(flat), axis=0) + 1e-12
+        weight = np.minimum(robust.weights(flat / scale).min(axis=1), 1.0)[:, None]
+        R = (flat * weight).T @ flat / weight.sum()
+        floor = np.diag(np.full(R.shape[0], 1e-14))
+        self._L = np.linalg.cholesky(0.5 * (R + R.T) + floor)
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and information; windows share only the first entries (an arrow-shaped matrix)."""
+        residual, gradient, information, _ = self._accumulate(row)
+        return self._cost(residual), gradient, information
+
+    def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
+        values, tangents = self._linearised(jnp.asarray(row))
+        residual, derivative = np.asarray(values), np.asarray(tangents)
+        Li = np.linalg.inv(self._L)
+        white = residual @ Li.T
+        weight = robust.weights(white)
+        d_white = derivative @ Li.T
+        p, s, n = len(self.row), self._shared, len(self.table.vehicle.state_names)
+        gradient, information = np.zeros(p), np.zeros((p, p))
+        for place in range(len(self._places)):
+            own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
+            flat = d_white[place].reshape(s + n, -1)
+            gradient[own] += flat @ (white[place] * weight[place]).ravel()
+            information[np.ix_(own, own)] += flat @ flat.T
+        return residual, gradient, information, d_white
+
+    # ---- what the accuracy analysis and the report need --------------------------------------------------------
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array]]:
+        """Per window: whitened residuals (n, outputs) and their sensitivities (p, n, outputs)."""
+        residual, _, _, d_white = self._accumulate(row)
+        Li = np.linalg.inv(self._L)
+        p, s, n = len(self.row), self._shared, len(self.table.vehicle.state_names)
+        white, sensitivities = [], []
+        for place in range(len(self._places)):
+            full = np.zeros((p, *d_white.shape[2:]))
+            full[:s] = d_white[place, :s]
+            full[s + place * n : s + (place + 1) * n] = d_white[place, s:]
+            white.append(residual[place] @ Li.T)
+            sensitivities.append(full)
+        return white, sensitivities
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the output errors at the last accepted row."""
+        return np.asarray(self._L @ self._L.T)
+
+    def places(self) -> list[tuple[int, int]]:
+        """Record number and first sample of each window."""
+        return list(self._places)

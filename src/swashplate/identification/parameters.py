@@ -1,0 +1,225 @@
+"""Which parameters an identification may move: free, fixed, bounded, tied, or held by a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swashplate.errors import IdentificationError
+from swashplate.identification.expressions import Expression, parse_tie
+from swashplate.vehicles.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Free:
+    """One parameter that an identification may move.
+
+    Attributes:
+        name: its name on the card.
+        scale: a change of the order that matters, in the parameter's unit.
+        mean, sigma: prior (None: the data alone decides), in the parameter's unit.
+        start: first guess (None: the card's value).
+        source: where the prior comes from.
+    """
+
+    name: str
+    scale: float
+    mean: float | None = None
+    sigma: float | None = None
+    start: float | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A ready set of free parameters and ties.
+
+    Attributes:
+        name: what the user calls it.
+        description: what it is for.
+        free: the parameters to move.
+        ties: "name = expression" each.
+        fixed: values that the choice sets for the equations' switches.
+    """
+
+    name: str
+    description: str
+    free: tuple[Free, ...]
+    ties: tuple[str, ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
+
+
+_PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
+_LINEAR_TIES = (
+    "a_beta_u_linear = a_alpha_v_linear",
+    "a_beta_v_linear = a_alpha_u_linear",
+    "a_beta_q_linear = a_alpha_p_linear",
+)
+_CARD = "the published card, half its value"
+_LAG = "the published card, 0.3 rad"
+
+CHOICES: dict[str, Choice] = {
+    "flight": Choice(
+        "flight",
+        "the six parameters that the paper identifies in flight (Fankhauser et al., sec. IV-B)",
+        (
+            Free("a_alpha_v", 0.0125),
+            Free("a_alpha_u", 0.0125),
+            Free("a_alpha_p", 0.012),
+            Free("tau_f_upper", 1.0),
+            Free("o_zeta_upper", 0.1),
+            Free("o_zeta_lower", 0.1),
+        ),
+        _PAPER_TIES,
+    ),
+    "full": Choice(
+        "full",
+        "what a slow flight can tell: servo and bar effectiveness, lags, linear flap-back, rotor and heave damping",
+        (
+            Free("linkage_lower", 0.0678, 0.1355, 0.0678, source=_CARD),
+            Free("tau_f_lower", 0.04, 0.08, 0.04, source=_CARD),
+            Free("o_zeta_lower", 0.3, -0.0094, 0.3, source=_LAG),
+            Free("o_zeta_upper", 0.3, -0.1789, 0.3, source=_LAG),
+            Free("tau_f_upper", 0.8, 1.6, 0.8, source=_CARD),
+            Free("hub_stiffness_upper", 0.0542, 0.1084, 0.0542, source=_CARD),
+            Free("a_alpha_p_linear", 0.02, 0.021, 0.021, 0.021, "16 / (gamma Omega), gamma about 3.2"),
+            Free("a_alpha_v_linear", 0.02, 0.021, 0.021, 0.021, "flap-back of both rotors, 2 x 0.0103 rad s/m"),
+            Free("a_alpha_u_linear", 0.02, 0.0, 0.021, source="at most the flap-back"),
+            Free("gyroscopic", 0.5, 0.5, 0.5, 0.5, "between none and that of rigid rotors"),
+            Free("damping_r", 8.8e-4, 8.8e-4, 8.8e-4, 8.8e-4, "2 (k_Q Omega) of both rotors"),
+            Free("damping_w", 0.3, 0.3, 0.3, 0.3, "momentum theory in hover"),
+            Free("inertia_zz", 1.4e-4, 2.7786e-4, 1.4e-4, source=_CARD),
+            Free("tau_drive_upper", 0.09, 0.185, 0.09, source=_CARD),
+            Free("tau_drive_lower", 0.06, 0.115, 0.06, source=_CARD),
+        ),
+        (*_PAPER_TIES, *_LINEAR_TIES),
+        (("bar_heading_transport", 1.0),),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Parameterization:
+    """How a row of free numbers becomes the equations' parameters.
+
+    Attributes:
+        vehicle: whose parameters they are.
+        free: the parameters to move, in the row's order.
+        ties: tied names and their expressions, in an order in which each uses only what stands before.
+    """
+
+    vehicle: Vehicle
+    free: tuple[Free, ...]
+    ties: tuple[tuple[str, Expression], ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(free.name for free in self.free)
+
+    def starts(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """First guesses in the card's units."""
+        card = self.vehicle.card.values()
+        return np.array([card[f.name] if f.start is None else f.start for f in self.free], dtype=np.float64)
+
+    def bounds(self) -> tuple[np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.float64]]]:
+        """What physics allows, in the card's units (infinite where the card is silent)."""
+        entries = [self.vehicle.card.parameters[f.name] for f in self.free]
+        low = [-np.inf if entry.lower is None else entry.lower for entry in entries]
+        high = [np.inf if entry.upper is None else entry.upper for entry in entries]
+        return np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
+
+    def values(self, row: Any) -> Any:
+        """The equations' parameters for a row of free numbers (traceable)."""
+        numbers: dict[str, Any] = dict(self.vehicle.card.values())
+        for place, name in enumerate(self.names):
+            numbers[name] = row[place]
+        for name, expression in self.ties:
+            numbers[name] = expression(numbers)
+        return self.vehicle.parameters(*(numbers[name] for name in self.vehicle.parameter_names))
+
+    def identified(self, row: ArrayLike) -> dict[str, float]:
+        """Names and values of everything that moved, tied parameters too."""
+        numbers: dict[str, Any] = {
+            **self.vehicle.card.values(),
+            **dict(zip(self.names, map(float, np.asarray(row)), strict=True)),
+        }
+        for name, expression in self.ties:
+            numbers[name] = float(expression(numbers))
+        return {name: numbers[name] for name in (*self.names, *(name for name, _ in self.ties))}
+
+    def without(self, names: Iterable[str]) -> Parameterization:
+        """The same with some parameters fixed at the card."""
+        dropped = set(names)
+        return replace(self, free=tuple(free for free in self.free if free.name not in dropped))
+
+
+def parameterize(
+    vehicle: Vehicle,
+    free: str | Sequence[str | Free] = "full",
+    *,
+    ties: Sequence[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+) -> Parameterization:
+    """Free parameters, ties and priors, checked against the vehicle's card.
+
+    Args:
+        vehicle: whose parameters they are.
+        free: a ready choice ("flight": the paper's six; "full") or parameter names.
+        ties: "name = expression" each, beside those of the choice.
+        fixed: values held for parameters that are not free.
+        priors: mean and standard deviation by name; a prior here replaces the choice's.
+
+    Raises:
+        IdentificationError: for a name that the card does not have, or one that is both free and tied.
+    """
+    if isinstance(free, str) and free in CHOICES:
+        choice = CHOICES[free]
+        wanted, texts = list(choice.free), [*choice.ties, *ties]
+        vehicle = vehicle.with_values(dict(choice.fixed))
+    else:
+        names = [free] if isinstance(free, str) else list(free)
+        wanted, texts = [_as_free(vehicle, item) for item in names], list(ties)
+    if fixed:
+        _known(vehicle, fixed)
+        vehicle = vehicle.with_values(fixed)
+        wanted = [item for item in wanted if item.name not in fixed]
+    for name, (mean, sigma) in (priors or {}).items():
+        _known(vehicle, [name])
+        if not sigma > 0.0:
+            raise IdentificationError(f"prior sigma is {sigma}, expected a positive number.", channel=name)
+        wanted = [replace(f, mean=mean, sigma=sigma, source="given prior") if f.name == name else f for f in wanted]
+    tied = [parse_tie(text) for text in texts]
+    _known(vehicle, [f.name for f in wanted])
+    for name, expression in tied:
+        _known(vehicle, [name, *expression.names])
+    doubled = {f.name for f in wanted} & {name for name, _ in tied}
+    if doubled or len({f.name for f in wanted}) < len(wanted):
+        raise IdentificationError(f"{', '.join(sorted(doubled)) or 'a name'} is free twice or both free and tied.")
+    if not wanted:
+        raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(CHOICES)}.")
+    return Parameterization(vehicle, tuple(wanted), tuple(tied))
+
+
+def _as_free(vehicle: Vehicle, item: str | Free) -> Free:
+    if isinstance(item, Free):
+        return item
+    known = {free.name: free for choice in CHOICES.values() for free in choice.free}
+    if item in known:
+        return replace(known[item], mean=None, sigma=None)
+    _known(vehicle, [item])
+    return Free(item, abs(vehicle.card.parameters[item].value) or 0.01)
+
+
+def _known(vehicle: Vehicle, names: Iterable[str]) -> None:
+    unknown = sorted(set(names) - set(vehicle.parameter_names))
+    if unknown:
+        raise IdentificationError(
+            f"'{vehicle.name}' has no such parameter.",
+            channel=", ".join(unknown),
+            hint=f"Parameters are listed by 'swash vehicles show {vehicle.name}'.",
+        )

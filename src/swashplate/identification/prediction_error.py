@@ -1,0 +1,275 @@
+"""Maximum likelihood by prediction errors: the default for flights, which fly in disturbed air under feedback.
+
+The cost is the negative log-likelihood of the innovations of a constant-gain Kalman filter around the nonlinear
+equations, with the process and measurement noise estimated beside the parameters (filter error method: Maine and
+Iliff 1981; Jategaonkar 2015, ch. 5; Ljung 1999, ch. 7). Because every prediction uses only the past, a controller that
+answers to the measured motion does not bias it as it biases output error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.flights.flight import Array
+from swashplate.identification import robust
+from swashplate.identification.parameters import Parameterization
+from swashplate.identification.records import Record
+from swashplate.identification.rows import Entry, Row
+from swashplate.identification.start_states import hover, slopes, start_state
+from swashplate.identification.stochastic import (
+    N_DISTURBANCES,
+    FilterState,
+    Noise,
+    Nuisance,
+    commands,
+    stochastic_model,
+)
+
+SETTLING = 1.5
+"""Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
+
+_NOISE_SPREAD = {"tau_gust_moment": 0.5, "tau_gust_force": 0.5, "drift_moment": 0.5, "drift_force": 0.5}
+"""Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
+
+_NUISANCE = {
+    # name: start, scale, prior sigma
+    "delay_servo": (0.05, 0.05, 0.05),
+    "delay_motor": (0.05, 0.05, 0.05),
+    "trim_servo_roll": (0.0, 0.02, 0.05),
+    "trim_servo_pitch": (0.0, 0.02, 0.05),
+    "lever_x": (0.0, 0.05, 0.1),
+    "lever_y": (0.0, 0.05, 0.1),
+    "lever_z": (0.0, 0.05, 0.1),
+}
+
+
+def parameter_entries(table: Parameterization) -> list[Entry]:
+    """Row entries of the free parameters with their bounds and priors."""
+    low, high = table.bounds()
+    return [
+        Entry(
+            name=free.name,
+            group="parameter",
+            start=start,
+            scale=free.scale,
+            lower=lower,
+            upper=upper,
+            mean=0.0 if free.mean is None else free.mean,
+            sigma=np.inf if free.sigma is None else free.sigma,
+        )
+        for free, start, lower, upper in zip(table.free, table.starts(), low, high, strict=True)
+    ]
+
+
+def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
+    """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
+    longest = max(piece.time.size for piece in pieces)
+
+    def padded(rows: Array) -> Array:
+        return np.concatenate([rows, np.repeat(rows[-1:], longest - rows.shape[0], axis=0)])
+
+    return {
+        "outputs": np.stack([padded(piece.outputs) for piece in pieces]),
+        "inputs": np.stack([padded(piece.inputs) for piece in pieces]),
+        "voltage": np.stack([padded(piece.voltage) for piece in pieces]),
+        "mask": np.stack([np.arange(longest) < piece.time.size for piece in pieces]),
+    }
+
+
+class PredictionError:
+    """The innovations' likelihood of some records as a function of parameters, nuisances and noise.
+
+    Args:
+        table: free parameters and ties.
+        pieces: the records, all at one rate.
+        noise: first guesses of the noise.
+        estimate_noise: False keeps the noise at `noise`.
+        nuisance: centre of the priors on delays, trims and lever arms (None: the usual ones).
+    """
+
+    def __init__(
+        self,
+        table: Parameterization,
+        pieces: Sequence[Record],
+        *,
+        noise: Noise | None = None,
+        estimate_noise: bool = True,
+        nuisance: Nuisance | None = None,
+    ) -> None:
+        self.table = table
+        self.pieces = tuple(pieces)
+        self.noise = noise or Noise()
+        self.estimate_noise = estimate_noise
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
+        entries = parameter_entries(table)
+        for number in range(len(pieces)):
+            for name, (usual, scale, sigma) in _NUISANCE.items():
+                start = usual if nuisance is None else float(getattr(nuisance, name))
+                low = 0.0 if name.startswith("delay") else -np.inf
+                entries.append(Entry(f"{name}[{number}]", "nuisance", start, scale, low, np.inf, start, sigma))
+        if estimate_noise:
+            for name, value in self.noise._asdict().items():
+                log = float(np.log(value))
+                entries.append(
+                    Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
+                )
+        self.row = Row(tuple(entries))
+        self._data = {key: jnp.asarray(value) for key, value in stack_records(pieces).items()}
+        first = [slopes(piece, np.array([0])) for piece in pieces]
+        self._first = jnp.asarray(np.stack([v[0] for v, _ in first])), jnp.asarray(np.stack([r[0] for _, r in first]))
+        self._scale = jnp.asarray(self.row.scale)
+        settling = round(SETTLING / self.model.dt)
+        self.counted = np.stack(
+            [(np.arange(self._data["mask"].shape[1]) >= settling) & mask for mask in np.asarray(self._data["mask"])]
+        )
+        self._residuals = jax.jit(self.innovations)
+        self._linearised = jax.jit(self._with_tangents)
+
+    # ---- traced ------------------------------------------------------------------------------------------------
+    def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
+        """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
+        numbers = row * self._scale
+        k, r, m = len(self.table.free), len(self.pieces), len(_NUISANCE)
+        block = numbers[k : k + r * m].reshape(r, m)
+        nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+            **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
+        )
+        noise = Noise(*jnp.exp(numbers[k + r * m :])) if self.estimate_noise else self.noise
+        return self.table.values(numbers[:k]), nuisance, noise
+
+    def innovations(self, row: Any) -> tuple[Any, Any, FilterState]:
+        """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
+        parameters, nuisances, noise = self.unpack(row)
+
+        def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance) -> Any:
+            return filter_record(
+                self.model, y, u, voltage, value=value, rate=rate, parameters=parameters, noise=noise, nuisance=nuisance
+            )
+
+        return jax.vmap(one)(  # type: ignore[no-any-return]
+            self._data["outputs"], self._data["inputs"], self._data["voltage"], *self._first, nuisances
+        )
+
+    def _with_tangents(self, row: Any) -> Any:
+        def residuals(row: Any) -> Any:
+            return self.innovations(row)[:2]
+
+        return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,)), out_axes=(None, 0))(jnp.eye(len(self.row)))
+
+    # ---- likelihood --------------------------------------------------------------------------------------------
+    def cost(self, row: Array) -> float:
+        """Negative log-likelihood of the counted innovations (without its constant)."""
+        innovations, covariances, _ = self._residuals(jnp.asarray(row))
+        return self._cost(np.asarray(innovations), np.asarray(covariances))
+
+    def _cost(self, innovations: Array, covariances: Array) -> float:
+        total = 0.0
+        for nu, S, counted in zip(innovations, covariances, self.counted, strict=True):
+            nu = nu[counted]
+            if not (np.isfinite(nu).all() and np.isfinite(S).all()):
+                return np.inf
+            try:
+                L = np.linalg.cholesky(S)
+            except np.linalg.LinAlgError:
+                return np.inf
+            total += robust.huber(np.linalg.solve(L, nu.T)) + nu.shape[0] * float(np.log(np.diag(L)).sum())
+        return total
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
+        gradient, information, values, _ = self._accumulate(row)
+        return self._cost(*values), gradient, information
+
+    def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
+        values, tangents = self._linearised(jnp.asarray(row))
+        values = tuple(np.asarray(v) for v in values)
+        tangents = tuple(np.asarray(t) for t in tangents)
+        p = len(self.row)
+        gradient, information = np.zeros(p), np.zeros((p, p))
+        for r, counted in enumerate(self.counted):
+            nu, S = values[0][r][counted], values[1][r]
+            if not np.isfinite(nu).all():
+                return gradient, information, values, tangents
+            d_nu, dS = tangents[0][:, r][:, counted], tangents[1][:, r]
+            Li = np.linalg.inv(np.linalg.cholesky(S))
+            white = nu @ Li.T
+            weight = robust.weights(white)
+            d_white = d_nu @ Li.T
+            dM = Li @ dS @ Li.T
+            flat = d_white.reshape(p, -1)
+            gradient += flat @ (white * weight).ravel()
+            gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
+            # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
+            gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
+            information += flat @ flat.T
+            information += 0.5 * nu.shape[0] * dM.reshape(p, -1) @ dM.reshape(p, -1).T
+        return gradient, information, values, tangents
+
+    def refresh(self, row: Array) -> None:
+        """Nothing is held between iterations: the noise is part of the row."""
+
+    def unturned(self, innovations: Array, piece: Record) -> Array:
+        """Innovations of a record with their horizontal part back in local axes."""
+        names = list(self.model.output_names)
+        if not {"x", "y", "psi"} <= set(names):
+            return innovations
+        turned = innovations.copy()
+        i, j, k = (names.index(name) for name in ("x", "y", "psi"))
+        c, s = np.cos(piece.outputs[:, k]), np.sin(piece.outputs[:, k])
+        turned[:, i] = c * innovations[:, i] - s * innovations[:, j]
+        turned[:, j] = s * innovations[:, i] + c * innovations[:, j]
+        return turned
+
+    # ---- what the accuracy analysis and the report need --------------------------------------------------------
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array]]:
+        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs)."""
+        _, _, values, tangents = self._accumulate(row)
+        white, sensitivities = [], []
+        for r, counted in enumerate(self.counted):
+            Li = np.linalg.inv(np.linalg.cholesky(values[1][r]))
+            white.append(values[0][r][counted] @ Li.T)
+            sensitivities.append(tangents[0][:, r][:, counted] @ Li.T)
+        return white, sensitivities
+
+
+def filter_record(
+    model: Any,
+    y: Any,
+    u: Any,
+    voltage: Any,
+    *,
+    value: Any,
+    rate: Any,
+    parameters: Any,
+    noise: Noise,
+    nuisance: Nuisance,
+) -> tuple[Any, Any, FilterState]:
+    """Innovations, their covariance and the filtered states of one record (traceable).
+
+    Args:
+        model: the stochastic model.
+        y, u, voltage: measurements, logged inputs and battery voltage by sample.
+        value, rate: measured channels and their rates at the first sample.
+    """
+    reaching = commands(model.vehicle, model.dt, u, nuisance)
+    around, at_hover = hover(model.vehicle, parameters, jnp.mean(voltage))
+    gain = model.gain(around, at_hover, parameters, jnp.mean(voltage), noise, nuisance)
+    settled = max(1, round(0.5 / model.dt))
+    x = start_state(
+        model.vehicle,
+        model.output_names,
+        parameters,
+        nuisance,
+        value=value,
+        rate=rate,
+        inputs=jnp.mean(u[:settled], axis=0),
+        voltage=voltage[0],
+    )
+    start = FilterState(x, jnp.zeros(N_DISTURBANCES), jnp.zeros(N_DISTURBANCES))
+    innovations, states = model.run(start, y, reaching, parameters, voltage, noise, nuisance, gain)
+    return innovations, gain.covariance, states

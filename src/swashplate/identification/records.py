@@ -1,0 +1,103 @@
+"""A conditioned flight as the arrays that estimators work on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Array, Flight
+from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.vehicles.vehicle import Vehicle
+
+POSE = (*POSITION, *ATTITUDE)
+"""What motion capture measures."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One unbroken piece of a flight on a uniform time grid.
+
+    Attributes:
+        name: the flight's source and the piece's interval.
+        time: stamps [s], shape (n,).
+        inputs: commands in the order of the vehicle's inputs, shape (n, n_inputs).
+        outputs: measured channels in the order of `output_names`, shape (n, n_outputs).
+        voltage: battery voltage [V], shape (n,).
+        output_names: names of the measured channels.
+        voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
+    """
+
+    name: str
+    time: Array
+    inputs: Array
+    outputs: Array
+    voltage: Array
+    output_names: tuple[str, ...]
+    voltage_known: bool
+
+    @property
+    def dt(self) -> float:
+        return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
+
+
+def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Sequence[str] = POSE) -> list[Record]:
+    """The unbroken pieces of one or more conditioned flights.
+
+    Raises:
+        FlightError: where a flight lacks a channel, is not on a uniform grid, holds NaN or a constant input only.
+    """
+    pieces = []
+    for flight in [flights] if isinstance(flights, Flight) else list(flights):
+        for piece in flight.split():
+            pieces.append(_record(piece, vehicle, tuple(outputs)))
+    if not pieces:
+        raise FlightError("there is no flight to work on.")
+    steps = {round(piece.dt, 9) for piece in pieces}
+    if len(steps) > 1:
+        raise FlightError(
+            f"the flights have different rates (steps of {sorted(steps)} s).",
+            hint="Condition all of them to the same rate.",
+        )
+    return pieces
+
+
+def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Record:
+    source = flight.provenance.source or "flight"
+    wanted = (*vehicle.input_names, *outputs)
+    missing = [name for name in wanted if name not in flight]
+    if missing:
+        raise FlightError(
+            f"lacks what '{vehicle.name}' needs; it has {', '.join(flight.channels) or 'nothing'}.",
+            where=source,
+            channel=", ".join(missing),
+            hint="Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
+        )
+    table = flight.array(wanted)
+    time = flight.time(wanted[0])
+    if time.size < 3:
+        raise FlightError(f"has {time.size} samples, expected at least 3.", where=source)
+    steps = np.diff(time)
+    if np.ptp(steps) > 1e-6 * float(np.mean(steps)) + 1e-9:
+        raise FlightError(
+            f"time steps vary from {steps.min():.6f} to {steps.max():.6f} s.",
+            where=source,
+            hint="Bring the flight to a uniform rate with flight.condition(rate=100).",
+        )
+    for column, name in enumerate(wanted):
+        if not np.all(np.isfinite(table[:, column])):
+            raise FlightError("holds values that are not finite.", where=source, channel=name)
+    nominal = vehicle.card.values()["voltage_nominal"]
+    known = "voltage" in flight
+    n_inputs = len(vehicle.input_names)
+    return Record(
+        name=f"{source} {time[0]:.2f}-{time[-1]:.2f} s",
+        time=time,
+        inputs=table[:, :n_inputs],
+        outputs=table[:, n_inputs:],
+        voltage=flight.values("voltage") if known else np.full(time.size, nominal),
+        output_names=outputs,
+        voltage_known=known,
+    )

@@ -1,0 +1,71 @@
+"""The row of numbers that an estimator moves: every entry with its name, scale, bounds and prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.flights.flight import Array
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One number that an estimator moves.
+
+    Attributes:
+        name: what it is called in tables, e.g. "tau_f_upper" or "delay of record 1".
+        group: "parameter", "nuisance", "noise" or "initial".
+        start: first guess.
+        scale: a change of the order that matters.
+        lower, upper: bounds.
+        mean, sigma: prior (sigma infinite: none).
+        logarithmic: True where the row holds the natural logarithm.
+    """
+
+    name: str
+    group: str
+    start: float
+    scale: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    mean: float = 0.0
+    sigma: float = np.inf
+    logarithmic: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """Entries in the order of the row; the row itself holds value / scale."""
+
+    entries: tuple[Entry, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(entry.name for entry in self.entries)
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def column(self, field: str) -> Array:
+        return np.array([getattr(entry, field) for entry in self.entries], dtype=np.float64)
+
+    @property
+    def scale(self) -> Array:
+        return self.column("scale")
+
+    def starts(self) -> Array:
+        return self.column("start") / self.scale
+
+    def bounds(self) -> tuple[Array, Array]:
+        return self.column("lower") / self.scale, self.column("upper") / self.scale
+
+    def prior(self, row: Array) -> tuple[float, Array, Array]:
+        """Half the squared distance from the priors, its gradient and the diagonal of its Hessian."""
+        weight = self.scale / self.column("sigma")
+        away = (row - self.column("mean") / self.scale) * weight
+        return 0.5 * float(away @ away), away * weight, weight**2
+
+    def places(self, group: str) -> Array:
+        """Indices of a group's entries."""
+        return np.array([i for i, entry in enumerate(self.entries) if entry.group == group], dtype=np.intp)

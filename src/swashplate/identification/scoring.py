@@ -1,0 +1,146 @@
+"""Fisher scoring with Levenberg-Marquardt damping and bounds: one optimizer for every likelihood here.
+
+Levenberg (1944), Marquardt (1963); the information matrix stands for the Hessian (Jategaonkar 2015, sec. 4.6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Array
+from swashplate.identification.rows import Row
+
+Progress = Callable[[int, float], None]
+"""Called after each iteration with its number and the cost."""
+
+
+class Likelihood(Protocol):
+    """A negative log-likelihood of a row, priors not included."""
+
+    @property
+    def row(self) -> Row: ...
+
+    def cost(self, row: Array) -> float:
+        """The negative log-likelihood; infinite where the model diverges."""
+        ...
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and Fisher information."""
+        ...
+
+    def refresh(self, row: Array) -> None:
+        """Take an accepted row for the weights that are held during an iteration."""
+        ...
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where the scoring ended.
+
+    Attributes:
+        row: the scaled row.
+        cost: negative log-likelihood with priors.
+        history: cost after each iteration.
+        information: Fisher information of the data alone, scaled.
+        converged: False where the iterations ran out.
+        at_bound: names of entries that ended on a bound.
+    """
+
+    row: Array
+    cost: float
+    history: tuple[float, ...]
+    information: Array
+    converged: bool
+    at_bound: tuple[str, ...]
+
+
+_HOPELESS = 1e8
+"""Damping at which a step is so short that no descent is left."""
+
+_LARGEST_STEP = 0.7
+"""In scaled units: no entry moves by more than this in one iteration."""
+
+
+def minimise(
+    likelihood: Likelihood,
+    *,
+    start: Array | None = None,
+    iterations: int = 60,
+    tolerance: float = 1e-2,
+    progress: Progress | None = None,
+) -> Optimum:
+    """The row of the highest posterior probability.
+
+    Args:
+        likelihood: what to minimise, with the row's priors added.
+        start: scaled first guess (None: the entries' starts).
+        iterations: at most this many.
+        tolerance: stop when an iteration and its prediction gain less than this in log-likelihood.
+        progress: told about every iteration.
+
+    Raises:
+        IdentificationError: where the first guess already diverges.
+    """
+    row_of = likelihood.row
+    low, high = row_of.bounds()
+    row = np.clip(row_of.starts() if start is None else np.array(start, dtype=np.float64), low, high)
+    likelihood.refresh(row)
+    cost, gradient, information = _posterior(likelihood, row)
+    if not np.isfinite(cost):
+        raise IdentificationError(
+            "the model diverges from the flight at the first guess.",
+            hint="Check units and signs with 'swash inspect', or start from a card that flies.",
+        )
+    history, damping, converged = [cost], 1e-2, False
+    for iteration in range(iterations):
+        found = None
+        while damping < _HOPELESS:
+            step = _step(row, gradient, information[1], damping, low, high)
+            trial = np.clip(row + step, low, high)
+            trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
+            if np.isfinite(trial_cost) and trial_cost < cost:
+                found = trial, trial_cost
+                break
+            damping *= 5.0
+        if found is None:
+            converged = True  # no direction goes down any more
+            break
+        gained = cost - found[1]
+        row, damping = found[0], max(damping / 8.0, 1e-5)
+        likelihood.refresh(row)
+        cost, gradient, information = _posterior(likelihood, row)
+        history.append(cost)
+        if progress is not None:
+            progress(iteration + 1, cost)
+        if gained < tolerance:
+            converged = True
+            break
+    touching = (row <= low + 1e-9) | (row >= high - 1e-9)
+    at_bound = tuple(name for name, touch in zip(row_of.names, touching, strict=True) if touch)
+    return Optimum(row, cost, tuple(history), information[0], converged, at_bound)
+
+
+def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
+    cost, gradient, information = likelihood.scores(row)
+    prior_cost, prior_gradient, prior_information = likelihood.row.prior(row)
+    return cost + prior_cost, gradient + prior_gradient, (information, information + np.diag(prior_information))
+
+
+def _step(row: Array, gradient: Array, hessian: Array, damping: float, low: Array, high: Array) -> Array:
+    """A damped step that leaves out the entries which a bound stops."""
+    free = np.ones(row.size, dtype=bool)
+    step = np.zeros(row.size)
+    damped = hessian + damping * np.diag(np.diag(hessian) + 1e-6)
+    for _ in range(3):
+        step = np.zeros(row.size)
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], -gradient[free])
+        stopped = free & (((row <= low + 1e-12) & (step < 0)) | ((row >= high - 1e-12) & (step > 0)))
+        if not stopped.any():
+            break
+        free &= ~stopped
+    return np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)

@@ -1,0 +1,282 @@
+"""A vehicle in disturbed air, seen by sensors: the model whose one-step predictions prediction error compares.
+
+The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
+it fades) and a drift (random walk: trims, battery, servo zeros). Both are held over a sample. The measurement update
+has a constant gain from the Riccati equation at hover (Jategaonkar 2015, sec. 5.4); horizontal position errors are
+turned into the heading first, so that the gain does not depend on where the nose points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from swashplate.identification.riccati import kalman_gain
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, body_to_local
+from swashplate.simulation.dynamics import (
+    CONSTANTS,
+    RowRates,
+    equations_of,
+    jax_backend,
+    rk4_step_looped,
+    row_rates,
+)
+from swashplate.vehicles.vehicle import Vehicle
+
+N_DISTURBANCES = 6
+DISTURBED = ("p", "q", "r", "u", "v", "w")
+"""The states whose rates are disturbed, in the order of the disturbances."""
+
+
+class Noise(NamedTuple):
+    """Intensities of the process noise and standard deviations of the measurement noise.
+
+    `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)],
+    `tau_gust_*` [s], `sensor_*` per sample [m, rad].
+    """
+
+    white_tilt: Any = 0.5
+    white_yaw: Any = 2.0
+    white_horizontal: Any = 0.02
+    white_vertical: Any = 0.02
+    gust_tilt: Any = 3.0
+    gust_yaw: Any = 15.0
+    gust_horizontal: Any = 0.4
+    gust_vertical: Any = 0.3
+    tau_gust_moment: Any = 0.5
+    tau_gust_force: Any = 0.5
+    drift_moment: Any = 0.1
+    drift_force: Any = 0.03
+    sensor_position: Any = 3e-4
+    sensor_angle: Any = 1.5e-3
+
+
+class Nuisance(NamedTuple):
+    """What belongs to one record and not to the vehicle.
+
+    `delay_*`: time by which the motion lags the logged commands [s]; `trim_*`: zeros of the commands; `lever_*`: from
+    the centre of gravity to the tracked point in body axes [m]; `level_*`: error of the tracked body's level [rad].
+    """
+
+    delay_servo: Any = 0.0
+    delay_motor: Any = 0.0
+    trim_motor_lower: Any = 0.0
+    trim_motor_upper: Any = 0.0
+    trim_servo_roll: Any = 0.0
+    trim_servo_pitch: Any = 0.0
+    lever_x: Any = 0.0
+    lever_y: Any = 0.0
+    lever_z: Any = 0.0
+    level_phi: Any = 0.0
+    level_theta: Any = 0.0
+
+
+class Gain(NamedTuple):
+    """Constant measurement update of states, gusts and drifts, and the innovations' covariance."""
+
+    state: Any
+    gust: Any
+    drift: Any
+    covariance: Any
+
+
+class FilterState(NamedTuple):
+    """Estimated vehicle states and disturbances."""
+
+    x: Any
+    gust: Any
+    drift: Any
+
+
+@dataclass(frozen=True)
+class StochasticModel:
+    """A vehicle's equations with disturbances and sensors, as functions of flat rows.
+
+    Attributes:
+        vehicle: whose equations.
+        output_names: measured channels.
+        dt: sample time [s].
+        rates: the equations on flat rows.
+    """
+
+    vehicle: Vehicle
+    output_names: tuple[str, ...]
+    dt: float
+    rates: RowRates
+
+    # ---- one sample --------------------------------------------------------------------------------------------
+    def step(self, x: Any, accelerations: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
+        """The state one sample later, with disturbing accelerations held (in the order of `DISTURBED`)."""
+        push = jnp.zeros(x.shape[0]).at[self._disturbed].set(accelerations)
+        calm = jnp.zeros(3)
+        driving = jnp.stack([jnp.concatenate([row, calm, voltage[None]]) for row in u])
+        constants = [getattr(Environment(), name) for name in CONSTANTS]
+        numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
+        return rk4_step_looped(
+            lambda x, w: self.rates(x, w, numbers) + push,
+            x,
+            lambda fraction: driving[jnp.round(2.0 * fraction).astype(int)],
+            self.dt,
+        )
+
+    def measure(self, x: Any, nuisance: Nuisance) -> Any:
+        """The measured channels of a state row."""
+        attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
+        lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, jax_backend())
+        offsets = {
+            "x": lever.x,
+            "y": lever.y,
+            "z": lever.z,
+            "phi": nuisance.level_phi,
+            "theta": nuisance.level_theta,
+        }
+        return jnp.stack([x[self.vehicle.index(name)] + offsets.get(name, 0.0) for name in self.output_names])
+
+    @property
+    def _disturbed(self) -> Any:
+        return jnp.array([self.vehicle.index(name) for name in DISTURBED])
+
+    # ---- the filter --------------------------------------------------------------------------------------------
+    def linear(
+        self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance
+    ) -> tuple[Any, Any, Any, Any]:
+        """A, C, Q, R of the joined system (states, gusts, drifts) around an equilibrium with the nose north."""
+        n, m = x.shape[0], N_DISTURBANCES
+        zero = jnp.zeros(m)
+        by_x, by_push = jax.jacfwd(lambda x, d: self.step(x, d, (u, u, u), parameters, voltage), argnums=(0, 1))(
+            x, zero
+        )
+        A = jnp.block(
+            [
+                [by_x, by_push, by_push],
+                [jnp.zeros((m, n)), jnp.diag(self._fade(noise)), jnp.zeros((m, m))],
+                [jnp.zeros((m, n + m)), jnp.eye(m)],
+            ]
+        )
+        C = jnp.concatenate([jax.jacfwd(lambda x: self.measure(x, nuisance))(x), jnp.zeros((self.n_outputs, 2 * m))], 1)
+        tilt, yaw, horizontal, vertical = noise[:4]
+        white = jnp.stack([tilt, tilt, yaw, horizontal, horizontal, vertical])
+        tilt, yaw, horizontal, vertical = noise[4:8]
+        gust = jnp.stack([tilt, tilt, yaw, horizontal, horizontal, vertical])
+        drift = jnp.stack([noise.drift_moment] * 3 + [noise.drift_force] * 3)
+        # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
+        spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T
+        Q = jax.scipy.linalg.block_diag(
+            spread + self._floor(n), jnp.diag(gust**2 * self.dt), jnp.diag(drift**2 * self.dt)
+        )
+        return A, C, Q, jnp.diag(self._sensor_variances(noise))
+
+    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> Gain:
+        """Steady gain at an equilibrium with the nose north."""
+        n, m = x.shape[0], N_DISTURBANCES
+        K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
+        return Gain(K[:n], K[n : n + m], K[n + m :], S)
+
+    def _fade(self, noise: Noise) -> Any:
+        """What is left of each gust after one sample."""
+        return jnp.exp(-self.dt / jnp.stack([noise.tau_gust_moment] * 3 + [noise.tau_gust_force] * 3))
+
+    def _floor(self, n: int) -> Any:
+        """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
+        speeds = [name.startswith("omega") for name in self.vehicle.state_names]
+        return jnp.diag(jnp.where(jnp.array(speeds), 1e-4, 1e-10)[:n])
+
+    def _sensor_variances(self, noise: Noise) -> Any:
+        sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
+        return jnp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names])
+
+    @property
+    def n_outputs(self) -> int:
+        return len(self.output_names)
+
+    def correct(self, state: FilterState, y: Any, gain: Gain, nuisance: Nuisance) -> tuple[FilterState, Any]:
+        """The state after a measurement, and the innovation with its horizontal part in heading axes."""
+        psi = state.x[self.vehicle.index("psi")]
+        innovation = self._turn_outputs(y - self.measure(state.x, nuisance), -psi)
+        moved = self._turn_states(gain.state @ innovation, psi)
+        return (
+            FilterState(state.x + moved, state.gust + gain.gust @ innovation, state.drift + gain.drift @ innovation),
+            innovation,
+        )
+
+    def predict(
+        self, state: FilterState, u: tuple[Any, Any, Any], parameters: Any, voltage: Any, noise: Noise
+    ) -> FilterState:
+        """The state one sample later."""
+        x = self.step(state.x, state.gust + state.drift, u, parameters, voltage)
+        return FilterState(x, self._fade(noise) * state.gust, state.drift)
+
+    def run(
+        self,
+        start: FilterState,
+        y: Any,
+        u: Any,
+        parameters: Any,
+        voltage: Any,
+        noise: Noise,
+        nuisance: Nuisance,
+        gain: Gain,
+    ) -> tuple[Any, FilterState]:
+        """Innovations (n, n_outputs) and the states after each measurement.
+
+        Args:
+            start: predicted state at the first sample.
+            y: measurements (n, n_outputs).
+            u: inputs at each sample's start, middle and end, each (n, n_inputs).
+            voltage: battery voltage (n,).
+        """
+
+        def sample(state: FilterState, now: Any) -> tuple[FilterState, Any]:
+            measured, commands, volts = now
+            corrected, innovation = self.correct(state, measured, gain, nuisance)
+            return self.predict(corrected, commands, parameters, volts, noise), (innovation, corrected)
+
+        _, (innovations, states) = jax.lax.scan(sample, start, (y, u, voltage))
+        return innovations, states
+
+    # ---- heading -----------------------------------------------------------------------------------------------
+    def _turn_outputs(self, row: Any, angle: Any) -> Any:
+        return _turn(row, self.output_names, angle)
+
+    def _turn_states(self, row: Any, angle: Any) -> Any:
+        return _turn(row, self.vehicle.state_names, angle)
+
+
+def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
+    """The horizontal position in a row turned by an angle about the vertical."""
+    if "x" not in names or "y" not in names:
+        return row
+    i, j = names.index("x"), names.index("y")
+    c, s = jnp.cos(angle), jnp.sin(angle)
+    return row.at[i].set(c * row[i] - s * row[j]).at[j].set(s * row[i] + c * row[j])
+
+
+def stochastic_model(vehicle: Vehicle, output_names: tuple[str, ...], dt: float) -> StochasticModel:
+    """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds."""
+    return StochasticModel(vehicle, output_names, dt, row_rates(equations_of(vehicle), padded=True))
+
+
+def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> tuple[Any, Any, Any]:
+    """What reaches the vehicle at the start, middle and end of each sample: trimmed, and later than logged.
+
+    A smooth curve through the samples; before the first and after the last sample the nearest one holds.
+    """
+    n = inputs.shape[0]
+    trims = jnp.stack([jnp.asarray(getattr(nuisance, f"trim_{name}"), dtype=float) for name in vehicle.input_names])
+    motor = [name.startswith("motor") for name in vehicle.input_names]
+    delay = jnp.where(jnp.array(motor), nuisance.delay_motor, nuisance.delay_servo)
+    trimmed = inputs + trims
+
+    def at(offset: float) -> Any:
+        place = jnp.clip(jnp.arange(n)[:, None] + (offset - delay)[None, :] / dt, 0.0, n - 1.0)
+        below = jnp.clip(jnp.floor(place), 0, n - 2).astype(int)
+        a, b, c, d = (jnp.take_along_axis(trimmed, jnp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+        t = place - below
+        # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
+        return b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+
+    return at(0.0), at(0.5 * dt), at(dt)

@@ -1,0 +1,149 @@
+"""Predictions from many start points on a flight, each from what a causal observer knew at its start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.flights.flight import Array
+from swashplate.identification.kinematics import PREDICTED
+from swashplate.identification.prediction_error import filter_record
+from swashplate.identification.records import Record
+from swashplate.identification.riccati import predicted_covariance
+from swashplate.identification.start_states import hover, slopes
+from swashplate.identification.stochastic import (
+    FilterState,
+    Noise,
+    Nuisance,
+    commands,
+    stochastic_model,
+)
+from swashplate.vehicles.vehicle import Vehicle
+
+HORIZONS = (0.5, 1.0, 2.0, 5.0)
+"""Seconds ahead at which predictions are judged."""
+
+SETTLING = 2.0
+"""Seconds before the first start point, for the observer to forget its first guess."""
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predicted states after each start.
+
+    Attributes:
+        starts: sample indices of the starts, shape (s,).
+        states: predicted body states, shape (s, longest horizon in samples, 12), the first one sample after the start.
+        filtered: the observer's body states at every sample, shape (n, 12).
+        innovations: one-step prediction errors (n, outputs), and `covariance` their model covariance.
+    """
+
+    starts: NDArray[np.intp]
+    states: Array
+    filtered: Array
+    innovations: Array
+    covariance: Array
+
+
+def predict(
+    vehicle: Vehicle,
+    record: Record,
+    *,
+    noise: Noise,
+    nuisance: Nuisance,
+    horizon: float = max(HORIZONS),
+    every: float = 0.1,
+    settling: float = SETTLING,
+) -> Predictions:
+    """Predict `horizon` seconds ahead from starts every `every` seconds, the first after `settling` seconds.
+
+    At each start the observer has seen the record up to that sample and nothing after it. From there on the equations
+    run on the recorded inputs; gusts fade and drifts stay as the observer last saw them.
+    """
+    model = stochastic_model(vehicle, record.output_names, record.dt)
+    parameters = vehicle.values()
+    value, rate = slopes(record, np.array([0]))
+    n, ahead = record.time.size, round(horizon / record.dt)
+    starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
+    padded = np.concatenate([record.inputs, np.repeat(record.inputs[-1:], ahead, axis=0)])
+    volts = jnp.asarray(np.concatenate([record.voltage, np.repeat(record.voltage[-1:], ahead)]))
+
+    @jax.jit
+    def observe() -> Any:
+        return filter_record(
+            model,
+            jnp.asarray(record.outputs),
+            jnp.asarray(record.inputs),
+            jnp.asarray(record.voltage),
+            value=jnp.asarray(value[0]),
+            rate=jnp.asarray(rate[0]),
+            parameters=parameters,
+            noise=noise,
+            nuisance=nuisance,
+        )
+
+    innovations, covariance, filtered = observe()
+    reaching = commands(vehicle, record.dt, jnp.asarray(padded), nuisance)
+    kept = jnp.array([vehicle.index(name) for name in PREDICTED])
+
+    @jax.jit
+    def run(first: Any) -> Any:
+        def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
+            now = (reaching[0][k], reaching[1][k], reaching[2][k])
+            following = model.predict(state, now, parameters, volts[k], noise)
+            return following, following.x[kept]
+
+        at_start = jax.tree.map(lambda rows: rows[first], filtered)
+        return jax.lax.scan(sample, at_start, first + jnp.arange(ahead))[1]
+
+    states = jax.vmap(run)(jnp.asarray(starts))
+    return Predictions(
+        starts=np.asarray(starts),
+        states=np.asarray(states),
+        filtered=np.asarray(filtered.x[:, kept]),
+        innovations=np.asarray(innovations),
+        covariance=np.asarray(covariance),
+    )
+
+
+def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kind: str) -> Array:
+    """Predictions without a model: "hold" the last value, or keep the body "rates" (velocities and turn rates)."""
+    held = states[starts]
+    if kind == "hold":
+        return np.asarray(held)
+    from scipy.spatial.transform import Rotation
+
+    time = ahead * dt
+    position, velocity, angles, rates = held[:, 0:3], held[:, 3:6], held[:, 6:9], held[:, 9:12]
+    attitude = Rotation.from_euler("ZYX", angles[:, ::-1])
+    moved = position + attitude.apply(velocity) * time
+    turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
+    turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
+    return np.concatenate([moved, velocity, turned, rates], axis=1)
+
+
+def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:
+    """Standard deviations (n, 12) of predictions 1, 2, ... samples ahead, at hover with the nose north.
+
+    Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
+    """
+    model = stochastic_model(vehicle, record.output_names, record.dt)
+    parameters = vehicle.values()
+    voltage = jnp.asarray(float(np.mean(record.voltage)))
+    x, u = hover(vehicle, parameters, voltage)
+    A, C, Q, R = model.linear(x, u, parameters, voltage, noise, nuisance)
+    predicted = predicted_covariance(A, C, Q, R)
+    gain = jnp.linalg.solve(C @ predicted @ C.T + R, C @ predicted).T
+    corrected = predicted - gain @ C @ predicted
+    kept = jnp.array([vehicle.index(name) for name in PREDICTED])
+
+    def ahead(P: Any, _: None) -> tuple[Any, Any]:
+        P = A @ P @ A.T + Q
+        return P, jnp.sqrt(jnp.maximum(jnp.diag(P)[kept], 0.0))
+
+    return np.asarray(jax.lax.scan(ahead, corrected, None, length=round(horizon / record.dt))[1])

@@ -1,0 +1,217 @@
+"""`validate`: predict flights that no fit has seen, beside the published card and predictors without a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Array, Flight
+from swashplate.identification.feedback import excitation
+from swashplate.identification.fit import AxisExcitation, Fit
+from swashplate.identification.kinematics import PREDICTED, measured_states
+from swashplate.identification.records import Record, records
+from swashplate.identification.stochastic import Noise, Nuisance
+from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.validation import innovations
+from swashplate.validation.calibration import CALIBRATION, calibrate
+from swashplate.validation.metrics import fit_percent, rms, theil
+from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
+from swashplate.validation.validation import Example, Score, Validation
+from swashplate.validation.verdict import THRESHOLDS, verdict
+from swashplate.vehicles.catalogue import vehicle as named_vehicle
+from swashplate.vehicles.vehicle import Vehicle
+
+_JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
+_T = TypeVar("_T", Noise, Nuisance)
+_EXAMPLES = 6
+_EDGE = 0.1
+"""Seconds at a record's end whose measured rates have too few samples around them to be a truth."""
+
+
+@dataclass(frozen=True)
+class _Rival:
+    vehicle: Vehicle
+    nuisance: Nuisance
+    predictions: Predictions
+
+
+def validate(
+    model: Fit | Vehicle,
+    flights: Flight | Iterable[Flight],
+    *,
+    published: Vehicle | None = None,
+    horizons: Sequence[float] = HORIZONS,
+    every: float = 0.1,
+    calibration: float = CALIBRATION,
+    progress: Callable[[int, float], None] | None = None,
+) -> Validation:
+    """Predict unseen flights from many start points and judge the result.
+
+    The first `calibration` seconds of each record tell its delays, trims and lever arm (of the model and of the
+    published card alike, each by its own equations); no prediction starts before they are over. Hidden states and slow
+    disturbances at each start come from a causal observer with the same noise for both.
+
+    Args:
+        model: a fit, or a vehicle (a model file's observer section is used where there is one).
+        flights: conditioned flights that the fit has not seen.
+        published: the card to compare with (None: the packaged card of the same vehicle).
+        horizons: seconds ahead.
+        every: seconds between starts.
+        calibration: seconds at the start of each record.
+        progress: called with the number of records done and their number.
+
+    Raises:
+        FlightError: where no record is long enough for calibration and the shortest horizon.
+    """
+    enable_double_precision()
+    enable_compilation_cache()
+    if isinstance(model, Fit):
+        vehicle, published = model.vehicle, published or model.published
+    else:
+        vehicle, published = model, published or named_vehicle(model.name)
+    noise, prior = observer_of(vehicle)
+    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    shortest = calibration + min(horizons) + 1.0
+    all_pieces = records(flights, vehicle)
+    pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
+    if not pieces:
+        longest = max(piece.time[-1] - piece.time[0] for piece in all_pieces)
+        raise FlightError(
+            f"the longest unbroken piece has {longest:.1f} s, expected more than {shortest:g} s "
+            f"({calibration:g} s to calibrate, then the shortest horizon).",
+            where=all_pieces[0].name,
+            hint="Use a longer flight, or a shorter calibration.",
+        )
+    parts: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
+    judged: list[AxisExcitation] = []
+    measured: list[Array] = []
+    examples: list[Example] = []
+    checks: list[tuple[Array, Array]] = []
+    likelihoods: list[dict[str, float]] = []
+    for number, piece in enumerate(pieces):
+        ahead = max(h for h in horizons if h < piece.time[-1] - piece.time[0] - calibration)
+        rivals = {}
+        for name, flown in (("model", vehicle), ("published card", published)):
+            nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration)
+            rivals[name] = _Rival(
+                flown,
+                nuisance,
+                predict(flown, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=every, settling=calibration),
+            )
+        own = rivals["model"]
+        truth = measured_states(piece, own.nuisance)
+        judged.extend(excitation(vehicle, piece, truth))
+        measured.append(truth)
+        for horizon in horizons:
+            if horizon <= ahead:
+                for name, part in _at_horizon(piece, rivals, truth, horizon).items():
+                    parts.setdefault((name, horizon), []).append(part)
+        examples.extend(_examples(piece, own, noise, min(2.0, ahead)))
+        settled = round(calibration / piece.dt)
+        checks.append((own.predictions.innovations[settled:], own.predictions.covariance))
+        likelihoods.append(
+            {
+                name: innovations.log_likelihood(r.predictions.innovations[settled:], r.predictions.covariance)
+                for name, r in rivals.items()
+            }
+        )
+        if progress is not None:
+            progress(number + 1, float(len(pieces)))
+    scores = _scores(parts)
+    return Validation(
+        vehicle=vehicle,
+        published=published,
+        scores=scores,
+        innovations=innovations.check(
+            np.concatenate([c[0] for c in checks]), np.mean([c[1] for c in checks], axis=0), pieces[0].output_names
+        ),
+        log_likelihood={
+            name: float(np.mean([item[name] for item in likelihoods])) for name in ("model", "published card")
+        },
+        verdict=verdict(scores, judged),
+        thresholds=THRESHOLDS,
+        examples=tuple(examples),
+        records=tuple(pieces),
+        measured=tuple(measured),
+        flights=flights,
+        settings={
+            "horizons": list(horizons),
+            "every": every,
+            "calibration": calibration,
+            "records": [piece.name for piece in pieces],
+            "noise": {k: float(v) for k, v in noise._asdict().items()},
+        },
+    )
+
+
+def observer_of(vehicle: Vehicle) -> tuple[Noise, Nuisance]:
+    """Noise and usual nuisances from a model's observer section, or the defaults where the card has none."""
+    noise = vehicle.card.observer.get("noise", {})
+    nuisance = vehicle.card.observer.get("nuisance", {})
+    usual = Nuisance() if nuisance else Nuisance(delay_servo=0.05, delay_motor=0.05)
+    return _filled(Noise(), noise), _filled(usual, nuisance)
+
+
+def _filled(usual: _T, given: Mapping[str, float]) -> _T:
+    known = {name: float(value) for name, value in given.items() if name in usual._fields}
+    return usual._replace(**known)
+
+
+def _at_horizon(
+    piece: Record, rivals: Mapping[str, _Rival], truth: Array, horizon: float
+) -> dict[str, tuple[Array, Array, Array]]:
+    """Predicted, true and starting states of every predictor at one horizon."""
+    ahead = round(horizon / piece.dt)
+    starts = rivals["model"].predictions.starts
+    counted = starts + ahead < piece.time.size - round(_EDGE / piece.dt)
+    first = starts[counted]
+    made = {
+        name: (r.predictions.states[counted, ahead - 1], truth[first + ahead], truth[first])
+        for name, r in rivals.items()
+    }
+    for name, kind in (("hold", "hold"), ("constant rates", "rates")):
+        made[name] = (naive(truth, first, ahead, piece.dt, kind=kind), truth[first + ahead], truth[first])
+    return made
+
+
+def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array]]]) -> tuple[Score, ...]:
+    made = []
+    for (name, horizon), rows in parts.items():
+        predicted, truth, first = (np.concatenate(columns) for columns in zip(*rows, strict=True))
+        if not len(truth):
+            continue
+        fits, errors, theils = (
+            fit_percent(predicted, truth, first),
+            rms(predicted - truth),
+            theil(predicted, truth, first),
+        )
+        for channel in _JUDGED:
+            i = PREDICTED.index(channel)
+            made.append(Score(channel, horizon, name, float(fits[i]), float(errors[i]), float(theils[i]), len(truth)))
+    return tuple(made)
+
+
+def _examples(piece: Record, own: _Rival, noise: Noise, horizon: float) -> list[Example]:
+    """A few predictions spread over the record."""
+    sigma = prediction_sigma(own.vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=horizon)
+    ahead = sigma.shape[0]
+    usable = np.flatnonzero(own.predictions.starts + ahead < piece.time.size)
+    chosen = usable[np.linspace(0, usable.size - 1, min(_EXAMPLES, usable.size)).astype(int)] if usable.size else usable
+    made = []
+    for place in chosen:
+        start = int(own.predictions.starts[place])
+        made.append(
+            Example(
+                record=piece.name,
+                start=float(piece.time[start]),
+                time=piece.time[start + 1 : start + 1 + ahead],
+                states=own.predictions.states[place, :ahead],
+                sigma=sigma,
+            )
+        )
+    return made

@@ -1,0 +1,148 @@
+"""`Validation`: how well a model predicts flights that no fit has seen, next to its rivals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from swashplate.flights.flight import Array, Flight
+from swashplate.identification.records import Record
+from swashplate.vehicles.vehicle import Vehicle
+
+PREDICTORS = ("model", "published card", "hold", "constant rates")
+
+
+@dataclass(frozen=True)
+class Score:
+    """One predictor on one channel at one horizon.
+
+    Attributes:
+        channel: schema name (u, v, w, phi, theta, psi, p, q, r, x, y, z).
+        horizon: seconds ahead.
+        predictor: one of `PREDICTORS`.
+        fit: 100 (1 - rms error / rms change since the start) [%]; "hold" scores 0.
+        rms: RMS error in the channel's inside unit.
+        theil: Theil's inequality coefficient of the changes.
+        starts: how many start points.
+    """
+
+    channel: str
+    horizon: float
+    predictor: str
+    fit: float
+    rms: float
+    theil: float
+    starts: int
+
+
+@dataclass(frozen=True)
+class InnovationCheck:
+    """One-step prediction errors of one output.
+
+    Attributes:
+        channel: the output.
+        rms: in its unit.
+        expected: standard deviation that the model promises.
+        consistency: mean squared normalised innovation (1: honest covariance).
+        whiteness: largest autocorrelation over lags 1 to 20 samples.
+        whiteness_bound: its 99 % bound for white noise.
+    """
+
+    channel: str
+    rms: float
+    expected: float
+    consistency: float
+    whiteness: float
+    whiteness_bound: float
+
+
+@dataclass(frozen=True)
+class AxisVerdict:
+    """One axis in words.
+
+    Attributes:
+        axis: "roll", "pitch", "yaw", "heave" or "horizontal".
+        level: "good", "usable", "poor" or "cannot be judged".
+        words: the verdict with its numbers.
+    """
+
+    axis: str
+    level: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Example:
+    """One prediction to look at: from `start` [s] on, states (n, 12) with their 2-sigma band."""
+
+    record: str
+    start: float
+    time: Array
+    states: Array
+    sigma: Array
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Predictions of unseen flights, judged.
+
+    Attributes:
+        vehicle: the model. `published`: the untouched card beside it.
+        scores: per channel, horizon and predictor.
+        innovations: per output. `log_likelihood`: mean per sample of the model and of the published card.
+        verdict: per axis.
+        thresholds: the numbers behind the words.
+        examples: predictions to draw.
+        records: what was predicted; `measured`: body states (n, 12) of each.
+        flights: the conditioned flights.
+        settings: observer, trims, horizons.
+    """
+
+    vehicle: Vehicle
+    published: Vehicle
+    scores: tuple[Score, ...]
+    innovations: tuple[InnovationCheck, ...]
+    log_likelihood: Mapping[str, float]
+    verdict: tuple[AxisVerdict, ...]
+    thresholds: Mapping[str, float]
+    examples: tuple[Example, ...]
+    records: tuple[Record, ...]
+    measured: tuple[Array, ...]
+    flights: tuple[Flight, ...]
+    settings: Mapping[str, Any]
+
+    def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
+        """The score of one predictor on one channel at one horizon."""
+        return next(
+            s
+            for s in self.scores
+            if s.channel == channel and abs(s.horizon - horizon) < 1e-9 and s.predictor == predictor
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers and words as JSON types (no time histories)."""
+        return {
+            "kind": "validation",
+            "vehicle": self.vehicle.name,
+            "scores": [vars(score) for score in self.scores],
+            "innovations": [vars(check) for check in self.innovations],
+            "log_likelihood": dict(self.log_likelihood),
+            "verdict": [vars(axis) for axis in self.verdict],
+            "thresholds": dict(self.thresholds),
+            "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
+            "settings": dict(self.settings),
+        }
+
+    def __repr__(self) -> str:
+        fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}
+        channels = [
+            c for c in ("u", "v", "w", "phi", "theta", "psi", "p", "q", "r") if any(key[0] == c for key in fits)
+        ]
+        lines = ["Prediction fit % (100 perfect, 0 as good as holding the last value)"]
+        for horizon in sorted({key[1] for key in fits}):
+            lines.append(f"{horizon:g} s".ljust(18) + "".join(f"{channel:>9s}" for channel in channels))
+            for predictor in PREDICTORS:
+                row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
+                lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
+        return "\n".join([*lines, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

@@ -1,0 +1,56 @@
+"""A verdict in words per axis, its thresholds visible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from swashplate.identification.fit import AxisExcitation
+from swashplate.validation.validation import AxisVerdict, Score
+
+THRESHOLDS = {"good": 50.0, "usable": 20.0}
+"""Prediction fit [%] of every channel of an axis at its horizon; "usable" must also beat every rival."""
+
+_AXES = {
+    # axis: channels, horizon [s]
+    "roll": (("phi", "p"), 1.0),
+    "pitch": (("theta", "q"), 1.0),
+    "yaw": (("psi", "r"), 0.5),
+    "heave": (("w",), 0.5),
+    "horizontal": (("u", "v"), 0.5),
+}
+
+
+def verdict(scores: Sequence[Score], excitation: Sequence[AxisExcitation]) -> tuple[AxisVerdict, ...]:
+    """Judge every axis whose channels were scored.
+
+    Args:
+        scores: of all predictors.
+        excitation: of the flights that were predicted.
+    """
+    made = []
+    for axis, (channels, horizon) in _AXES.items():
+        rows = [s for s in scores if s.channel in channels and abs(s.horizon - horizon) < 1e-9]
+        if not rows:
+            continue
+        judged = [item for item in excitation if item.axis == axis]
+        made.append(_one(axis, channels, horizon, rows, judged))
+    return tuple(made)
+
+
+def _one(
+    axis: str, channels: tuple[str, ...], horizon: float, rows: Sequence[Score], judged: Sequence[AxisExcitation]
+) -> AxisVerdict:
+    model = {s.channel: s.fit for s in rows if s.predictor == "model"}
+    rivals = {c: max(s.fit for s in rows if s.predictor != "model" and s.channel == c) for c in model}
+    numbers = ", ".join(f"{c} {model[c]:.0f} % (best rival {rivals[c]:.0f} %)" for c in channels if c in model)
+    said = f"{numbers} at {horizon:g} s."
+    beaten = [c for c in model if model[c] <= rivals[c]]
+    worst = min(model.values())
+    if judged and not any(item.identifiable for item in judged):
+        return AxisVerdict(axis, "cannot be judged", f"Cannot be judged from this flight: {said} {judged[0].words}")
+    if worst >= THRESHOLDS["good"] and not beaten:
+        return AxisVerdict(axis, "good", said)
+    if worst >= THRESHOLDS["usable"] and not beaten:
+        return AxisVerdict(axis, "usable", said)
+    why = f" Beaten in {', '.join(beaten)}." if beaten else ""
+    return AxisVerdict(axis, "poor", said + why)
