@@ -50,6 +50,10 @@ def straightened(time: Array, *, width: int = 75) -> Array:
     return out if np.all(np.diff(out) > 0) else time
 
 
+_OWN_STEPS = 2.5
+"""Steps of a stream's own that are never a gap: one sample may go missing from a slow channel."""
+
+
 def unbroken(time: Array, *, max_gap: float) -> list[Interval]:
     """Intervals (first stamp, last stamp) [s] between which no step exceeds `max_gap` [s]."""
     if time.size == 0:
@@ -92,7 +96,10 @@ def _at(data: xr.Dataset, grid: Array, method: str) -> dict[str, Array]:
 def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
     pieces: list[Interval] | None = [] if not flight.streams else None
     for data in flight.streams.values():
-        here = unbroken(np.asarray(data["time"].values, dtype=np.float64), max_gap=max_gap)
+        time = np.asarray(data["time"].values, dtype=np.float64)
+        # A slow stream (a battery voltage at 10 Hz) has no gap between two of its own samples.
+        own = _OWN_STEPS * float(np.median(np.diff(time)))
+        here = unbroken(time, max_gap=max(max_gap, own))
         pieces = here if pieces is None else common(pieces, here)
     found = pieces or []
     return common(found, list(flight.segments)) if flight.segments else found
@@ -115,7 +122,8 @@ def resample(
     Args:
         flight: streams at native stamps.
         rate: [Hz].
-        max_gap: longest step between samples [s] that is interpolated; a longer one splits the flight.
+        max_gap: longest step between samples [s] that is interpolated; a longer one splits the flight. A stream slower
+            than that is allowed 2.5 of its own steps.
         shortest_piece: pieces below this [s] are dropped and recorded.
         method: "linear" or "pchip"; attitude always goes by slerp.
         straighten: smooth the jitter of the stamps first (regular samples with irregular stamps only).

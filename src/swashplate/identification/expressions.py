@@ -44,6 +44,12 @@ class Expression:
         """The expression's value for the parameters' values (numbers or traced numbers)."""
         return _walk(self._tree, values)
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
 

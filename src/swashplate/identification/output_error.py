@@ -8,6 +8,8 @@ residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -17,15 +19,21 @@ import numpy as np
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
 from swashplate.identification import robust
-from swashplate.identification.parameters import Parameterization
+from swashplate.identification.parameters import Layout, Parameterization
 from swashplate.identification.prediction_error import parameter_entries, stack_records
 from swashplate.identification.records import Record
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.start_states import slopes, start_state
-from swashplate.identification.stochastic import N_DISTURBANCES, Nuisance, commands, stochastic_model
+from swashplate.identification.stochastic import (
+    N_DISTURBANCES,
+    Nuisance,
+    StochasticModel,
+    commands,
+    stochastic_model,
+)
 
-WINDOW = 4.0
-"""Seconds of one shot: many periods of the fast modes, and short against the growth of the slow unstable ones."""
+WINDOW = 2.0
+"""Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""
 
 _NUISANCE = {
     # name: scale, prior sigma
@@ -98,100 +106,44 @@ class OutputError:
                 scale, sigma = _INITIAL[name]
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
         self.row = Row(tuple(entries))
-        self._scale = jnp.asarray(self.row.scale[: self._shared])
-        self._initial_scale = jnp.asarray([_INITIAL[name][0] for name in states])
+        self._plan = _Plan(self.model, table.layout, len(pieces), self.nuisances, self.length, self._shared)
         self._data = self._windows()
-        self._residuals = jax.jit(self.residuals)
-        self._linearised = jax.jit(self._with_tangents)
         self._L = np.eye(len(pieces[0].output_names))
 
     def _windows(self) -> dict[str, Any]:
-        n = self.length
-        outputs, values, rates, offsets = [], [], [], []
+        outputs, values, rates = [], [], []
         for number, first in self._places:
             piece = self.pieces[number]
             value, rate = slopes(piece, np.array([first]))
-            outputs.append(piece.outputs[first : first + n])
+            outputs.append(piece.outputs[first : first + self.length])
             values.append(value[0])
             rates.append(rate[0])
-            offsets.append(first)
         stacked = stack_records(self.pieces)
         return {
             "outputs": jnp.asarray(np.stack(outputs)),
             "value": jnp.asarray(np.stack(values)),
             "rate": jnp.asarray(np.stack(rates)),
-            "first": jnp.asarray(offsets),
+            "first": jnp.asarray([first for _, first in self._places]),
             "record": jnp.asarray([number for number, _ in self._places]),
             "inputs": jnp.asarray(stacked["inputs"]),
             "voltage": jnp.asarray(stacked["voltage"]),
+            "card": jnp.asarray(self.table.card_row),
+            "scale": jnp.asarray(self.row.scale[: self._shared]),
+            "initial_scale": jnp.asarray([_INITIAL[name][0] for name in self.table.vehicle.state_names]),
         }
 
-    # ---- traced ------------------------------------------------------------------------------------------------
     def unpack(self, shared: Any) -> tuple[Any, Nuisance]:
         """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
-        numbers = shared * self._scale
-        k, r, m = len(self.table.free), len(self.pieces), len(self.nuisances)
-        block = numbers[k : k + r * m].reshape(r, m)
-        nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
-            **{name: block[:, i] for i, name in enumerate(self.nuisances)}
-        )
-        return self.table.values(numbers[:k]), nuisance
+        return _unpack(self._plan, self._data, jnp.asarray(shared))
 
-    def _shoot(self, shared: Any, initial: Any, place: Any) -> tuple[Any, Any]:
-        """Outputs and states of one window."""
-        parameters, nuisances = self.unpack(shared)
-        record = self._data["record"][place]
-        nuisance = jax.tree.map(lambda values: values[record], nuisances)
-        reaching = commands(self.table.vehicle, self.model.dt, self._data["inputs"][record], nuisance)
-        first = self._data["first"][place]
-        cut = tuple(jax.lax.dynamic_slice_in_dim(u, first, self.length) for u in reaching)
-        voltage = jax.lax.dynamic_slice_in_dim(self._data["voltage"][record], first, self.length)
-        start = start_state(
-            self.table.vehicle,
-            self.model.output_names,
-            parameters,
-            nuisance,
-            value=self._data["value"][place],
-            rate=self._data["rate"][place],
-            inputs=cut[0][0] * 1.0,
-            voltage=voltage[0],
-        )
-        calm = jnp.zeros(N_DISTURBANCES)
-
-        def sample(x: Any, now: Any) -> tuple[Any, Any]:
-            u, volts = now
-            return self.model.step(x, calm, u, parameters, volts), x
-
-        _, states = jax.lax.scan(sample, start + initial * self._initial_scale, (cut, voltage))
-        return jax.vmap(lambda x: self.model.measure(x, nuisance))(states), states
-
-    def residuals(self, row: Any) -> tuple[Any, Any]:
+    def residuals(self, row: Array) -> tuple[Any, Any]:
         """Residuals (windows, n, outputs) and states (windows, n, states)."""
-        shared = row[: self._shared]
-        initial = row[self._shared :].reshape(len(self._places), -1)
-        outputs, states = jax.vmap(lambda i, x0: self._shoot(shared, x0, i))(jnp.arange(len(self._places)), initial)
-        return self._data["outputs"] - outputs, states
-
-    def _with_tangents(self, row: Any) -> tuple[Any, Any]:
-        """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
-        shared = row[: self._shared]
-        initial = row[self._shared :].reshape(len(self._places), -1)
-        count = self._shared + initial.shape[1]
-
-        def one(place: Any, x0: Any) -> Any:
-            def outputs(both: Any) -> Any:
-                return self._shoot(both[: self._shared], both[self._shared :], place)[0]
-
-            both = jnp.concatenate([shared, x0])
-            return jax.vmap(lambda t: jax.jvp(outputs, (both,), (t,)), out_axes=(None, 0))(jnp.eye(count))
-
-        values, tangents = jax.vmap(one)(jnp.arange(len(self._places)), initial)
-        return self._data["outputs"] - values, -tangents
+        return _residuals(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
         """Negative log-likelihood with the covariance of the last accepted row."""
-        residual = np.asarray(self._residuals(jnp.asarray(row))[0])
+        residual = np.asarray(self.residuals(row)[0])
         return self._cost(residual)
 
     def _cost(self, residual: Array) -> float:
@@ -203,7 +155,7 @@ class OutputError:
 
     def refresh(self, row: Array) -> None:
         """Covariance of the residuals at an accepted row, outliers weighed down."""
-        flat = np.asarray(self._residuals(jnp.asarray(row))[0]).reshape(-1, self._L.shape[0])
+        flat = np.asarray(self.residuals(row)[0]).reshape(-1, self._L.shape[0])
         if not np.isfinite(flat).all():
             return
         scale = 1.4826 * np.median(np.abs(flat), axis=0) + 1e-12
@@ -218,7 +170,7 @@ class OutputError:
         return self._cost(residual), gradient, information
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
-        values, tangents = self._linearised(jnp.asarray(row))
+        values, tangents = _with_tangents(self._plan, self._data, jnp.asarray(row))
         residual, derivative = np.asarray(values), np.asarray(tangents)
         Li = np.linalg.inv(self._L)
         white = residual @ Li.T
@@ -230,7 +182,7 @@ class OutputError:
             own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
             flat = d_white[place].reshape(s + n, -1)
             gradient[own] += flat @ (white[place] * weight[place]).ravel()
-            information[np.ix_(own, own)] += flat @ flat.T
+            information[np.ix_(own, own)] += (flat * weight[place].ravel()) @ flat.T
         return residual, gradient, information, d_white
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
@@ -256,3 +208,78 @@ class OutputError:
     def places(self) -> list[tuple[int, int]]:
         """Record number and first sample of each window."""
         return list(self._places)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What compiled code depends on: everything but numbers."""
+
+    model: StochasticModel
+    layout: Layout
+    records: int
+    nuisances: tuple[str, ...]
+    length: int
+    shared: int
+
+
+def _unpack(plan: _Plan, data: Any, shared: Any) -> tuple[Any, Nuisance]:
+    numbers = shared * data["scale"]
+    k, r, m = len(plan.layout.free), plan.records, len(plan.nuisances)
+    block = numbers[k : k + r * m].reshape(r, m)
+    nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+        **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
+    )
+    return plan.layout.values(data["card"], numbers[:k]), nuisance
+
+
+def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tuple[Any, Any]:
+    """Outputs and states of one window."""
+    model, vehicle = plan.model, plan.model.vehicle
+    parameters, nuisances = _unpack(plan, data, shared)
+    record, first = data["record"][place], data["first"][place]
+    nuisance = jax.tree.map(lambda values: values[record], nuisances)
+    reaching = commands(vehicle, model.dt, data["inputs"][record], nuisance, held=model.held)
+    cut = tuple(jax.lax.dynamic_slice_in_dim(u, first, plan.length) for u in reaching)
+    voltage = jax.lax.dynamic_slice_in_dim(data["voltage"][record], first, plan.length)
+    start = start_state(
+        vehicle,
+        model.output_names,
+        parameters,
+        nuisance,
+        value=data["value"][place],
+        rate=data["rate"][place],
+        inputs=cut[0][0],
+        voltage=voltage[0],
+    )
+    calm = jnp.zeros(N_DISTURBANCES)
+
+    def sample(x: Any, now: Any) -> tuple[Any, Any]:
+        u, volts = now
+        return model.step(x, calm, u, parameters, volts), x
+
+    _, states = jax.lax.scan(sample, start + initial * data["initial_scale"], (cut, voltage))
+    return jax.vmap(lambda x: model.measure(x, nuisance))(states), states
+
+
+@partial(jax.jit, static_argnums=0)
+def _residuals(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
+    places = jnp.arange(initial.shape[0])
+    outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
+    return data["outputs"] - outputs, states
+
+
+@partial(jax.jit, static_argnums=0)
+def _with_tangents(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+    """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
+    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
+
+    def one(place: Any, x0: Any) -> Any:
+        def outputs(both: Any) -> Any:
+            return _shoot(plan, data, both[: plan.shared], both[plan.shared :], place)[0]
+
+        both = jnp.concatenate([shared, x0])
+        return jax.vmap(lambda t: jax.jvp(outputs, (both,), (t,)), out_axes=(None, 0))(jnp.eye(both.shape[0]))
+
+    values, tangents = jax.vmap(one)(jnp.arange(initial.shape[0]), initial)
+    return data["outputs"] - values, -tangents

@@ -103,8 +103,32 @@ CHOICES: dict[str, Choice] = {
 
 
 @dataclass(frozen=True)
+class Layout:
+    """How a row of free numbers becomes the equations' parameters, without any number: compiled code depends on this.
+
+    Attributes:
+        parameters: the equations' named tuple type.
+        free: names of the free parameters, in the row's order.
+        ties: tied names and their expressions, in an order in which each uses only what stands before.
+    """
+
+    parameters: Any
+    free: tuple[str, ...]
+    ties: tuple[tuple[str, Expression], ...]
+
+    def values(self, card: Any, row: Any) -> Any:
+        """The equations' parameters for the card's numbers (in their order) and a row of free ones (traceable)."""
+        numbers = {name: card[i] for i, name in enumerate(self.parameters._fields)}
+        for place, name in enumerate(self.free):
+            numbers[name] = row[place]
+        for name, expression in self.ties:
+            numbers[name] = expression(numbers)
+        return self.parameters(**numbers)
+
+
+@dataclass(frozen=True)
 class Parameterization:
-    """How a row of free numbers becomes the equations' parameters.
+    """Free parameters and ties of a vehicle, with the card that gives all other numbers.
 
     Attributes:
         vehicle: whose parameters they are.
@@ -120,6 +144,15 @@ class Parameterization:
     def names(self) -> tuple[str, ...]:
         return tuple(free.name for free in self.free)
 
+    @property
+    def layout(self) -> Layout:
+        return Layout(self.vehicle.parameters, self.names, self.ties)
+
+    @property
+    def card_row(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """The card's numbers in the equations' order."""
+        return np.array(self.vehicle.values(), dtype=np.float64)
+
     def starts(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """First guesses in the card's units."""
         card = self.vehicle.card.values()
@@ -132,24 +165,10 @@ class Parameterization:
         high = [np.inf if entry.upper is None else entry.upper for entry in entries]
         return np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
 
-    def values(self, row: Any) -> Any:
-        """The equations' parameters for a row of free numbers (traceable)."""
-        numbers: dict[str, Any] = dict(self.vehicle.card.values())
-        for place, name in enumerate(self.names):
-            numbers[name] = row[place]
-        for name, expression in self.ties:
-            numbers[name] = expression(numbers)
-        return self.vehicle.parameters(*(numbers[name] for name in self.vehicle.parameter_names))
-
     def identified(self, row: ArrayLike) -> dict[str, float]:
         """Names and values of everything that moved, tied parameters too."""
-        numbers: dict[str, Any] = {
-            **self.vehicle.card.values(),
-            **dict(zip(self.names, map(float, np.asarray(row)), strict=True)),
-        }
-        for name, expression in self.ties:
-            numbers[name] = float(expression(numbers))
-        return {name: numbers[name] for name in (*self.names, *(name for name, _ in self.ties))}
+        moved = self.layout.values(self.card_row, np.asarray(row))
+        return {name: float(getattr(moved, name)) for name in (*self.names, *(name for name, _ in self.ties))}
 
     def without(self, names: Iterable[str]) -> Parameterization:
         """The same with some parameters fixed at the card."""

@@ -9,6 +9,8 @@ answers to the measured motion does not bias it as it biases output error.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -17,7 +19,7 @@ import numpy as np
 
 from swashplate.flights.flight import Array
 from swashplate.identification import robust
-from swashplate.identification.parameters import Parameterization
+from swashplate.identification.parameters import Layout, Parameterization
 from swashplate.identification.records import Record
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.start_states import hover, slopes, start_state
@@ -26,6 +28,7 @@ from swashplate.identification.stochastic import (
     FilterState,
     Noise,
     Nuisance,
+    StochasticModel,
     commands,
     stochastic_model,
 )
@@ -48,6 +51,10 @@ _NUISANCE = {
 }
 
 
+_LENGTHS = 256
+"""Records are padded to a multiple of this many samples, so that flights of similar length share compiled code."""
+
+
 def parameter_entries(table: Parameterization) -> list[Entry]:
     """Row entries of the free parameters with their bounds and priors."""
     low, high = table.bounds()
@@ -68,7 +75,7 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
 
 def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
     """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
-    longest = max(piece.time.size for piece in pieces)
+    longest = -(-max(piece.time.size for piece in pieces) // _LENGTHS) * _LENGTHS
 
     def padded(rows: Array) -> Array:
         return np.concatenate([rows, np.repeat(rows[-1:], longest - rows.shape[0], axis=0)])
@@ -119,52 +126,32 @@ class PredictionError:
                     Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
                 )
         self.row = Row(tuple(entries))
-        self._data = {key: jnp.asarray(value) for key, value in stack_records(pieces).items()}
+        stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
-        self._first = jnp.asarray(np.stack([v[0] for v, _ in first])), jnp.asarray(np.stack([r[0] for _, r in first]))
-        self._scale = jnp.asarray(self.row.scale)
-        settling = round(SETTLING / self.model.dt)
-        self.counted = np.stack(
-            [(np.arange(self._data["mask"].shape[1]) >= settling) & mask for mask in np.asarray(self._data["mask"])]
-        )
-        self._residuals = jax.jit(self.innovations)
-        self._linearised = jax.jit(self._with_tangents)
+        self._plan = _Plan(self.model, table.layout, len(pieces), estimate_noise)
+        self._data = {
+            **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
+            "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
+            "rate": jnp.asarray(np.stack([rate[0] for _, rate in first])),
+            "card": jnp.asarray(table.card_row),
+            "scale": jnp.asarray(self.row.scale),
+            "noise": jnp.asarray([float(value) for value in self.noise]),
+        }
+        late = np.arange(stacked["mask"].shape[1]) >= round(SETTLING / self.model.dt)
+        self.counted = np.asarray(stacked["mask"], dtype=bool) & late
 
-    # ---- traced ------------------------------------------------------------------------------------------------
     def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
         """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
-        numbers = row * self._scale
-        k, r, m = len(self.table.free), len(self.pieces), len(_NUISANCE)
-        block = numbers[k : k + r * m].reshape(r, m)
-        nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
-            **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
-        )
-        noise = Noise(*jnp.exp(numbers[k + r * m :])) if self.estimate_noise else self.noise
-        return self.table.values(numbers[:k]), nuisance, noise
+        return _unpack(self._plan, self._data, jnp.asarray(row))
 
-    def innovations(self, row: Any) -> tuple[Any, Any, FilterState]:
+    def innovations(self, row: Array) -> tuple[Any, Any, FilterState]:
         """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
-        parameters, nuisances, noise = self.unpack(row)
-
-        def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance) -> Any:
-            return filter_record(
-                self.model, y, u, voltage, value=value, rate=rate, parameters=parameters, noise=noise, nuisance=nuisance
-            )
-
-        return jax.vmap(one)(  # type: ignore[no-any-return]
-            self._data["outputs"], self._data["inputs"], self._data["voltage"], *self._first, nuisances
-        )
-
-    def _with_tangents(self, row: Any) -> Any:
-        def residuals(row: Any) -> Any:
-            return self.innovations(row)[:2]
-
-        return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,)), out_axes=(None, 0))(jnp.eye(len(self.row)))
+        return _innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
         """Negative log-likelihood of the counted innovations (without its constant)."""
-        innovations, covariances, _ = self._residuals(jnp.asarray(row))
+        innovations, covariances, _ = self.innovations(row)
         return self._cost(np.asarray(innovations), np.asarray(covariances))
 
     def _cost(self, innovations: Array, covariances: Array) -> float:
@@ -186,7 +173,7 @@ class PredictionError:
         return self._cost(*values), gradient, information
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
-        values, tangents = self._linearised(jnp.asarray(row))
+        values, tangents = _with_tangents(self._plan, self._data, jnp.asarray(row))
         values = tuple(np.asarray(v) for v in values)
         tangents = tuple(np.asarray(t) for t in tangents)
         p = len(self.row)
@@ -206,7 +193,7 @@ class PredictionError:
             gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
             # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
-            information += flat @ flat.T
+            information += (flat * weight.ravel()) @ flat.T
             information += 0.5 * nu.shape[0] * dM.reshape(p, -1) @ dM.reshape(p, -1).T
         return gradient, information, values, tangents
 
@@ -237,8 +224,53 @@ class PredictionError:
         return white, sensitivities
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """What compiled code depends on: everything but numbers."""
+
+    model: StochasticModel
+    layout: Layout
+    records: int
+    estimate_noise: bool
+
+
+def _unpack(plan: _Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
+    numbers = row * data["scale"]
+    k, r, m = len(plan.layout.free), plan.records, len(_NUISANCE)
+    block = numbers[k : k + r * m].reshape(r, m)
+    nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+        **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
+    )
+    noise = Noise(*(jnp.exp(numbers[k + r * m :]) if plan.estimate_noise else data["noise"]))
+    return plan.layout.values(data["card"], numbers[:k]), nuisance, noise
+
+
+@partial(jax.jit, static_argnums=0)
+def _innovations(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
+    parameters, nuisances, noise = _unpack(plan, data, row)
+
+    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance) -> Any:
+        return filter_record(
+            plan.model, y, u, voltage, value=value, rate=rate, parameters=parameters, noise=noise, nuisance=nuisance
+        )
+
+    return jax.vmap(one)(  # type: ignore[no-any-return]
+        data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], nuisances
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def _with_tangents(plan: _Plan, data: Any, row: Any) -> Any:
+    """Innovations and covariances with their derivatives by every entry of the row."""
+
+    def residuals(row: Any) -> Any:
+        return _innovations(plan, data, row)[:2]
+
+    return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,)), out_axes=(None, 0))(jnp.eye(row.shape[0]))
+
+
 def filter_record(
-    model: Any,
+    model: StochasticModel,
     y: Any,
     u: Any,
     voltage: Any,
@@ -256,7 +288,7 @@ def filter_record(
         y, u, voltage: measurements, logged inputs and battery voltage by sample.
         value, rate: measured channels and their rates at the first sample.
     """
-    reaching = commands(model.vehicle, model.dt, u, nuisance)
+    reaching = commands(model.vehicle, model.dt, u, nuisance, held=model.held)
     around, at_hover = hover(model.vehicle, parameters, jnp.mean(voltage))
     gain = model.gain(around, at_hover, parameters, jnp.mean(voltage), noise, nuisance)
     settled = max(1, round(0.5 / model.dt))

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
@@ -97,7 +98,17 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
         time=time,
         inputs=table[:, :n_inputs],
         outputs=table[:, n_inputs:],
-        voltage=flight.values("voltage") if known else np.full(time.size, nominal),
+        voltage=_slow(flight.values("voltage"), float(np.mean(steps))) if known else np.full(time.size, nominal),
         output_names=outputs,
         voltage_known=known,
     )
+
+
+_BATTERY = 1.0
+"""Seconds over which a logged voltage is averaged: a battery sags slowly, a volt of noise is 14 rad/s of rotor."""
+
+
+def _slow(voltage: Array, dt: float) -> Array:
+    """A logged voltage without its noise: straight lines over `_BATTERY` seconds each way (Savitzky and Golay)."""
+    window = min(2 * round(_BATTERY / dt) + 1, voltage.size - (voltage.size + 1) % 2)
+    return np.asarray(savgol_filter(voltage, window, 1), dtype=np.float64)

@@ -62,8 +62,8 @@ class Optimum:
 _HOPELESS = 1e8
 """Damping at which a step is so short that no descent is left."""
 
-_LARGEST_STEP = 0.7
-"""In scaled units: no entry moves by more than this in one iteration."""
+_LARGEST_STEP = {"parameter": 0.7, "noise": 0.7, "nuisance": 3.0, "initial": 10.0}
+"""In scaled units: no entry of a group moves by more than this in one iteration."""
 
 
 def minimise(
@@ -97,21 +97,22 @@ def minimise(
             hint="Check units and signs with 'swash inspect', or start from a card that flies.",
         )
     history, damping, converged = [cost], 1e-2, False
+    reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
     for iteration in range(iterations):
         found = None
         while damping < _HOPELESS:
-            step = _step(row, gradient, information[1], damping, low, high)
+            step = np.clip(_step(row, gradient, information[1], damping, low, high), -reach, reach)
             trial = np.clip(row + step, low, high)
             trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
             if np.isfinite(trial_cost) and trial_cost < cost:
                 found = trial, trial_cost
                 break
-            damping *= 5.0
+            damping *= 10.0
         if found is None:
             converged = True  # no direction goes down any more
             break
         gained = cost - found[1]
-        row, damping = found[0], max(damping / 8.0, 1e-5)
+        row, damping = found[0], max(damping / 10.0, 1e-12)
         likelihood.refresh(row)
         cost, gradient, information = _posterior(likelihood, row)
         history.append(cost)
@@ -143,4 +144,4 @@ def _step(row: Array, gradient: Array, hessian: Array, damping: float, low: Arra
         if not stopped.any():
             break
         free &= ~stopped
-    return np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+    return step

@@ -19,7 +19,7 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local
 from swashplate.simulation.dynamics import (
     CONSTANTS,
-    RowRates,
+    Equations,
     equations_of,
     jax_backend,
     rk4_step_looped,
@@ -96,28 +96,36 @@ class FilterState(NamedTuple):
 class StochasticModel:
     """A vehicle's equations with disturbances and sensors, as functions of flat rows.
 
+    Two models of the same equations, outputs and rate are equal, so that compiled code serves every card.
+
     Attributes:
-        vehicle: whose equations.
+        equations: whose equations.
         output_names: measured channels.
         dt: sample time [s].
-        rates: the equations on flat rows.
+        held: commands are kept through each sample (a flight computer's outputs); otherwise a smooth curve joins them.
     """
 
-    vehicle: Vehicle
+    equations: Equations
     output_names: tuple[str, ...]
     dt: float
-    rates: RowRates
+    held: bool = True
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """For names only: its card is any card of these equations."""
+        return self.equations.vehicle
 
     # ---- one sample --------------------------------------------------------------------------------------------
     def step(self, x: Any, accelerations: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
         """The state one sample later, with disturbing accelerations held (in the order of `DISTURBED`)."""
+        rates = row_rates(self.equations, padded=False)
         push = jnp.zeros(x.shape[0]).at[self._disturbed].set(accelerations)
         calm = jnp.zeros(3)
         driving = jnp.stack([jnp.concatenate([row, calm, voltage[None]]) for row in u])
         constants = [getattr(Environment(), name) for name in CONSTANTS]
         numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
         return rk4_step_looped(
-            lambda x, w: self.rates(x, w, numbers) + push,
+            lambda x, w: rates(x, w, numbers) + push,
             x,
             lambda fraction: driving[jnp.round(2.0 * fraction).astype(int)],
             self.dt,
@@ -257,10 +265,10 @@ def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
 
 def stochastic_model(vehicle: Vehicle, output_names: tuple[str, ...], dt: float) -> StochasticModel:
     """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds."""
-    return StochasticModel(vehicle, output_names, dt, row_rates(equations_of(vehicle), padded=True))
+    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9))
 
 
-def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> tuple[Any, Any, Any]:
+def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, held: bool) -> tuple[Any, Any, Any]:
     """What reaches the vehicle at the start, middle and end of each sample: trimmed, and later than logged.
 
     A smooth curve through the samples; before the first and after the last sample the nearest one holds.
@@ -279,4 +287,7 @@ def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> tu
         # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
         return b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
 
+    if held:
+        now = at(0.0)
+        return now, now, now
     return at(0.0), at(0.5 * dt), at(dt)

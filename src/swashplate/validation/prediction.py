@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -20,6 +21,7 @@ from swashplate.identification.stochastic import (
     FilterState,
     Noise,
     Nuisance,
+    StochasticModel,
     commands,
     stochastic_model,
 )
@@ -66,46 +68,29 @@ def predict(
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them.
     """
     model = stochastic_model(vehicle, record.output_names, record.dt)
-    parameters = vehicle.values()
+    parameters = jax.tree.map(jnp.asarray, vehicle.values())
     value, rate = slopes(record, np.array([0]))
     n, ahead = record.time.size, round(horizon / record.dt)
     starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
-    padded = np.concatenate([record.inputs, np.repeat(record.inputs[-1:], ahead, axis=0)])
-    volts = jnp.asarray(np.concatenate([record.voltage, np.repeat(record.voltage[-1:], ahead)]))
-
-    @jax.jit
-    def observe() -> Any:
-        return filter_record(
-            model,
-            jnp.asarray(record.outputs),
-            jnp.asarray(record.inputs),
-            jnp.asarray(record.voltage),
-            value=jnp.asarray(value[0]),
-            rate=jnp.asarray(rate[0]),
-            parameters=parameters,
-            noise=noise,
-            nuisance=nuisance,
-        )
-
-    innovations, covariance, filtered = observe()
-    reaching = commands(vehicle, record.dt, jnp.asarray(padded), nuisance)
-    kept = jnp.array([vehicle.index(name) for name in PREDICTED])
-
-    @jax.jit
-    def run(first: Any) -> Any:
-        def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
-            now = (reaching[0][k], reaching[1][k], reaching[2][k])
-            following = model.predict(state, now, parameters, volts[k], noise)
-            return following, following.x[kept]
-
-        at_start = jax.tree.map(lambda rows: rows[first], filtered)
-        return jax.lax.scan(sample, at_start, first + jnp.arange(ahead))[1]
-
-    states = jax.vmap(run)(jnp.asarray(starts))
+    inputs, voltage = (
+        np.concatenate([rows, np.repeat(rows[-1:], ahead, axis=0)]) for rows in (record.inputs, record.voltage)
+    )
+    innovations, covariance, filtered, states = _predict(
+        model,
+        ahead,
+        record.outputs,
+        inputs,
+        voltage,
+        (value[0], rate[0]),
+        parameters,
+        jax.tree.map(jnp.asarray, noise),
+        jax.tree.map(jnp.asarray, nuisance),
+        starts,
+    )
     return Predictions(
         starts=np.asarray(starts),
         states=np.asarray(states),
-        filtered=np.asarray(filtered.x[:, kept]),
+        filtered=np.asarray(filtered),
         innovations=np.asarray(innovations),
         covariance=np.asarray(covariance),
     )
@@ -125,6 +110,45 @@ def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kin
     turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
     turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
     return np.concatenate([moved, velocity, turned, rates], axis=1)
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _predict(
+    model: StochasticModel,
+    ahead: int,
+    y: Any,
+    inputs: Any,
+    voltage: Any,
+    first: Any,
+    parameters: Any,
+    noise: Noise,
+    nuisance: Nuisance,
+    starts: Any,
+) -> tuple[Any, Any, Any, Any]:
+    n = y.shape[0]
+    innovations, covariance, filtered = filter_record(
+        model,
+        y,
+        inputs[:n],
+        voltage[:n],
+        value=first[0],
+        rate=first[1],
+        parameters=parameters,
+        noise=noise,
+        nuisance=nuisance,
+    )
+    reaching = commands(model.vehicle, model.dt, inputs, nuisance, held=model.held)
+    kept = jnp.array([model.vehicle.index(name) for name in PREDICTED])
+
+    def run(start: Any) -> Any:
+        def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
+            now = (reaching[0][k], reaching[1][k], reaching[2][k])
+            following = model.predict(state, now, parameters, voltage[k], noise)
+            return following, following.x[kept]
+
+        return jax.lax.scan(sample, jax.tree.map(lambda rows: rows[start], filtered), start + jnp.arange(ahead))[1]
+
+    return innovations, covariance, filtered.x[:, kept], jax.vmap(run)(starts)
 
 
 def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:
