@@ -1,0 +1,102 @@
+"""From a fit and a validation (or one of them) to the structure of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from swashplate.errors import SwashError
+from swashplate.identification.fit import Fit
+from swashplate.reporting import sections_data, sections_fit, sections_sight, sections_validation
+from swashplate.reporting.figures_validation import key_picture
+from swashplate.reporting.glossary import PARAMETERS
+from swashplate.reporting.structure import Figure, Report, Section
+from swashplate.reporting.summary import banners, summary
+from swashplate.reporting.versions import date, versions
+from swashplate.simulation.linearize import Mode, linearize
+from swashplate.validation.validation import Validation
+
+
+def compose(
+    fit: Fit | None = None,
+    validation: Validation | None = None,
+    *,
+    title: str | None = None,
+    modes: Mapping[str, Sequence[Mode]] | None = None,
+) -> Report:
+    """A report's structure.
+
+    Args:
+        fit, validation: one of them at least.
+        title: heading; made from the vehicle and the flights where None.
+        modes: eigenvalues at hover by vehicle ("published", "identified"); computed where None.
+
+    Raises:
+        SwashError: where there is nothing to report.
+    """
+    if fit is None and validation is None:
+        raise SwashError("there is nothing to report: neither a fit nor a validation was given.")
+    found, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
+    hover = sections_sight.hover(found, problems)
+    parts: list[Section | None] = [
+        sections_validation.verdict(validation) if validation else None,
+        sections_data.asked(fit, validation),
+        sections_data.data(fit, validation),
+        _with_warnings(fit) if fit else None,
+        sections_fit.comparison(fit) if fit and fit.comparisons else None,
+        sections_validation.prediction(validation) if validation else None,
+        sections_fit.residuals(fit) if fit and fit.comparisons else None,
+        sections_sight.sight(fit) if fit else None,
+        hover,
+        sections_validation.innovations(validation) if validation and validation.innovations else None,
+        sections_fit.noise(fit) if fit else None,
+        sections_fit.meanings(fit, PARAMETERS) if fit else None,
+        sections_data.made_with(fit, validation),
+    ]
+    return Report(
+        title=title or _title(fit, validation),
+        banners=banners(fit, validation),
+        summary=summary(fit, validation),
+        picture=_picture(fit, validation),
+        sections=tuple(part for part in parts if part is not None),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def hover_modes(fit: Fit | None, validation: Validation | None) -> tuple[dict[str, Sequence[Mode]], list[str]]:
+    """Modes of the published and the identified vehicle at hover, and why one has none."""
+    source = fit or validation
+    if source is None:
+        return {}, []
+    found: dict[str, Sequence[Mode]] = {}
+    problems = []
+    for label, vehicle in (("published", source.published), ("identified", source.vehicle)):
+        try:
+            found[label] = linearize(vehicle).modes()
+        except SwashError as error:
+            problems.append(f"The {label} vehicle has no eigenvalues at hover: {error}")
+    return found, problems
+
+
+def _with_warnings(fit: Fit) -> Section:
+    section = sections_fit.parameters(fit)
+    warned = sections_fit.warnings(fit)
+    return replace(section, blocks=(warned, *section.blocks)) if warned else section
+
+
+def _picture(fit: Fit | None, validation: Validation | None) -> Figure | None:
+    """The key picture: the race of the predictors; without a validation, flight against model in roll and pitch."""
+    if validation and validation.scores:
+        return key_picture(validation)
+    if fit and fit.comparisons:
+        figures = [b for b in sections_fit.comparison(fit).blocks if isinstance(b, Figure)]
+        return replace(figures[0], identifier="key-picture") if figures else None
+    return None
+
+
+def _title(fit: Fit | None, validation: Validation | None) -> str:
+    source = fit or validation
+    assert source is not None
+    names = list(dict.fromkeys(f.provenance.source for f in source.flights if f.provenance.source))
+    verb = "identified from" if fit else "predicting"
+    return f"{source.vehicle.name} {verb} {', '.join(names[:2]) or 'a flight'}"

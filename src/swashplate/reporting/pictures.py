@@ -1,0 +1,122 @@
+"""Still pictures of the key results for README files and papers (PNG or SVG, by the suffix of the path)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swashplate.atomic import replaced_when_complete
+from swashplate.errors import SwashError
+from swashplate.flights.schema import channel
+from swashplate.identification.kinematics import PREDICTED
+from swashplate.reporting.figures_time import flight_name
+from swashplate.reporting.figures_validation import JUDGED, middle_horizon
+from swashplate.reporting.sections_validation import apart
+from swashplate.reporting.theme import FLIGHT, MODEL, PREDICTOR_STYLE, PREDICTOR_WORDS, axis_title
+from swashplate.validation.validation import PREDICTORS, Validation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MARKERS = {"model": "o", "published card": "s", "constant rates": "X", "hold": "|"}
+_FLOOR = -60.0
+
+
+def prediction_picture(
+    validation: Validation,
+    *,
+    path: str | os.PathLike[str],
+    channels: tuple[str, ...] = ("phi", "theta", "p", "q"),
+    title: str | None = None,
+) -> Path:
+    """Flight (solid) and predictions (dashed, +-2 sigma) over time on the first predicted flight."""
+    if not validation.records or not validation.examples:
+        raise SwashError("the validation has no predictions to draw.")
+    source = flight_name(validation.records[0].name)
+    mine = [i for i, record in enumerate(validation.records) if flight_name(record.name) == source]
+    names = {validation.records[i].name for i in mine}
+    examples = apart([e for e in validation.examples if e.record in names])
+    figure = _figure(8.6, 1.35 * len(channels) + 0.7)
+    panels: Any = figure.subplots(len(channels), 1, sharex=True)
+    for panel, name in zip(np.atleast_1d(panels), channels, strict=True):
+        j, factor = PREDICTED.index(name), channel(name).shown_factor
+        for k, i in enumerate(mine):
+            record = validation.records[i]
+            label = "flight" if k == 0 else None
+            panel.plot(record.time, factor * validation.measured[i][:, j], color=FLIGHT, lw=1.0, label=label)
+        for k, e in enumerate(examples):
+            middle = factor * e.states[:, j]
+            spread = 2.0 * factor * np.broadcast_to(e.sigma, e.states.shape)[:, j]
+            label = "prediction from each dot, ±2σ" if k == 0 else None
+            panel.fill_between(e.time, middle - spread, middle + spread, color=MODEL, alpha=0.2, lw=0)
+            panel.plot(e.time, middle, color=MODEL, lw=1.4, ls="--", label=label)
+            panel.plot(e.time[:1], middle[:1], "o", color=MODEL, ms=4)
+        panel.set_ylabel(axis_title(name))
+        panel.margins(x=0.01)
+        _tidy(panel)
+    np.atleast_1d(panels)[0].legend(loc="upper right", ncols=2, frameon=False, fontsize=9)
+    np.atleast_1d(panels)[-1].set_xlabel("time [s]")
+    figure.suptitle(title or f"Prediction of {source}", fontsize=11, x=0.02, ha="left")
+    return _save(figure, path)
+
+
+def score_picture(validation: Validation, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
+    """Fit % of every predictor on every channel, one second ahead."""
+    if not validation.scores:
+        raise SwashError("the validation has no scores to draw.")
+    horizon = middle_horizon(validation)
+    scores = {(s.channel, s.predictor): s.fit for s in validation.scores if s.horizon == horizon}
+    names = [name for name in JUDGED if (name, "model") in scores]
+    figure = _figure(7.2, 0.32 * len(names) + 1.4)
+    panel: Any = figure.subplots()
+    for predictor in reversed([p for p in PREDICTORS if p != "hold"]):
+        rows = [(i, scores[name, predictor]) for i, name in enumerate(names) if (name, predictor) in scores]
+        color = PREDICTOR_STYLE[predictor][0]
+        style = {"edgecolors": color, "zorder": 3, "clip_on": False}
+        filled = color if predictor != "published card" else "none"
+        size = 70 if predictor == "model" else 46
+        label = PREDICTOR_WORDS[predictor]
+        inside = [(i, fit) for i, fit in rows if fit >= _FLOOR]
+        x, y = [fit for _, fit in inside], [i for i, _ in inside]
+        panel.scatter(x, y, marker=_MARKERS[predictor], s=size, facecolors=filled, label=label, **style)
+        below = [i for i, fit in rows if fit < _FLOOR]
+        panel.scatter([_FLOOR] * len(below), below, marker="<", s=size, facecolors="none", **style)
+    panel.axvline(0.0, color="#333", lw=1.2, label="hold the last value")
+    panel.set(yticks=range(len(names)), yticklabels=names, xlim=(_FLOOR, 102.0), xlabel=f"fit {horizon:g} s ahead [%]")
+    panel.invert_yaxis()
+    _tidy(panel)
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    if title:
+        panel.set_title(title, fontsize=11, loc="left")
+    return _save(figure, path)
+
+
+def _figure(width: float, height: float) -> Figure:
+    """A figure without a window system: nothing of pyplot's global state is touched."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained", facecolor="white")
+
+
+def _tidy(panel: Any) -> None:
+    panel.grid(color="#e4e4e4", lw=0.7)
+    panel.set_axisbelow(True)
+    for side in ("top", "right"):
+        panel.spines[side].set_visible(False)
+
+
+def _save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Writes without a date in it, so that the same result gives the same bytes."""
+    import matplotlib as mpl
+
+    target = Path(path)
+    if target.suffix not in (".png", ".svg"):
+        raise SwashError(f"suffix is '{target.suffix}', expected .png or .svg.", where=target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    stamp: dict[str, Any] = {"Date": None} if target.suffix == ".svg" else {"Software": None}
+    with mpl.rc_context({"svg.hashsalt": "swashplate"}), replaced_when_complete(target) as temporary:
+        figure.savefig(temporary, dpi=160, metadata=stamp)
+    return target

@@ -1,0 +1,162 @@
+"""Sections on what was asked, the flights and what was done to them, and what the result was made with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from swashplate.flights.flight import Flight
+from swashplate.identification.fit import Fit
+from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.versions import card_hash, date, result_hash, versions
+from swashplate.reporting.words import counted, listed, plain_words, span_words, step_words
+from swashplate.validation.validation import Validation
+from swashplate.vehicles.vehicle import Vehicle
+
+
+def asked(fit: Fit | None, validation: Validation | None) -> Section:
+    """What was asked: vehicle, method, flights and settings."""
+    blocks: list[Block] = []
+    vehicle = fit.vehicle if fit else validation.vehicle if validation else None
+    if fit:
+        blocks.append(
+            Text(
+                f"Identify {counted(len(fit.names), 'parameter')} of the vehicle '{fit.vehicle.name}' "
+                f"(choice: {fit.choice}) from {listed(_sources(fit.flights))} by {method_words(fit.method)}."
+            )
+        )
+    if validation:
+        blocks.append(
+            Text(
+                f"Predict {listed(_sources(validation.flights))} with the model "
+                f"{', '.join(f'{h:g}' for h in sorted({s.horizon for s in validation.scores}))} s ahead from "
+                f"many start "
+                "points, and compare with the published card (same observer, same trims), with holding the last value "
+                "and with constant rates."
+            )
+        )
+    if vehicle is not None:
+        blocks.append(Text(f"The vehicle: {vehicle.card.title}. Where its card may be trusted: {vehicle.card.trust}"))
+    rows = [("fit", fit.settings)] if fit else []
+    rows += [("validation", validation.settings)] if validation else []
+    cells = tuple((Cell(f"{k}"), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
+    if cells:
+        blocks.append(Table("Settings", ("setting", "of", "value"), cells))
+    return Section("asked", "What was asked", tuple(blocks))
+
+
+def method_words(method: str) -> str:
+    """A method's name for a sentence."""
+    return {
+        "prediction-error": "prediction error (maximum likelihood with process noise)",
+        "output-error": "output error (maximum likelihood without process noise)",
+        "nelder-mead": "Nelder and Mead's search on the squared error, the paper's own way",
+    }.get(method, method)
+
+
+def _sources(flights: Iterable[Flight]) -> list[str]:
+    return [flight.provenance.source or "an unnamed flight" for flight in flights]
+
+
+def same_flight(one: Flight, other: Flight) -> bool:
+    """True for two parts of one log: equal hashes, or the very same object where there is no file."""
+    hashes = one.provenance.sha256, other.provenance.sha256
+    return one is other or (hashes[0] == hashes[1] != "")
+
+
+def used_twice(fit: Fit | None, validation: Validation | None) -> list[Flight]:
+    """Flights of the validation that come from a log which the fit used: predicting them proves less."""
+    if fit is None or validation is None:
+        return []
+    return [flight for flight in validation.flights if any(same_flight(flight, other) for other in fit.flights)]
+
+
+def data(fit: Fit | None, validation: Validation | None) -> Section:
+    """The flights: where they come from, what was done to them, what their readers found."""
+    fitted, tested = fit.flights if fit else (), validation.flights if validation else ()
+    twice = used_twice(fit, validation)
+    roles = [("used for the fit", f) for f in fitted]
+    for flight in tested:
+        seen = any(flight is other for other in twice)
+        if not any(flight is other for other in fitted):
+            role = (
+                "predicted; a log that the fit used" if seen else "kept from the fit, predicted" if fit else "predicted"
+            )
+            roles.append((role, flight))
+    rows = tuple(
+        (
+            Cell(flight.provenance.source or "unnamed"),
+            Cell(role),
+            Cell(
+                "simulated" if flight.provenance.simulated else "flown",
+                tone="caution" if flight.provenance.simulated else "plain",
+            ),
+            Cell(span_words(flight)),
+            Cell(f"{flight.provenance.reader} {flight.provenance.reader_version}".strip() or "–"),
+            Cell(flight.provenance.sha256[:12] or "–"),
+        )
+        for role, flight in roles
+    )
+    blocks: list[Block] = [
+        Table(
+            "Flights",
+            ("flight", "role", "origin", "length", "reader", "SHA-256 (first 12)"),
+            rows,
+            note="Full hashes stand at the end of the report.",
+        )
+    ]
+    for _, flight in roles:
+        name = flight.provenance.source or "unnamed"
+        if flight.history:
+            blocks.append(
+                Points(
+                    tuple(step_words(step) for step in flight.history), title=f"What was done to {name}", ordered=True
+                )
+            )
+        else:
+            blocks.append(Text(f"Nothing was done to {name} after reading."))
+        if len(flight.segments) > 1:
+            pieces = ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in flight.segments)
+            blocks.append(Text(f"Unbroken segments of {name}: {pieces}."))
+        if flight.provenance.notes:
+            blocks.append(Points(flight.provenance.notes, title=f"What to know about {name}"))
+    return Section("data", "The data and what was done to it", tuple(blocks))
+
+
+def made_with(fit: Fit | None, validation: Validation | None) -> Section:
+    """Versions and hashes: enough to know whether two reports say the same about the same data."""
+    rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
+    hashes: list[tuple[str, str]] = []
+    seen: set[str] = set()
+    for flight in (*(fit.flights if fit else ()), *(validation.flights if validation else ())):
+        name = flight.provenance.source or "unnamed"
+        if name not in seen:
+            hashes.append((f"flight {name}", flight.provenance.sha256 or "none: simulated or made in memory"))
+            seen.add(name)
+    vehicles: Mapping[str, Vehicle] = _vehicles(fit, validation)
+    hashes += [(f"{label} card", card_hash(vehicle.card)) for label, vehicle in vehicles.items()]
+    results: list[tuple[str, dict[str, Any]]] = [("fit", fit.as_dict())] if fit else []
+    results += [("validation", validation.as_dict())] if validation else []
+    hashes += [(f"numbers of the {label}", result_hash(result)) for label, result in results]
+    return Section(
+        "versions",
+        "Versions and hashes",
+        (
+            Text(f"Written on {date()}."),
+            Table("Versions", ("package", "version"), rows),
+            Table(
+                "SHA-256",
+                ("of", "hash"),
+                tuple((Cell(name), Cell(value, tone="quiet")) for name, value in hashes),
+                note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to "
+                "six digits, "
+                "wall time left out. None depends on the machine or on where files lie.",
+            ),
+        ),
+        folded=True,
+    )
+
+
+def _vehicles(fit: Fit | None, validation: Validation | None) -> dict[str, Vehicle]:
+    found = fit or validation
+    return {"published": found.published, "identified": found.vehicle} if found else {}

@@ -1,0 +1,275 @@
+"""Sections on the fit: parameters, flight against model, and residuals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swashplate.flights.flight import Array
+from swashplate.identification.fit import Comparison, Estimate, Fit
+from swashplate.identification.kinematics import PREDICTED, measured_states
+from swashplate.identification.stochastic import Nuisance
+from swashplate.reporting.figures_fit import (
+    cost_history,
+    residual_correlation,
+    residual_histogram,
+    residual_time,
+)
+from swashplate.reporting.figures_time import Series, flight_name, time_figures
+from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.words import sigma_words, value_words
+
+PRIOR_HEAVY = 0.5
+"""Share of prior information above which a value says more about the prior than about the flight."""
+
+
+def parameters(fit: Fit) -> Section:
+    """Every estimated number, with where it comes from."""
+    rows = tuple(_row(fit, estimate) for estimate in fit.parameters)
+    blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
+    blocks.append(
+        Table(
+            "Parameters before and after the fit",
+            (
+                "parameter",
+                "unit",
+                "published",
+                "identified",
+                "σ plain",
+                "σ corrected",
+                "change",
+                "change / σ",
+                "prior share",
+                "remarks",
+            ),
+            rows,
+            note="σ plain: Cramér-Rao bound. σ corrected: the same, allowing for coloured residuals (Morelli and Klein "
+            "1997); use this one. Prior share: how much of the information is the prior's; near 100 % the flight said "
+            "nothing. A name leads to its meaning and source.",
+        )
+    )
+    if fit.record_estimates:
+        blocks.append(
+            Table(
+                "What belongs to the records and not to the vehicle",
+                ("quantity", "record", "unit", "estimate", "±σ"),
+                tuple(
+                    (
+                        Cell(e.name, link=f"meaning-{e.name}"),
+                        Cell(e.record),
+                        Cell(unit_words(e.unit)),
+                        Cell(value_words(e.value, e.sigma), number=True),
+                        Cell(sigma_words(e.sigma), number=True),
+                    )
+                    for e in fit.record_estimates
+                ),
+            )
+        )
+    if len(fit.history) > 1:
+        blocks.append(cost_history(fit.history))
+    return Section("parameters", "Parameters", tuple(blocks))
+
+
+def noise(fit: Fit) -> Section | None:
+    """The noise model, None where the method has none."""
+    if fit.noise is None:
+        return None
+    table = Table(
+        "Noise that the method assumed or estimated",
+        ("intensity", "value"),
+        tuple((Cell(k), Cell(value_words(float(v)), number=True)) for k, v in fit.noise._asdict().items()),
+        note="white_*: rad/s² or m/s² per √Hz; gust_* and drift_*: rad/s³ or m/s³ per √Hz; tau_*: s; sensor_*: "
+        "standard deviation per sample in m or rad.",
+    )
+    return Section("noise", "Noise model", (table,), folded=True)
+
+
+def _row(fit: Fit, e: Estimate) -> tuple[Cell, ...]:
+    change = e.value - e.published
+    relative = _relative(change, e.published)
+    sigmas = f"{change / e.sigma_corrected:+.1f}" if e.sigma_corrected > 0.0 else "–"
+    return (
+        Cell(e.name, link=f"meaning-{e.name}"),
+        Cell(unit_words(e.unit)),
+        Cell(value_words(e.published), number=True),
+        Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
+        Cell(sigma_words(e.sigma), number=True),
+        Cell(sigma_words(e.sigma_corrected), number=True),
+        Cell(relative, number=True),
+        Cell(sigmas, number=True),
+        Cell(f"{100.0 * e.prior_share:.0f} %", number=True, tone="caution" if e.prior_share > PRIOR_HEAVY else "plain"),
+        Cell(*_remarks(fit, e)),
+    )
+
+
+def _relative(change: float, published: float) -> str:
+    if change == 0.0:
+        return "none"
+    share = 100.0 * change / abs(published) if published else math.inf
+    return f"{share:+.0f} %" if abs(share) < 1000.0 else ("new" if not published else "> 999 %")
+
+
+def _remarks(fit: Fit, e: Estimate) -> tuple[str, bool, str]:
+    words = []
+    if e.at_bound:
+        entry = fit.published.card.parameters.get(e.name)
+        bounds = f" [{value_words(entry.lower)}, {value_words(entry.upper)}]" if entry else ""
+        words.append(f"at its physical bound{bounds}")
+    if e.tie:
+        words.append(f"tied: = {e.tie}")
+    if e.prior_mean is not None and e.prior_sigma is not None:
+        words.append(f"prior {value_words(e.prior_mean, e.prior_sigma)} ± {sigma_words(e.prior_sigma)}")
+    return "; ".join(words), False, "bad" if e.at_bound else "plain"
+
+
+def comparison(fit: Fit) -> Section:
+    """Flight against model for every channel, one pair of figures per flight."""
+    one_step = fit.method == "prediction-error"
+    words = "one-step prediction" if one_step else "simulation on the recorded inputs"
+    intro = (
+        "Each model sample was predicted one sample ahead from everything measured before it, so the lines "
+        "should lie on "
+        "top of each other and only the residuals below tell how good they are. How the model does seconds "
+        "ahead stands "
+        "under Prediction. Velocities and rates are the filter's estimates beside the slopes of the "
+        "measured pose."
+        if one_step
+        else "The model ran on the recorded inputs alone. Velocities and rates are its states beside the slopes of the "
+        "measured pose."
+    )
+    blocks: list[Block] = [
+        Text(f"{intro} Where the cost did not count a sample (settling, outliers), no model is drawn.")
+    ]
+    by_flight: dict[str, list[Comparison]] = {}
+    for piece in fit.comparisons:
+        by_flight.setdefault(flight_name(piece.record.name), []).append(piece)
+    for i, (source, pieces) in enumerate(by_flight.items()):
+        blocks += time_figures(
+            _series(fit, pieces),
+            [(piece.record.time, piece.record.inputs) for piece in pieces],
+            fit.vehicle.input_names,
+            identifier=f"fit-{i + 1}",
+            source=source,
+            model_words=words,
+        )
+    return Section("comparison", "Flight against model", tuple(blocks))
+
+
+def _series(fit: Fit, pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
+    found: dict[str, list[Series]] = {}
+    for piece in pieces:
+        record = piece.record
+        counted = np.asarray(piece.counted) > 0
+        for j, name in enumerate(record.output_names):
+            found.setdefault(name, []).append(
+                Series(
+                    record.time,
+                    record.outputs[:, j],
+                    np.where(counted, piece.model[:, j], np.nan),
+                    np.asarray(piece.sigma)[j],
+                )
+            )
+        if {"x", "y", "z", "phi", "theta", "psi"} <= set(record.output_names) and piece.states.shape[1] == len(
+            PREDICTED
+        ):
+            motion = measured_states(record, _nuisance(fit, record.name))
+            for j, name in enumerate(PREDICTED):
+                if name not in record.output_names:
+                    found.setdefault(name, []).append(
+                        Series(record.time, motion[:, j], np.where(counted, piece.states[:, j], np.nan))
+                    )
+    return found
+
+
+def _nuisance(fit: Fit, record: str) -> Nuisance:
+    """The record's own delays, trims, lever and level, the mean ones where it has none."""
+    own = {e.name: e.value for e in fit.record_estimates if e.record == record and e.name in Nuisance._fields}
+    return fit.nuisance._replace(**own)
+
+
+def residuals(fit: Fit) -> Section:
+    """What the model left over: over time, its autocorrelation, its distribution."""
+    names = fit.comparisons[0].record.output_names
+    timed: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
+    plain: dict[str, list[Array]] = {name: [] for name in names}
+    for piece in fit.comparisons:
+        counted = np.asarray(piece.counted) > 0
+        for j, name in enumerate(names):
+            rows = piece.residuals[:, j]
+            timed[name].append((piece.record.time, np.where(counted, rows, np.nan)))
+            plain[name].append(rows[counted])
+    sigma = {name: float(np.mean([c.sigma[j] for c in fit.comparisons])) for j, name in enumerate(names)}
+    plain = {name: [rows for rows in pieces if rows.size > 1] for name, pieces in plain.items()}
+    dt = fit.comparisons[0].record.dt
+    return Section(
+        "residuals",
+        "Residuals",
+        (residual_time(timed, sigma), residual_correlation(plain, dt), residual_histogram(plain, sigma)),
+    )
+
+
+def meanings(fit: Fit, words: Mapping[str, str]) -> Section:
+    """What each number means and where its first value comes from."""
+    published = fit.published.card.parameters
+    identified = fit.vehicle.card.parameters
+    names = [e.name for e in fit.parameters]
+    rows = [
+        (
+            Cell(name, anchor=f"meaning-{name}"),
+            Cell(words.get(name, "") or "–"),
+            Cell(unit_words(published[name].unit) or "1"),
+            Cell(f"{published[name].source} ({published[name].status})"),
+            Cell(f"{_limit(published[name].lower)} to {_limit(published[name].upper)}"),
+            Cell("; ".join(dict.fromkeys(note for note in (published[name].note, identified[name].note) if note))),
+        )
+        for name in names
+        if name in published
+    ]
+    of_records = list(dict.fromkeys(e.name for e in fit.record_estimates))
+    units = {e.name: e.unit for e in fit.record_estimates}
+    rows += [
+        (
+            Cell(name, anchor=f"meaning-{name}"),
+            Cell(words.get(name, "") or "–"),
+            Cell(unit_words(units[name]) or "1"),
+            Cell("estimated for each record"),
+            Cell("–"),
+            Cell(""),
+        )
+        for name in of_records
+    ]
+    return Section(
+        "meanings",
+        "What the numbers mean and where they come from",
+        (
+            Table(
+                "Meaning, unit and source of each parameter",
+                (
+                    "parameter",
+                    "meaning [symbol of the paper]",
+                    "unit",
+                    "source of the published value",
+                    "physics allows",
+                    "note",
+                ),
+                tuple(rows),
+            ),
+        ),
+        folded=True,
+    )
+
+
+def _limit(value: float | None) -> str:
+    return "–" if value is None else value_words(value)
+
+
+def warnings(fit: Fit) -> Points | None:
+    """What a reader must know before using the numbers, None where there is nothing."""
+    words = [f"{e.name} ended at its physical bound." for e in fit.parameters if e.at_bound]
+    heavy = [e.name for e in fit.parameters if e.prior_share > PRIOR_HEAVY and not e.tie]
+    if heavy:
+        words.append(f"The prior, not the flight, decided {', '.join(heavy)}.")
+    return Points(tuple(words), title="Before you use the numbers") if words else None

@@ -1,0 +1,128 @@
+"""Sections on what the data can tell (correlation, blind directions, excitation) and on the eigenvalues at hover."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from swashplate.identification.fit import Fit
+from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
+from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.words import value_words
+from swashplate.simulation.linearize import Mode
+
+_SLOW = 1e-6
+
+
+def sight(fit: Fit) -> Section:
+    """What the data can and cannot tell."""
+    blocks: list[Block] = []
+    if fit.excitation:
+        blocks.append(
+            Table(
+                "Excitation and feedback per axis",
+                (
+                    "axis",
+                    "verdict",
+                    "finding",
+                    "command",
+                    "explained",
+                    "coherence",
+                    "phase",
+                    "power",
+                    "record",
+                ),
+                tuple(
+                    (
+                        Cell(a.axis),
+                        Cell(
+                            "independent excitation" if a.identifiable else "not identifiable",
+                            tone="good" if a.identifiable else "bad",
+                        ),
+                        Cell(a.words),
+                        Cell(a.command),
+                        Cell(_share(a.explained), number=True),
+                        Cell(value_words(round(a.coherence, 2)), number=True),
+                        Cell(f"{math.degrees(a.phase):.0f}°" if math.isfinite(a.phase) else "–", number=True),
+                        Cell(value_words(float(f"{a.power:.2g}")), number=True),
+                        Cell(a.record),
+                    )
+                    for a in fit.excitation
+                ),
+                note="Explained: share of the command that past motion explains. A command that past motion "
+                "explains almost wholly is a controller's answer: the record "
+                "then shows "
+                "the controller, not the aircraft. Coherence and phase: largest between command and motion in "
+                "the band. "
+                "Power: standard deviation of the command.",
+            )
+        )
+    if fit.directions:
+        blocks.append(
+            Points(
+                tuple(d.words for d in fit.directions),
+                title="Combinations of parameters that these flights hardly see, worst first",
+                ordered=True,
+            )
+        )
+    else:
+        blocks.append(Text("There is no combination of the free parameters that these flights do not see."))
+    if len(fit.names) > 1:
+        blocks.append(correlation_matrix(fit.names, fit.correlation))
+    return Section("sight", "What the flights can tell", tuple(blocks))
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.0f} %" if math.isfinite(value) else "–"
+
+
+def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> Section | None:
+    """Eigenvalues of the published and the identified vehicle at hover; None where there is nothing to say.
+
+    Args:
+        modes: by vehicle, "published" and "identified".
+        problems: why a vehicle has none.
+    """
+    blocks: list[Block] = [Text(problem, tone="caution") for problem in problems]
+    if modes:
+        blocks.append(eigenvalues(modes))
+        blocks.append(
+            Table(
+                "Modes at hover",
+                (
+                    "mode",
+                    "vehicle",
+                    "eigenvalue [1/s]",
+                    "ω [rad/s]",
+                    "f [Hz]",
+                    "damping",
+                    "time constant [s]",
+                    "behaviour",
+                ),
+                tuple(
+                    _row(mode, label, place)
+                    for label, found in modes.items()
+                    for place, mode in enumerate((m for m in found if m.frequency > _SLOW), start=1)
+                ),
+                note="Modes at the origin (position, heading and whatever hover does not hold) are left out: "
+                + ", ".join(f"{sum(m.frequency <= _SLOW for m in found)} {label}" for label, found in modes.items())
+                + ". The states named take part most. Quadratic terms have no slope at hover.",
+            )
+        )
+    return Section("hover", "Eigenvalues at hover", tuple(blocks)) if blocks else None
+
+
+def _row(mode: Mode, label: str, place: int) -> tuple[Cell, ...]:
+    value = mode.eigenvalue
+    words = f"{value.real:+.3f}" + (f" ± {value.imag:.3f}j" if value.imag > 0.0 else "")
+    grows = value.real > _SLOW
+    return (
+        Cell(f"{place}. {', '.join(name for name, share in mode.states if share > 0.1) or mode.states[0][0]}"),
+        Cell(label),
+        Cell(words, number=True),
+        Cell(f"{mode.frequency:.2f}", number=True),
+        Cell(f"{mode.frequency / (2.0 * math.pi):.2f}", number=True),
+        Cell(f"{mode.damping:+.3f}", number=True),
+        Cell(f"{mode.time_constant:.3g}" if math.isfinite(mode.time_constant) else "–", number=True),
+        Cell("grows" if grows else "dies out", tone="bad" if grows else "plain"),
+    )

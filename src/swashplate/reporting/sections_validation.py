@@ -1,0 +1,195 @@
+"""Sections on the validation: verdict, predictions to look at, tables per horizon, innovations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.flights.schema import channel
+from swashplate.identification.kinematics import PREDICTED
+from swashplate.reporting.figures_time import Prediction, Series, flight_name, time_figures
+from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
+from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.words import counted, percent, sigma_words, value_words
+from swashplate.validation.validation import PREDICTORS, Example, Score, Validation
+
+_SHORT = {"model": "model", "published card": "card", "hold": "hold", "constant rates": "rates"}
+LEVEL_TONE = {"good": "good", "usable": "caution", "poor": "bad"}
+
+
+def verdict(validation: Validation) -> Section:
+    """One line per axis, and the thresholds behind the words."""
+    rows = tuple(
+        (Cell(v.axis), Cell(v.level, tone=LEVEL_TONE.get(v.level, "quiet"), strong=True), Cell(v.words))
+        for v in validation.verdict
+    )
+    blocks: list[Block] = [Table("Verdict per axis", ("axis", "verdict", "why"), rows)]
+    if validation.thresholds:
+        blocks.append(
+            Table(
+                "Thresholds behind the words",
+                ("threshold", "value"),
+                tuple(
+                    (Cell(k.replace("_", " ")), Cell(value_words(float(v)), number=True))
+                    for k, v in validation.thresholds.items()
+                ),
+                note="Least prediction fit [%] of every channel of an axis; good and usable must beat every rival too.",
+            )
+        )
+    return Section("verdict", "Verdict", tuple(blocks))
+
+
+def prediction(validation: Validation) -> Section:
+    """Predictions to look at, then the numbers per horizon."""
+    names = {flight_name(record.name) for record in validation.records}
+    blocks: list[Block] = [
+        Text(
+            "At each start point a causal observer knew the flight up to there and nothing after it; from there "
+            "on the model "
+            "ran on the recorded inputs. The shaded band is ±2σ of what the model promises."
+        )
+    ]
+    for i, source in enumerate(sorted(names)):
+        blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
+    blocks.append(fit_over_horizon(validation))
+    blocks += [_table(validation, horizon) for horizon in horizons(validation)]
+    return Section("prediction", "Prediction", tuple(blocks))
+
+
+def _pictures(validation: Validation, source: str, *, identifier: str) -> tuple[Block, ...]:
+    records = [
+        (record, states)
+        for record, states in zip(validation.records, validation.measured, strict=True)
+        if flight_name(record.name) == source
+    ]
+    mine = {record.name for record, _ in records}
+    examples = apart([example for example in validation.examples if example.record in mine])
+    channels = {
+        name: [Series(record.time, states[:, j]) for record, states in records] for j, name in enumerate(PREDICTED)
+    }
+    predictions = {
+        name: [Prediction(e.time, e.states[:, j], np.broadcast_to(e.sigma, e.states.shape)[:, j]) for e in examples]
+        for j, name in enumerate(PREDICTED)
+    }
+    return time_figures(
+        channels,
+        [(record.time, record.inputs) for record, _ in records],
+        validation.vehicle.input_names,
+        identifier=identifier,
+        source=source,
+        model_words="prediction from each dot on",
+        predictions=predictions,
+    )
+
+
+def apart(examples: Sequence[Example]) -> list[Example]:
+    """Examples that do not overlap in time, earliest first: overlapping ones would hide each other."""
+    chosen: list[Example] = []
+    for example in sorted(examples, key=lambda e: e.start):
+        if not chosen or example.time[0] >= chosen[-1].time[-1]:
+            chosen.append(example)
+    return chosen
+
+
+def _table(validation: Validation, horizon: float) -> Table:
+    scores = {(s.channel, s.predictor): s for s in validation.scores if s.horizon == horizon}
+    names = sorted({name for name, _ in scores}, key=lambda n: (JUDGED.index(n) if n in JUDGED else len(JUDGED), n))
+    shown = [p for p in PREDICTORS if any(predictor == p for _, predictor in scores)]
+    rated = [p for p in shown if p != "hold"]
+    rows = []
+    for name in names:
+        present = {p: scores[name, p] for p in shown if (name, p) in scores}
+        best = max(present, key=lambda p: present[p].fit)
+        unit = channel(name)
+        rows.append(
+            (
+                Cell(name),
+                Cell(unit_words(unit.shown_unit)),
+                *(_cell(percent(s.fit), s is present[best]) for s in _row(present, rated)),
+                *(
+                    _cell(value_words(s.rms * unit.shown_factor, 0.01 * s.rms * unit.shown_factor), s is present[best])
+                    for s in _row(present, shown)
+                ),
+                *(
+                    _cell(f"{s.theil:.2f}" if math.isfinite(s.theil) else "–", s is present[best])
+                    for s in _row(present, shown)
+                ),
+            )
+        )
+    words, rated_words = [_SHORT[p] for p in shown], [_SHORT[p] for p in rated]
+    starts = max((s.starts for s in scores.values()), default=0)
+    return Table(
+        f"Prediction {horizon:g} s ahead, from {counted(starts, 'start point')}",
+        ("channel", "unit", *rated_words, *words, *words),
+        tuple(rows),
+        groups=(
+            ("", 2),
+            ("fit [%] (hold scores 0)", len(rated)),
+            ("RMS error", len(shown)),
+            ("Theil's coefficient", len(shown)),
+        ),
+        note="Model: the identified one. Card: the published one. Hold: the last value stays. Rates: constant rates. "
+        "Bold: the best of the row. Fit: 100 (1 − rms error / rms change since the start). "
+        "Theil: 0 perfect, 1 "
+        "no better than the opposite.",
+    )
+
+
+def _row(present: dict[str, Score], wanted: Sequence[str]) -> list[Score]:
+    return [present.get(p, Score("", 0.0, p, math.nan, math.nan, math.nan, 0)) for p in wanted]
+
+
+def _cell(words: str, strong: bool) -> Cell:
+    return Cell(words, number=True, strong=strong)
+
+
+def innovations(validation: Validation) -> Section:
+    """One-step prediction errors: size, honesty of their covariance, whiteness, likelihood."""
+    rows = []
+    for check in validation.innovations:
+        unit = channel(check.channel)
+        honest = 0.5 <= check.consistency <= 2.0
+        white = check.whiteness <= check.whiteness_bound
+        rows.append(
+            (
+                Cell(check.channel),
+                Cell(unit_words(unit.shown_unit)),
+                Cell(sigma_words(check.rms * unit.shown_factor), number=True),
+                Cell(sigma_words(check.expected * unit.shown_factor), number=True),
+                Cell(f"{check.consistency:.2f}", number=True, tone="plain" if honest else "caution"),
+                Cell(
+                    "as promised"
+                    if honest
+                    else ("larger than promised" if check.consistency > 1 else "smaller than promised")
+                ),
+                Cell(
+                    f"{check.whiteness:.2f} (bound {check.whiteness_bound:.2f})",
+                    number=True,
+                    tone="plain" if white else "caution",
+                ),
+                Cell("white" if white else "coloured"),
+            )
+        )
+    blocks: list[Block] = [
+        Table(
+            "One-step prediction errors",
+            ("channel", "unit", "RMS", "promised σ", "consistency", "size", "largest autocorrelation", "colour"),
+            tuple(rows),
+            note="Consistency: mean squared error over promised variance; called as promised between 0.5 and 2. "
+            "White noise "
+            "keeps its autocorrelation below the bound at 99 %.",
+        )
+    ]
+    if validation.log_likelihood:
+        blocks.append(
+            Table(
+                "Log-likelihood per sample",
+                ("predictor", "log-likelihood"),
+                tuple((Cell(k), Cell(f"{v:.3f}", number=True)) for k, v in validation.log_likelihood.items()),
+                note="Larger is better; a difference of 1 per sample is large.",
+            )
+        )
+    return Section("innovations", "Innovations", tuple(blocks))

@@ -1,0 +1,145 @@
+"""The first screen: banners that nobody may miss, and five lines for a reader with twenty seconds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from swashplate.flights.flight import Flight
+from swashplate.identification.fit import Fit
+from swashplate.reporting.figures_validation import middle_horizon
+from swashplate.reporting.sections_data import method_words, used_twice
+from swashplate.reporting.sections_fit import PRIOR_HEAVY
+from swashplate.reporting.words import counted, listed, percent, span_words, value_words
+from swashplate.validation.validation import PREDICTORS, Validation
+
+Line = tuple[str, str, str]
+_LEVELS = ("good", "usable", "poor", "cannot be judged")
+_TONES = {"good": "good", "usable": "caution", "poor": "bad"}
+
+
+def banners(fit: Fit | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
+    """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
+    found: list[tuple[str, str]] = []
+    flights = (*(fit.flights if fit else ()), *(validation.flights if validation else ()))
+    simulated = [f for f in flights if f.provenance.simulated]
+    if simulated:
+        names = list(dict.fromkeys(f.provenance.source or "unnamed" for f in simulated))
+        part = "" if len(simulated) == len(flights) else f" ({listed(names)})"
+        found.append(("caution", f"SIMULATED FLIGHT{part}: no aircraft flew for these numbers."))
+    twice = used_twice(fit, validation)
+    if twice:
+        names = list(dict.fromkeys(f.provenance.source or "an unnamed flight" for f in twice))
+        found.append(("caution", f"NOT A HOLD-OUT: {listed(names)} was used for the fit too."))
+    if fit and fit.failed:
+        reasons = " ".join(fit.problems) or "See the parameters."
+        found.append(("bad", f"FAILED FIT: do not use these numbers. {reasons}"))
+    elif fit and not fit.converged:
+        found.append(("caution", "NOT CONVERGED: the iterations ran out before the fit settled."))
+    return tuple(found)
+
+
+def summary(fit: Fit | None, validation: Validation | None) -> tuple[Line, ...]:
+    """Five lines (label, words, tone): what was done, how it ended, how it predicts, the verdict, what to beware of."""
+    rows = [_what(fit, validation)]
+    if fit:
+        rows.append(_fit(fit))
+    if validation:
+        rows += [_prediction(validation), _verdict(validation)]
+    elif fit:
+        rows.append(
+            ("Prediction", "not tested: no flight was held out. Do not trust the model before it was.", "caution")
+        )
+        rows.append(_changes(fit))
+    rows.append(_beware(fit, validation))
+    return tuple(rows)
+
+
+def _names(flights: Sequence[Flight]) -> str:
+    return listed([f"{f.provenance.source or 'an unnamed flight'} ({span_words(f)})" for f in flights], most=3)
+
+
+def _what(fit: Fit | None, validation: Validation | None) -> Line:
+    words = []
+    if fit:
+        used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.comparisons)
+        source = f"{used:.1f} s of {_names(fit.flights)}" if used else _names(fit.flights)
+        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.vehicle.name}' identified from {source}")
+    if validation:
+        words.append(
+            f"tested on {_names(validation.flights)}"
+            + (", which the fit never saw" if fit and not used_twice(fit, validation) else "")
+        )
+    return "What", ", ".join(words) + ".", "plain"
+
+
+def _fit(fit: Fit) -> Line:
+    steps = f" in {counted(len(fit.history) - 1, 'iteration')}" if len(fit.history) > 1 else ""
+    state = "failed" if fit.failed else ("converged" if fit.converged else "did not converge")
+    bounds = [e.name for e in fit.parameters if e.at_bound]
+    physics = f"{listed(bounds)} ended at a physical bound" if bounds else "every value lies within its physical bounds"
+    tone = "bad" if fit.failed else ("good" if fit.converged and not bounds else "caution")
+    method = method_words(fit.method).split(" (")[0]
+    return "Fit", f"{method.capitalize()} {state}{steps} ({fit.seconds:.0f} s); {physics}.", tone
+
+
+def _prediction(validation: Validation) -> Line:
+    horizon = middle_horizon(validation)
+    scores = {(s.channel, s.predictor): s.fit for s in validation.scores if s.horizon == horizon}
+    named = [(name, words) for name, words in _AXES if (name, "model") in scores]
+    if not named:
+        return "Prediction", "no channel of roll or pitch was predicted.", "caution"
+    own = ", ".join(f"{words} {percent(scores[name, 'model'])} %" for name, words in named)
+    rivals = [
+        f"{words} {', '.join(percent(scores[name, p]) for name, _ in named)}"
+        for p, words in (("published card", "published card"), ("constant rates", "constant rates"))
+        if all((name, p) in scores for name, _ in named)
+    ]
+    beaten = all(
+        scores[name, "model"] > scores.get((name, p), -math.inf)
+        for name, _ in named
+        for p in PREDICTORS
+        if p != "model"
+    )
+    text = f"fit {horizon:g} s ahead: {own} ({'; '.join([*rivals, 'hold the last value 0'])})."
+    return "Prediction", text, "good" if beaten else "caution"
+
+
+_AXES = (("phi", "roll"), ("theta", "pitch"), ("p", "roll rate"), ("q", "pitch rate"))
+
+
+def _verdict(validation: Validation) -> Line:
+    by_level = {level: [v.axis for v in validation.verdict if v.level == level] for level in _LEVELS}
+    words = [f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes]
+    worst = next((level for level in ("poor", "usable", "good") if by_level[level]), "")
+    return "Verdict", ("; ".join(words) or "no axis was judged") + ".", _TONES.get(worst, "plain")
+
+
+def _changes(fit: Fit) -> Line:
+    moved = sorted(
+        (e for e in fit.parameters if not e.tie and e.sigma_corrected > 0.0),
+        key=lambda e: -abs(e.value - e.published) / e.sigma_corrected,
+    )[:3]
+    words = [f"{e.name} {value_words(e.published)} → {value_words(e.value, e.sigma_corrected)}" for e in moved]
+    return "Change", f"Moved most for its uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
+
+
+def _beware(fit: Fit | None, validation: Validation | None) -> Line:
+    words = []
+    if fit:
+        blind = list(dict.fromkeys(a.axis for a in fit.excitation if not a.identifiable))
+        if blind:
+            words.append(f"no independent excitation in {listed(blind)}")
+        heavy = [e.name for e in fit.parameters if e.prior_share > PRIOR_HEAVY and not e.tie]
+        if heavy:
+            words.append(f"the prior, not the flight, decided {listed(heavy, most=5)}")
+        if fit.directions:
+            words.append(f"{counted(len(fit.directions), 'combination')} of parameters hardly seen")
+        if any(not c.record.voltage_known for c in fit.comparisons):
+            words.append("battery voltage not logged")
+    elif validation and any(not r.voltage_known for r in validation.records):
+        words.append("battery voltage not logged")
+    if not words:
+        return "Beware", "nothing that these flights could show.", "plain"
+    text = "; ".join(words)
+    return "Beware", f"{text[0].upper()}{text[1:]}.", "caution"

@@ -1,0 +1,196 @@
+"""Colours, line styles and layouts that all figures share.
+
+The colours are those of Okabe and Ito (2008), which the usual kinds of colour blindness can tell apart; line style or
+marker says the same a second time.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swashplate.flights.flight import Array
+from swashplate.flights.schema import channel
+
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#6B6B6B"
+
+FLIGHT, MODEL, PUBLISHED, CONSTANT, HOLD = BLACK, BLUE, VERMILION, GREEN, GREY
+BAND = "rgba(0,114,178,0.20)"
+
+PREDICTOR_STYLE: dict[str, tuple[str, str, str]] = {
+    "model": (MODEL, "solid", "circle"),
+    "published card": (PUBLISHED, "dash", "square-open"),
+    "constant rates": (CONSTANT, "dot", "x"),
+    "hold": (HOLD, "dashdot", "line-ns-open"),
+}
+"""Colour, line and marker of each predictor."""
+
+PREDICTOR_WORDS = {
+    "model": "identified model",
+    "published card": "published card",
+    "constant rates": "constant rates",
+    "hold": "hold the last value",
+}
+
+INPUT_COLORS = (ORANGE, PURPLE, SKY, GREEN)
+
+
+def numbers(values: Any) -> list[float | None]:
+    """A row of numbers as short JSON: six significant digits, gaps as null."""
+    row = np.asarray(values, dtype=np.float64).ravel()
+    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in row]
+
+
+_SMALL = 200
+_FAR = 4096.0
+"""Beyond this, single precision no longer resolves a millisecond."""
+
+
+def packed(values: Any) -> list[float | None] | dict[str, str]:
+    """A long row of numbers in plotly's binary form (base64, little-endian; NaN are gaps), a short one as is."""
+    row = np.asarray([np.nan if value is None else value for value in values], dtype=np.float64).ravel()
+    if row.size <= _SMALL:
+        return numbers(row)
+    single = not np.any(np.abs(row[np.isfinite(row)]) > _FAR)
+    data = row.astype("<f4" if single else "<f8").tobytes()
+    return {"dtype": "f4" if single else "f8", "bdata": base64.b64encode(data).decode("ascii")}
+
+
+def unit_words(unit: str) -> str:
+    """A unit as people write it: "kg m^2" becomes "kg m²", a pure number has none."""
+    if unit == "1":
+        return ""
+    for digits, small in (("^-1", "⁻¹"), ("^-2", "⁻²"), ("^2", "²"), ("^3", "³")):
+        unit = unit.replace(digits, small)
+    return unit
+
+
+def shown(name: str, values: Array) -> Array:
+    """Values of a channel in the unit that people expect on plots."""
+    return np.asarray(values, dtype=np.float64) * channel(name).shown_factor
+
+
+def axis_title(name: str) -> str:
+    """Name and unit of a channel for an axis."""
+    unit = unit_words(channel(name).shown_unit)
+    return f"{name} [{unit}]" if unit else name
+
+
+def line(
+    time: Any,
+    values: Any,
+    *,
+    name: str,
+    color: str,
+    dash: str = "solid",
+    width: float = 1.4,
+    axis: str = "",
+    hover: str = "",
+    **more: Any,
+) -> dict[str, Any]:
+    """A line trace on the subplot whose axes end in `axis` ("" for the first)."""
+    trace: dict[str, Any] = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": packed(time),
+        "y": packed(values),
+        "name": name,
+        "line": {"color": color, "dash": dash, "width": width},
+        "xaxis": f"x{axis}",
+        "yaxis": f"y{axis}",
+        "hovertemplate": (hover or f"{name}<br>%{{x:.2f}} s, %{{y:.4g}}") + "<extra></extra>",
+    }
+    return {**trace, **more}
+
+
+def base_layout(height: int, *, left: int = 58, top: int = 8, right: int = 10, bottom: int = 40) -> dict[str, Any]:
+    """What every figure has: margins that leave a telephone some plot, no legend (keys stand in the page)."""
+    return {
+        "height": height,
+        "autosize": True,
+        "showlegend": False,
+        "margin": {"l": left, "r": right, "t": top, "b": bottom},
+        "font": {
+            "family": "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif",
+            "size": 12,
+            "color": "#222",
+        },
+        "paper_bgcolor": "#fff",
+        "plot_bgcolor": "#fff",
+        "hovermode": "closest",
+    }
+
+
+def axis(title: str = "", **more: Any) -> dict[str, Any]:
+    """One axis: light grid, thin frame."""
+    plain: dict[str, Any] = {
+        "gridcolor": "#e4e4e4",
+        "zeroline": False,
+        "linecolor": "#999",
+        "showline": True,
+        "mirror": True,
+        "ticks": "outside",
+        "ticklen": 3,
+        "tickcolor": "#999",
+        "automargin": False,
+        "exponentformat": "e",
+    }
+    if title:
+        plain["title"] = {"text": title, "standoff": 4, "font": {"size": 12}}
+    return {**plain, **more}
+
+
+def bands(count: int, *, gap: float) -> list[tuple[float, float]]:
+    """Domains from top to bottom that share the unit interval, `gap` apart."""
+    size = (1.0 - gap * (count - 1)) / count
+    return [(max(0.0, 1.0 - (i + 1) * size - i * gap), min(1.0, 1.0 - i * size - i * gap)) for i in range(count)]
+
+
+def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") -> dict[str, Any]:
+    """A layout of panels one below the other that zoom in time together."""
+    layout = base_layout(height * len(titles) + 48)
+    for i, (title, domain) in enumerate(zip(titles, bands(len(titles), gap=0.1 / len(titles)), strict=True)):
+        number = "" if i == 0 else str(i + 1)
+        last = i == len(titles) - 1
+        layout[f"yaxis{number}"] = axis(title, domain=list(domain), anchor=f"x{number}", nticks=5)
+        layout[f"xaxis{number}"] = axis(
+            x_title if last else "", anchor=f"y{number}", matches=None if i == 0 else "x", showticklabels=last
+        )
+    return layout
+
+
+def grid(titles: Sequence[str], *, columns: int, height: int, x_title: str) -> dict[str, Any]:
+    """A layout of small panels in rows, each under its own heading."""
+    rows = -(-len(titles) // columns)
+    layout = base_layout(height * rows + 56, left=44, top=24)
+    down = bands(rows, gap=0.4 / rows)
+    gap = 0.12
+    width = (1.0 - gap * (columns - 1)) / columns
+    layout["annotations"] = []
+    for i, title in enumerate(titles):
+        number = "" if i == 0 else str(i + 1)
+        row, column = divmod(i, columns)
+        left = column * (width + gap)
+        lowest = i + columns >= len(titles)
+        layout[f"xaxis{number}"] = axis(
+            x_title if lowest else "", domain=[left, min(1.0, left + width)], anchor=f"y{number}", nticks=4, tickangle=0
+        )
+        layout[f"yaxis{number}"] = axis("", domain=list(down[row]), anchor=f"x{number}", nticks=5)
+        layout["annotations"].append(
+            {
+                "text": f"<b>{title}</b>",
+                "xref": "paper",
+                "yref": "paper",
+                "x": left,
+                "y": down[row][1],
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "showarrow": False,
+                "font": {"size": 12},
+            }
+        )
+    return layout

@@ -1,0 +1,163 @@
+"""The report in a real browser: every plot drawn, no error, nothing fetched, readable on a telephone and on paper."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from report_samples import fit, modes, validation
+from swashplate.reporting.report import report
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+NASTY = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">.mat"
+SIZES = {"desk": (1200, 900), "telephone": (390, 844)}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
+    with sync_api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("reports")
+    return {
+        "both": report(fit(name=NASTY), validation(name=NASTY), path=folder / "both.html", modes=modes()),
+        "failed": report(fit(failed=True, simulated=True), path=folder / "failed.html", modes=modes()),
+        "validation": report(None, validation(), path=folder / "validation.html", modes=modes()),
+    }
+
+
+class Visit:
+    """A page that was opened and drawn, with what it said and what it asked for."""
+
+    def __init__(self, browser: Any, path: Path, size: tuple[int, int]) -> None:
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector("html[data-drawn=all]", state="attached", timeout=60_000)
+
+
+@pytest.fixture(scope="module")
+def visit(browser: Any, written: dict[str, Path]) -> Any:
+    """Opens a report at a size, once for all tests: reading plotly takes a browser seconds."""
+    visits: dict[tuple[str, str], Visit] = {}
+
+    def open_(name: str, size: str) -> Visit:
+        if (name, size) not in visits:
+            visits[name, size] = Visit(browser, written[name], SIZES[size])
+        return visits[name, size]
+
+    return open_
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("both", "desk"), ("both", "telephone"), ("failed", "telephone"), ("validation", "desk")]
+)
+def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) -> None:
+    seen = visit(name, size)
+    assert seen.said == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+    drawn = seen.page.evaluate(
+        "Array.from(document.querySelectorAll('.canvas'), c => ({svg: c.querySelectorAll('svg.main-svg').length,"
+        " marks: c.querySelectorAll('.trace, .hm, .point').length, width: c.clientWidth,"
+        " drawing: c.querySelector('svg.main-svg').clientWidth}))"
+    )
+    assert len(drawn) > 4
+    assert all(each["svg"] > 0 and each["marks"] > 0 for each in drawn)
+    assert all(abs(each["drawing"] - each["width"]) <= 1 for each in drawn)
+
+
+@pytest.mark.parametrize("name", ["both", "failed"])
+def test_nothing_overflows_a_telephone(visit: Any, name: str) -> None:
+    page = visit(name, "telephone").page
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= SIZES["telephone"][0]
+    outside = page.evaluate(
+        "Array.from(document.querySelectorAll('h1,h2,h3,p,li,dd,dt,figcaption,.canvas,.wide')).filter(e =>"
+        " !e.closest('.wide') && e.getBoundingClientRect().right > window.innerWidth + 1)"
+        ".map(e => e.outerHTML.slice(0, 80))"
+    )
+    assert outside == []
+    sizes = page.evaluate(
+        "Array.from(document.querySelectorAll('p,li,dd,td,th,figcaption'),"
+        " e => parseFloat(getComputedStyle(e).fontSize))"
+    )
+    assert min(sizes) >= 12.0
+    scrolling = page.evaluate(
+        "Array.from(document.querySelectorAll('.table .wide')).some(e => e.scrollWidth > e.clientWidth)"
+    )
+    assert scrolling, "wide tables scroll in their own box"
+
+
+def test_summary_is_seen_without_scrolling(visit: Any) -> None:
+    page = visit("both", "desk").page
+    bottom = page.evaluate("document.querySelector('.summary').getBoundingClientRect().bottom")
+    assert bottom < SIZES["desk"][1]
+    top = page.evaluate("document.querySelector('#key-picture').getBoundingClientRect().top")
+    assert top < 0.75 * SIZES["desk"][1]
+
+
+def test_simulated_and_failed_are_the_first_thing_seen(visit: Any) -> None:
+    page = visit("failed", "telephone").page
+    banners = page.locator(".banner")
+    assert banners.nth(0).inner_text().startswith("SIMULATED FLIGHT")
+    assert banners.nth(1).inner_text().startswith("FAILED FIT")
+    assert banners.nth(0).bounding_box()["y"] <= 1.0
+
+
+def test_names_from_files_run_nothing(visit: Any) -> None:
+    page = visit("both", "desk").page
+    assert page.title() != "broken"
+    assert page.locator("img").count() == 0
+    assert "<script>" in page.locator(".summary").inner_text()
+
+
+def test_a_parameter_leads_to_its_meaning(visit: Any) -> None:
+    page = visit("both", "desk").page
+    page.locator("#parameters a", has_text="tau_f_upper").click()
+    target = page.locator("#meaning-tau_f_upper")
+    target.wait_for(state="visible", timeout=5000)
+    assert "stabilizer bar" in target.locator("xpath=..").inner_text()
+
+
+def test_panels_zoom_in_time_together(visit: Any) -> None:
+    page = visit("both", "desk").page
+    page.evaluate("Plotly.relayout('fit-1-tilt', {'xaxis.range': [3, 5]})")
+    ranges = page.evaluate(
+        "Object.entries(document.getElementById('fit-1-tilt')._fullLayout)"
+        ".filter(e => /^xaxis/.test(e[0])).map(e => e[1].range)"
+    )
+    assert len(ranges) == 5
+    assert all(found == [3, 5] for found in ranges)
+
+
+def test_paper_shows_folded_sections(visit: Any, tmp_path: Path) -> None:
+    page = visit("validation", "desk").page
+    content = page.pdf(path=str(tmp_path / "report.pdf"), format="A4")
+    assert content.startswith(b"%PDF")
+    assert page.evaluate("document.querySelectorAll('.canvas svg.main-svg').length") > 0

@@ -1,0 +1,94 @@
+"""The page as text: self-contained, escaped, written in one piece; and the still pictures."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from report_samples import fit, modes, validation
+from swashplate.errors import SwashError
+from swashplate.reporting.pictures import prediction_picture, score_picture
+from swashplate.reporting.report import report
+
+NASTY = "<script>alert('x')</script><img src=x onerror=alert(1)>.mat"
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("report")
+    path = report(fit(name=NASTY, simulated=True), validation(name=NASTY), path=folder / "r.html", modes=modes())
+    return path.read_text(encoding="utf-8")
+
+
+def without_scripts(page: str) -> str:
+    return re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_words_from_files_stay_words(page: str) -> None:
+    assert "<script>alert" not in page
+    assert "<img" not in without_scripts(page)
+    assert "&lt;script&gt;alert" in page
+    specs = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page, flags=re.DOTALL)
+    assert specs
+    assert not any("\\u003cscript" in spec or "\\u003cimg" in spec for spec in specs)
+
+
+def test_page_is_complete_in_itself(page: str) -> None:
+    rest = without_scripts(page)
+    assert not re.search(r"""(src|href)\s*=\s*["'](https?:)?//""", rest)
+    assert "@import" not in rest
+    assert "url(" not in rest
+    assert page.count("plotly.js v") == 1
+    assert page.count("<script>") == 2
+
+
+def test_first_words_of_the_body_say_simulated(page: str) -> None:
+    body = page[page.index("<body>") :]
+    words = re.sub(r"<[^>]*>|\s+", " ", body).strip()
+    assert words.startswith("SIMULATED FLIGHT")
+
+
+def test_headings_and_tables_can_be_read_aloud(page: str) -> None:
+    rest = without_scripts(page)
+    assert rest.count("<h1>") == 1
+    tables = rest.count("<table")
+    assert tables > 5
+    assert rest.count('scope="row"') > tables
+    assert len(re.findall(r'role="img" aria-label="[^"]{20,}"', rest)) == rest.count('class="canvas"')
+    identifiers = re.findall(r' id="([^"]+)"', rest)
+    assert len(identifiers) == len(set(identifiers))
+    for target in re.findall(r'href="#([^"]+)"', rest):
+        assert target in identifiers
+
+
+def test_page_is_small_enough_to_mail(page: str) -> None:
+    assert len(page.encode()) < 8e6
+
+
+def test_same_result_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    first, second = (report(fit(), path=tmp_path / name, modes=modes()).read_bytes() for name in ("a.html", "b.html"))
+    assert first == second
+
+
+def test_failure_leaves_nothing_half_written(tmp_path: Path) -> None:
+    with pytest.raises(SwashError, match="nothing to report"):
+        report(path=tmp_path / "r.html")
+    (tmp_path / "file").write_text("not a folder")
+    with pytest.raises(SwashError, match="cannot be written"):
+        report(fit(), path=tmp_path / "file" / "r.html", modes=modes())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
+
+
+def test_pictures_are_written_and_repeatable(tmp_path: Path) -> None:
+    sample = validation()
+    predicted = prediction_picture(sample, path=tmp_path / "p.png")
+    assert predicted.read_bytes().startswith(b"\x89PNG")
+    one = score_picture(sample, path=tmp_path / "a.svg").read_bytes()
+    assert one == score_picture(sample, path=tmp_path / "b.svg").read_bytes()
+    assert b"<svg" in one
+    with pytest.raises(SwashError, match=r"expected \.png or \.svg"):
+        score_picture(sample, path=tmp_path / "a.bmp")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg", "p.png"]
