@@ -1,0 +1,57 @@
+# Two commands on a fresh machine with python3 (3.11 or later, with venv), make and a C compiler:
+#   make demo    the main job, on real flights where they are found, otherwise on simulated ones
+#   make test    every check
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.complete
+
+.PHONY: help demo test lint types layers unit speed proof clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
+	@echo "make test   ruff, mypy, import-linter, pytest and the benchmarks in short"
+	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (an hour)"
+	@echo "make clean  remove .venv and everything that was built"
+
+# The stamp is written last, so that an interrupted installation is done again and a finished one is not.
+$(STAMP): lock/dev.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "swashplate needs Python 3.11 or later; run: make PYTHON=python3.11 ...")'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r lock/dev.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@
+
+demo: $(STAMP)
+	$(BIN)/swash demo --out demo
+
+# In this order, one after the other (also under make -j): what fails fastest comes first.
+test: $(STAMP)
+	$(MAKE) --no-print-directory lint
+	$(MAKE) --no-print-directory types
+	$(MAKE) --no-print-directory layers
+	$(MAKE) --no-print-directory unit
+	$(MAKE) --no-print-directory speed
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+layers: $(STAMP)
+	$(BIN)/lint-imports
+
+unit: $(STAMP)
+	$(BIN)/python -m pytest -m "not proof" -q
+
+speed: $(STAMP)
+	$(BIN)/python -m benchmarks.run --short
+
+proof: $(STAMP)
+	$(BIN)/python scripts/proof.py
+
+clean:
+	rm -rf .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Installs what the tests need from Debian: Chromium (the report is opened in it), a C compiler, make and venv.
+# Does nothing where all of it is there; asks sudo where it is not run by root.
+set -euo pipefail
+
+missing=()
+command -v chromium > /dev/null || missing+=(chromium)
+command -v gcc > /dev/null || missing+=(gcc libc6-dev)
+command -v make > /dev/null || missing+=(make)
+python3 -c 'import ensurepip, venv' 2> /dev/null || missing+=(python3-venv)
+
+if [ "${#missing[@]}" -eq 0 ]; then
+    exit 0
+fi
+if ! command -v apt-get > /dev/null; then
+    echo "These are missing and this is no Debian system: ${missing[*]}. Install them and try again." >&2
+    exit 1
+fi
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+    as_root=(sudo)
+fi
+export DEBIAN_FRONTEND=noninteractive
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"

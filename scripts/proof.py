@@ -1,0 +1,130 @@
+"""Runs every proof and writes docs/proof.md from what came out: `make proof` (up to an hour).
+
+    python scripts/proof.py [--assemble-only]
+
+Tests marked `proof` and the benchmarks leave JSON files in build/proof (the folder that SWASHPLATE_PROOF names):
+
+    {"title": "...", "text": "one paragraph", "columns": ["..."], "rows": [["..."]], "passed": true}
+
+`rows` hold texts or numbers; `passed` may be left out. The benchmarks' file (build/proof/benchmarks.json) is what
+`python -m benchmarks.run --out` writes. Files of an earlier run are removed first, so that nothing old is reported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "build" / "proof"
+PAGE = ROOT / "docs" / "proof.md"
+PACKAGES = ("swashplate", "jax", "numpy", "scipy")
+
+
+def ran(command: Sequence[str]) -> dict[str, Any]:
+    """A command's exit code and duration; its output goes to the screen."""
+    print("$", " ".join(command), flush=True)
+    begin = time.monotonic()
+    environment = {**os.environ, "SWASHPLATE_PROOF": str(FOLDER)}
+    code = subprocess.run([sys.executable, *command], cwd=ROOT, env=environment, check=False).returncode
+    return {"command": "python " + " ".join(command), "code": code, "seconds": time.monotonic() - begin}
+
+
+def cell(value: Any) -> str:
+    """A number with four figures, or a text, safe inside a Markdown table."""
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: ""}[value]
+    text = f"{value:.4g}" if isinstance(value, float) else f"{value:,}" if isinstance(value, int) else str(value)
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    lines = [
+        [cell(name) for name in columns],
+        ["---"] * len(columns),
+        *([cell(value) for value in row] for row in rows),
+    ]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def section(found: dict[str, Any]) -> str:
+    """One JSON file as a section of the page."""
+    verdict = {True: "**Passed.** ", False: "**Missed.** ", None: ""}[found.get("passed")]
+    parts = [f"## {found['title']}", verdict + found.get("text", "")]
+    if found.get("columns"):
+        parts.append(markdown_table(found["columns"], found["rows"]))
+    return "\n\n".join(part for part in parts if part)
+
+
+def benchmarks_as_section(document: dict[str, Any]) -> dict[str, Any]:
+    """The benchmarks' own file in the common form."""
+    results, machine = document["results"], document["machine"]
+    return {
+        "title": "Speed",
+        "text": f"Vehicle steps per second, best of several repeats, all in one run ({machine['processor']}, "
+        f"{machine['cores']} cores, load {machine['load_before']:.1f} before).",
+        "columns": ["what", "rate", "promised", "met", "note"],
+        "rows": [
+            [r["name"], round(r["rate"]), None if r["target"] is None else round(r["target"]), r["met"], r["note"]]
+            for r in results
+        ],
+        "passed": all(r["met"] for r in results),
+    }
+
+
+def heading(runs: Sequence[dict[str, Any]]) -> str:
+    """Where and when, and what ran."""
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    packages = ", ".join(f"{name} {metadata.version(name)}" for name in PACKAGES)
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    told = [
+        "# Proof",
+        "Written by `make proof`; do not edit.",
+        f"{today}; {models[0] if models else platform.machine()}, {os.cpu_count()} cores, {platform.system()}; "
+        f"Python {platform.python_version()}, {packages}.",
+    ]
+    if runs:
+        rows = [[f"`{run['command']}`", "passed" if run["code"] == 0 else "FAILED", run["seconds"]] for run in runs]
+        told.append(markdown_table(["command", "outcome", "seconds"], rows))
+    return "\n\n".join(told)
+
+
+def assemble(folder: Path, runs: Sequence[dict[str, Any]]) -> str:
+    """The page from the JSON files in a folder."""
+    sections = []
+    for file in sorted(folder.glob("*.json")):
+        found = json.loads(file.read_text(encoding="utf-8"))
+        sections.append(section(benchmarks_as_section(found) if file.name == "benchmarks.json" else found))
+    return "\n\n".join([heading(runs), *sections]) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Run every proof and write docs/proof.md.")
+    parser.add_argument("--assemble-only", action="store_true", help="write the page from build/proof as it is")
+    runs = []
+    if not parser.parse_args().assemble_only:
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        for old in FOLDER.glob("*.json"):
+            old.unlink()
+        runs.append(ran(["-m", "benchmarks.run", "--out", str((FOLDER / "benchmarks.json").relative_to(ROOT))]))
+        runs.append(ran(["-m", "pytest", "-m", "proof", "-q"]))
+    PAGE.parent.mkdir(exist_ok=True)
+    PAGE.write_text(assemble(FOLDER, runs), encoding="utf-8")
+    print(f"Written: {PAGE.relative_to(ROOT)}")
+    return 1 if any(run["code"] for run in runs) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

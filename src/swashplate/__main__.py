@@ -1,0 +1,7 @@
+"""`python -m swashplate` is `swash`."""
+
+from __future__ import annotations
+
+from swashplate.cli.app import main
+
+main()

@@ -1,0 +1,61 @@
+"""`swash`: the verbs, and nothing heavy until one of them runs."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import Annotated, NoReturn
+
+import typer
+
+from swashplate.cli import data, demo, identify, inspect, simulate, validate, vehicles
+from swashplate.cli.guard import Guarded
+
+app = typer.Typer(
+    name="swash",
+    cls=Guarded,
+    help="From a small helicopter's flight log to a validated model.",
+    rich_markup_mode=None,  # plain help: rich takes longer to load than everything else that --help needs
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import platform
+        from importlib import metadata
+
+        versions = {name: metadata.version(name) for name in ("jax", "numpy", "scipy")}
+        told = ", ".join([f"Python {platform.python_version()}", *(f"{k} {v}" for k, v in versions.items())])
+        typer.echo(f"swashplate {metadata.version('swashplate')} ({told})")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show the full traceback of an error (or set SWASHPLATE_DEBUG=1).")
+    ] = False,
+) -> None:
+    """From a small helicopter's flight log to a validated model."""
+
+
+app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)
+app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
+app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
+app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
+app.add_typer(vehicles.app, name="vehicles")
+app.add_typer(data.app, name="data")
+app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)
+
+
+def main() -> NoReturn:
+    """The console script. A polite kill ends as an interrupt does: temporary files are removed."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    app(prog_name="swash")  # also as `python -m swashplate`: completion and help speak of swash
+    raise AssertionError("typer ends the process itself")

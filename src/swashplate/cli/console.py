@@ -1,0 +1,95 @@
+"""What a person sees while and after a command runs: results on standard output, progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_PIPED_WIDTH = 400  # columns: wide enough for every line, so that a file or a pipe gets whole ones
+_AFTER = 1.0  # s: what is done sooner needs no progress bar
+
+
+def console() -> Console:
+    """Standard output; as wide as the terminal, or wide enough for every table where there is none."""
+    from rich.console import Console
+
+    return Console() if sys.stdout.isatty() else Console(width=_PIPED_WIDTH)
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON types: arrays as lists, and null for what JSON has no word for (NaN, infinity)."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, str | bool | int) or value is None:
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if hasattr(value, "tolist"):  # NumPy and JAX arrays and numbers
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(entry) for entry in value]
+    return str(value)
+
+
+def as_json(value: Any) -> str:
+    """A value as the text of a JSON document, valid everywhere (RFC 8259: no NaN)."""
+    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)
+
+
+class Progress:
+    """One line on standard error that says what is being done; appears after a second, and only on a terminal."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._lock = threading.Lock()
+        self._bar: Any = None
+        self._latest: dict[str, Any] = {"description": "", "completed": 0.0, "total": None, "note": ""}
+        # A timer, because a compilation goes on for seconds without calling back.
+        self._timer = threading.Timer(_AFTER, self._show)
+        self._timer.daemon = True
+        if not quiet and sys.stderr.isatty():
+            self._timer.start()
+
+    def _show(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bar
+
+        columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), TextColumn("{task.fields[note]}"))
+        with self._lock:
+            if self._timer.finished.is_set():  # closed while rich was loading
+                return
+            bar = Bar(SpinnerColumn(), *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True)
+            bar.add_task(**self._latest)
+            bar.start()
+            self._bar = bar
+
+    def say(self, what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
+        """What is being done now; `total` of the steps where they are known."""
+        with self._lock:
+            self._latest = {"description": what, "completed": done, "total": total, "note": note}
+            if self._bar is not None:
+                self._bar.update(self._bar.task_ids[0], **self._latest)
+
+    def close(self) -> None:
+        with self._lock:
+            self._timer.cancel()
+            if self._bar is not None:
+                self._bar.stop()
+
+
+@contextmanager
+def progress(*, quiet: bool) -> Iterator[Progress]:
+    """A progress line that is gone when the block ends, however it ends."""
+    line = Progress(quiet=quiet)
+    try:
+        yield line
+    finally:
+        line.close()

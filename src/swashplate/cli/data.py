@@ -1,0 +1,47 @@
+"""`swash data`: public data sets by name."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import options
+
+app = typer.Typer(
+    help="Public data sets by name: which there are, and getting them.", rich_markup_mode=None, no_args_is_help=True
+)
+
+
+@app.command("list")
+def list_(json: options.Json = False) -> None:
+    """List the files of every known data set and where each is found on this machine."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table
+    from swashplate.flights.datasets import listing
+
+    rows = listing()
+    if json:
+        typer.echo(as_json([{**vars(row), "found": row.found and str(row.found)} for row in rows]))
+        return
+    cells = [(row.name, row.file, str(row.found or "not here"), row.description) for row in rows]
+    console().print(table(("data set", "file", "where", "what"), cells, left=4))
+    missing = sorted({row.name for row in rows if row.found is None})
+    if missing:
+        typer.echo(f"\nGet what is not here with `swash data fetch {missing[0]}`.")
+
+
+@app.command()
+def fetch(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The data set, as in `swash data list`.")],
+    quiet: options.Quiet = False,
+) -> None:
+    """Download a data set from its public address into the user's cache, checked by hash; found files are not."""
+    from swashplate.cli.console import progress
+    from swashplate.flights.datasets import fetch as get
+
+    with progress(quiet=quiet) as line:
+        line.say(f"fetching {name}")
+        paths = get(name)
+    if not quiet:
+        typer.echo("\n".join(map(str, paths)))

@@ -1,0 +1,65 @@
+"""Every way a command can end, as one readable line on standard error and an exit code."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+import traceback
+from enum import IntEnum
+from typing import Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+from swashplate.errors import SwashError
+
+_LONGEST = 200  # characters of a foreign error that are shown
+
+
+class Exit(IntEnum):
+    """Exit codes: fine, a bug of ours, the user's input, stopped by the user (128 + SIGINT, as shells have it)."""
+
+    FINE = 0
+    OURS = 1
+    INPUT = 2
+    STOPPED = 130
+
+
+def _end(message: str, code: Exit, *, debug: bool) -> NoReturn:
+    if debug:
+        traceback.print_exc()
+    if code is not Exit.STOPPED:
+        typer.secho("Error: ", fg="red", bold=True, err=True, nl=False)
+    typer.echo(" ".join(message.split()), err=True)
+    raise typer.Exit(code)
+
+
+def _file_trouble(error: OSError) -> str:
+    """A file that could not be read or written, in words (no space left, no permission, ...)."""
+    place = f"{error.filename}: " if error.filename else ""
+    reason = error.strerror or str(error) or type(error).__name__
+    return f"{place}{reason}. Nothing was left half-written. Check the path, its permissions and the disk's space."
+
+
+class Guarded(TyperGroup):
+    """A group of verbs that ends in words: `SwashError` and trouble with files give 2, anything unforeseen 1."""
+
+    def invoke(self, ctx: Any) -> Any:
+        debug = bool(ctx.params.get("debug")) or os.environ.get("SWASHPLATE_DEBUG", "") not in ("", "0")
+        try:
+            return super().invoke(ctx)
+        except (typer.Exit, typer.Abort, typer.TyperException, BrokenPipeError):
+            raise  # typer knows what to do with these: usage errors are 2 already
+        except KeyboardInterrupt:
+            _end("Stopped. Nothing was left half-written.", Exit.STOPPED, debug=debug)
+        except SwashError as error:
+            _end(str(error), Exit.INPUT, debug=debug)
+        except OSError as error:
+            _end(_file_trouble(error), Exit.INPUT, debug=debug)
+        except Exception as error:
+            first = next(iter(str(error).splitlines()), "")[:_LONGEST]  # libraries put whole tracebacks into a message
+            described = f"{type(error).__name__}: {first}" if first else type(error).__name__
+            advice = "This is a bug in swashplate, not in your input. Please report it with the output of"
+            command = shlex.join(["swash", "--debug", *sys.argv[1:]])
+            _end(f"{described.rstrip('.')}. {advice} `{command}`.", Exit.OURS, debug=debug)

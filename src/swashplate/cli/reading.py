@@ -1,0 +1,90 @@
+"""From what a user calls a flight to a `Flight`: a file, a data set's file, or a window of one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swashplate.errors import FlightError
+
+if TYPE_CHECKING:
+    from swashplate.flights.flight import Flight
+
+_WINDOW = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d*)?)-(?P<stop>\d+(?:\.\d*)?)")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the user says about logs that the logs do not say themselves.
+
+    Attributes:
+        mapping: a file that maps columns to channels.
+        units: units by channel or field.
+        drop_bad_stamps: leave out samples whose time does not increase.
+    """
+
+    mapping: Path | None = None
+    units: dict[str, str] = field(default_factory=dict)
+    drop_bad_stamps: bool = False
+
+
+def split_window(text: str) -> tuple[str, tuple[float, float] | None]:
+    """`FILE@START-STOP` as the file and the window [s]; a file of just this name wins."""
+    found = None if Path(text).exists() else _WINDOW.fullmatch(text)
+    return (text, None) if found is None else (found["file"], (float(found["start"]), float(found["stop"])))
+
+
+def read(text: str, *, how: Reading | None = None) -> Flight:
+    """The flight, or the window of one, that `text` names, as logged.
+
+    Raises:
+        FlightError, UnitError, DatasetError: as the readers say.
+    """
+    from swashplate.flights import datasets, readers
+
+    chosen = how or Reading()
+    file, window = split_window(text)
+    flight = readers.read(
+        datasets.locate(file),
+        mapping=chosen.mapping,
+        units=chosen.units,
+        bad_stamps="drop" if chosen.drop_bad_stamps else "error",
+    )
+    if window is None:
+        return flight
+    start, stop = window
+    if not (start < stop and start < flight.stop and stop > flight.start):
+        raise FlightError(
+            f"the window {start:g}-{stop:g} s holds nothing; the flight runs from {flight.start:.2f} to "
+            f"{flight.stop:.2f} s.",
+            where=file,
+            hint="Give FILE@START-STOP in the log's own seconds.",
+        )
+    return flight.between(start, stop)
+
+
+def conditioned(texts: Iterable[str], *, rate: float, cutoff: float, how: Reading | None = None) -> list[Flight]:
+    """Flights read and brought to one rate, each step in its history."""
+    return [read(text, how=how).condition(rate=rate, cutoff=cutoff) for text in texts]
+
+
+def check_disjoint(flights: Sequence[Flight], names: Sequence[str]) -> None:
+    """That no stretch of a log is used twice: a hold-out that the fit has seen proves nothing.
+
+    Raises:
+        FlightError: naming the two.
+    """
+    for i, (one, name) in enumerate(zip(flights, names, strict=True)):
+        for other, other_name in zip(flights[:i], names[:i], strict=True):
+            hashed = one.provenance.sha256 and one.provenance.sha256 == other.provenance.sha256
+            # A saved simulation has no hash of its own.
+            named = Path(split_window(name)[0]).resolve() == Path(split_window(other_name)[0]).resolve()
+            if (hashed or named) and one.start < other.stop and other.start < one.stop:
+                raise FlightError(
+                    f"is the same stretch of the same log as {other_name}.",
+                    where=name,
+                    hint="Give another flight, or two windows of it: FILE@0-20 and FILE@20-40.",
+                )

@@ -1,0 +1,86 @@
+"""`swash simulate`: a maneuver flown by a vehicle, as a flight like any other."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli import options
+from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.flights.flight import Flight
+
+_WIND = ("wind_north", "wind_east", "wind_down")
+
+
+class SensorSet(StrEnum):
+    NONE = "none"
+    CLEAN = "clean"
+    REAL = "real"
+
+
+def simulate(
+    vehicle: options.VehicleName,
+    maneuver: Annotated[
+        str, typer.Option("--maneuver", help='For example "sweep:pitch,0.5-8Hz,60s" or "doublet:roll,0.5s,0.2".')
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The flight: .nc (nothing lost) or .csv.")],
+    sensors: Annotated[
+        SensorSet,
+        typer.Option("--sensors", help="The true states, motion capture with noise only, or with gaps and outliers."),
+    ] = SensorSet.NONE,
+    seed: Annotated[int, typer.Option("--seed", help="Of the sensors' noise.", min=0)] = 0,
+    voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage at the start [V].")] = None,
+    sag: Annotated[float, typer.Option("--sag", help="Fall of the voltage [V/s].")] = 0.0,
+    wind: Annotated[
+        str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")
+    ] = "0,0,0",
+    rate: options.Rate = 100.0,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fly a maneuver from hover, held in the room by a minimal controller, and save the flight."""
+    from swashplate.cli.console import progress
+    from swashplate.flights.maneuvers import parse
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    suffix = out.suffix.lower()
+    if suffix not in (".nc", ".csv"):
+        raise SwashError(f"ends in '{out.suffix}', expected .nc or .csv.", where=out, channel="--out")
+    if not out.absolute().parent.is_dir():
+        raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
+    blowing = dict(zip(_WIND, options.numbers(wind, option="--wind", count=3), strict=True))
+    excitation, aircraft = parse(maneuver), find(vehicle)
+    with progress(quiet=quiet) as line:
+        line.say("simulating (compiling takes longest the first time)")
+        import swashplate as sp
+
+        flight = sp.simulate_maneuver(
+            aircraft,
+            excitation,
+            controller=sp.hover_hold,
+            voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
+            sag=sag,
+            rate=rate,
+            wind=blowing,
+        )
+        if sensors is not SensorSet.NONE:
+            from swashplate.simulation.sensors import QUIET, Sensors
+
+            chosen = QUIET if sensors is SensorSet.CLEAN else Sensors()
+            flight = sp.observe(flight, aircraft, sensors=chosen, seed=seed)
+        paths = _save(flight, out)
+    if not quiet:
+        typer.echo(repr(flight))
+        typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def _save(flight: Flight, out: Path) -> tuple[Path, ...]:
+    if out.suffix.lower() == ".nc":
+        return (flight.save(out),)
+    from swashplate.flights.csv_export import write_csv
+
+    return write_csv(flight, out)

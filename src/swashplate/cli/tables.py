@@ -1,0 +1,86 @@
+"""Fits, validations and cards as tables for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from swashplate.identification.fit import Fit
+    from swashplate.validation.validation import Score, Validation
+    from swashplate.vehicles.vehicle import Vehicle
+
+_FIGURES_FROM = 110  # columns of a terminal that hold all three figures side by side
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]], *, left: int = 1, title: str | None = None) -> Table:
+    """Text cells as a rich table; the first `left` columns are words, the others numbers."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    made = Table(box=None, pad_edge=False, title=title, title_justify="left", header_style="bold")
+    for place, heading in enumerate(head):
+        made.add_column(escape(heading), justify="left" if place < left else "right", overflow="fold")
+    for row in rows:
+        made.add_row(*(escape(cell) for cell in row))
+    return made
+
+
+def fit_table(fit: Fit) -> RenderableType:
+    """Published and identified value of each parameter, two corrected sigmas, and what decided it."""
+    rows = []
+    for e in fit.parameters:
+        remarks = [f"= {e.tie}"] if e.tie else []
+        remarks += ["at its bound"] if e.at_bound else []
+        remarks += [f"{100 * e.prior_share:.0f} % from the prior"] if e.prior_share > 0.1 else []
+        known = math.isfinite(e.sigma_corrected) and not e.tie
+        bound = f"{2 * e.sigma_corrected:.2g}" if known else "-"
+        rows.append((e.name, f"{e.published:.4g}", f"{e.value:.4g}", bound, e.unit, ", ".join(remarks)))
+    made = table(("parameter", "published", "identified", "+- 2 sigma", "unit", "remark"), rows)
+    made.columns[4].justify = made.columns[5].justify = "left"
+    return made
+
+
+def _cells(scores: dict[str, Score], figure: str, factor: float, style: str) -> list[str]:
+    values = [getattr(score, figure) * factor if score is not None else None for score in scores.values()]
+    return ["-" if value is None else format(value, style) for value in values]
+
+
+def validation_table(validation: Validation, *, width: int) -> RenderableType:
+    """Fit %, RMS error and Theil's coefficient of the model and its rivals, by channel and horizon."""
+    from swashplate.flights.schema import channel
+    from swashplate.validation.validation import PREDICTORS
+
+    short = dict(zip(PREDICTORS, ("model", "card", "hold", "rates"), strict=False))
+    figures = [("fit", "fit % ", ".0f"), ("rms", "rms ", ".3g"), ("theil", "Theil ", ".2f")]
+    figures = figures if width >= _FIGURES_FROM else figures[:1]
+    rows = []
+    for name, horizon in dict.fromkeys((score.channel, score.horizon) for score in validation.scores):
+        found = {s.predictor: s for s in validation.scores if (s.channel, s.horizon) == (name, horizon)}
+        scores = {predictor: found.get(predictor) for predictor in PREDICTORS}
+        known = channel(name)
+        row = [name, known.shown_unit, f"{horizon:g}"]
+        for figure, _, style in figures:
+            row += _cells(scores, figure, known.shown_factor if figure == "rms" else 1.0, style)  # type: ignore[arg-type]
+        rows.append(row)
+    head = ["channel", "unit", "ahead [s]"]
+    for _, heading, _ in figures:
+        first, *others = (short[predictor] for predictor in PREDICTORS)
+        head += [f"{heading}{first}", *others]
+    return table(head, rows, left=2)
+
+
+def parameter_table(vehicle: Vehicle) -> RenderableType:
+    """Every number of a card with its unit, status and source."""
+    rows = [
+        (name, f"{p.value:.6g}", p.unit, p.status, p.source + (f" ({p.note})" if p.note else ""))
+        for name, p in vehicle.card.parameters.items()
+    ]
+    made = table(("parameter", "value", "unit", "status", "source"), rows)
+    for place in (2, 3, 4):
+        made.columns[place].justify = "left"
+    return made

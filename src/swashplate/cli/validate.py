@@ -1,0 +1,80 @@
+"""`swash validate`: how well a model predicts flights that it was not fitted to."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import options
+from swashplate.cli.reading import Reading
+
+FILES = ("report.html", "validation.json")
+
+
+def validate(
+    model: options.ModelName,
+    flight: options.Flights,
+    out: options.OutFolder = None,
+    published: Annotated[
+        str | None, typer.Option("--published", help="The card to compare with; by default the vehicle's own.")
+    ] = None,
+    horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
+    every: Annotated[float, typer.Option("--every", help="Seconds between start points.", min=0.01)] = 0.1,
+    calibration: Annotated[
+        float, typer.Option("--calibration", help="Seconds at each start that tell delays and trims.", min=0.0)
+    ] = 5.0,
+    rate: options.Rate = 100.0,
+    cutoff: options.Cutoff = 0.0,
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Predict flights from many start points and judge the predictions, next to the card and naive predictors."""
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, console, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.reading import check_disjoint, conditioned
+    from swashplate.cli.tables import validation_table
+    from swashplate.errors import SwashError
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    ahead = tuple(options.numbers(horizons, option="--horizons"))
+    if min(ahead) <= 0.0:
+        raise SwashError(f"'{horizons}' are not all positive.", channel="--horizons")
+    aircraft, card = find(model), None if published is None else find(published)
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    with progress(quiet=quiet or json) as line:
+        line.say("reading flights")
+        flights = conditioned(flight, rate=rate, cutoff=cutoff, how=how)
+        check_disjoint(flights, flight)
+
+        import swashplate as sp
+        from swashplate.identification.records import records
+
+        records(flights, aircraft)
+        with folder_when_complete(out, ours=FILES) as folder:
+            line.say("predicting (compiling takes longest the first time)")
+            validation = sp.validate(
+                aircraft,
+                flights,
+                published=card,
+                horizons=ahead,
+                every=every,
+                calibration=calibration,
+                progress=lambda done, total: line.say("predicting", done=done, total=total),
+            )
+            if folder is not None:
+                line.say("writing the report")
+                sp.report(validation=validation, path=folder / "report.html")
+                write_text(folder / "validation.json", as_json(validation.as_dict()) + "\n")
+    if json:
+        typer.echo(as_json(validation.as_dict()))
+    elif not quiet:
+        screen = console()
+        screen.print(validation_table(validation, width=screen.width))
+        typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")

@@ -1,0 +1,80 @@
+"""`swash vehicles`: what can fly here, and every number of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from swashplate.cli import options
+
+if TYPE_CHECKING:
+    from swashplate.simulation.trim import Trim
+
+app = typer.Typer(help="The vehicles that come with swashplate, and cards.", rich_markup_mode=None)
+
+
+@app.callback(invoke_without_command=True)
+def main(ctx: typer.Context, json: options.Json = False) -> None:
+    """List the vehicles, or show one."""
+    if ctx.invoked_subcommand is None:
+        list_(json=json)
+
+
+@app.command("list")
+def list_(json: options.Json = False) -> None:
+    """List the vehicles by name."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table
+    from swashplate.vehicles.card import packaged_cards
+
+    cards = packaged_cards()
+    if json:
+        typer.echo(as_json({name: {"title": card.title, "trust": card.trust} for name, card in cards.items()}))
+        return
+    console().print(table(("name", "what it is"), [(name, card.title) for name, card in cards.items()], left=2))
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A vehicle's name, or a card or model file.")],
+    trim: Annotated[bool, typer.Option("--trim", help="Also the hover: its inputs, states and modes.")] = False,
+    json: options.Json = False,
+) -> None:
+    """Show what a vehicle is, where its card may be trusted, and every number with unit, status and source."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import parameter_table
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    vehicle = find(name)
+    card = vehicle.card
+    hover: Trim | None = None
+    if trim:
+        import swashplate as sp
+
+        hover = sp.trim(vehicle, voltage=card.values().get("voltage_nominal"))
+    if json:
+        document: dict[str, Any] = {
+            "vehicle": card.vehicle,
+            "title": card.title,
+            "trust": card.trust,
+            "options": card.options,
+            "states": dict(zip(vehicle.state_names, vehicle.state_units, strict=True)),
+            "inputs": {
+                name: list(limits) for name, limits in zip(vehicle.input_names, vehicle.input_limits, strict=True)
+            },
+            "parameters": {name: vars(parameter) for name, parameter in card.parameters.items()},
+        }
+        if hover is not None:
+            document["trim"] = {"inputs": hover.commands(), "states": hover.states()}
+        typer.echo(as_json(document))
+        return
+    screen = console()
+    screen.print(card.title, style="bold", highlight=False, markup=False)
+    screen.print(f"Trust: {card.trust}", highlight=False, markup=False)
+    screen.print(
+        f"States: {', '.join(vehicle.state_names)}\nInputs: {', '.join(vehicle.input_names)}\n", highlight=False
+    )
+    screen.print(parameter_table(vehicle))
+    if hover is not None:
+        typer.echo(f"\n{hover!r}\n\n{sp.linearize(vehicle, hover)!r}")

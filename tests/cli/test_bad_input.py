@@ -1,0 +1,233 @@
+"""Everything that a user can get wrong: exit code 2, one message with file, channel and remedy, and nothing written."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import one_message, swash
+from scipy.io import savemat
+
+from made_logs import coax_record, dimensions, write_coax
+from swashplate.vehicles.card import packaged_cards
+
+LONG = 600  # samples: 4 s, long enough for what is not about length
+
+
+def _gigantic(path: Path) -> Path:
+    """A MATLAB header that claims 80 GB."""
+    flags = struct.pack("<IIII", 6, 8, 6, 0)
+    name = struct.pack("<HH4s", 1, 4, b"Data")
+    data = struct.pack("<II", 9, 0)
+    body = flags + dimensions(100_000, 100_000) + name + data
+    path.write_bytes(
+        b"MATLAB 5.0 MAT-file".ljust(124)
+        + struct.pack("<H2s", 0x0100, b"IM")
+        + struct.pack("<II", 14, len(body))
+        + body
+    )
+    return path
+
+
+def _text(path: Path, content: str) -> Path:
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+def _mat(path: Path, **fields: Any) -> Path:
+    savemat(path, fields)
+    return path
+
+
+def _with(name: str, change: Callable[[np.ndarray[Any, Any]], Any]) -> Callable[[Path], Path]:
+    def write(path: Path) -> Path:
+        record = coax_record(LONG)
+        array = record[name].astype(float)
+        changed = change(array)
+        savemat(path, {"Data": {**record, name: array if changed is None else changed}})
+        return path
+
+    return write
+
+
+def _nan_everywhere(x: np.ndarray[Any, Any]) -> None:
+    x[1] = np.nan
+
+
+def _back(time: np.ndarray[Any, Any]) -> None:
+    time[300] = time[100]
+
+
+def _twice(time: np.ndarray[Any, Any]) -> None:
+    time[300] = time[299]
+
+
+BAD: dict[str, tuple[Callable[[Path], Path], str, tuple[str, ...]]] = {
+    "missing file": (lambda p: p, "a.mat", ("no such file",)),
+    "a folder": (lambda p: (p.mkdir(), p)[1], "a.mat", ("is a folder",)),
+    "empty file": (lambda p: _text(p, ""), "a.mat", ("empty",)),
+    "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ()),
+    "wrong struct": (lambda p: _mat(p, Bench=np.ones(3)), "a.mat", ("Bench", "struct 'Data'")),
+    "missing channel": (lambda p: write_coax(p, orientation=None), "a.mat", ("orientation",)),
+    "wrong units": (_with("position", lambda x: 1000.0 * x + 1e6), "a.mat", ("position",)),
+    "NaN only": (_with("inputs", lambda x: np.full_like(x, np.nan)), "a.mat", ()),
+    "time backwards": (_with("time", _back), "a.mat", ("time",)),
+    "time doubled": (_with("time", _twice), "a.mat", ("time",)),
+    "one sample": (lambda p: _mat(p, Data={k: np.atleast_2d(v)[:, :1] for k, v in coax_record().items()}), "a.mat", ()),
+    "too short": (lambda p: write_coax(p), "a.mat", ()),
+    "gigantic header": (_gigantic, "a.mat", ("claims 10,000,000,000",)),
+    "csv without units": (lambda p: _text(p, "time,x\n0,1\n1,2\n"), "a.csv", ()),
+    "csv wrong unit": (lambda p: _text(p, "time [s],x [kg]\n0,1\n1,2\n"), "a.csv", ("x", "kg")),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_flight_is_refused_and_nothing_is_written(case: str, tmp_path: Path) -> None:
+    make, name, expected = BAD[case]
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    path = make(logs / name)
+    outcome = swash("identify", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit")
+    message = one_message(outcome)
+    for part in (name, *expected):
+        assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["logs"]
+
+
+def test_a_constant_input_is_seen_by_inspect(tmp_path: Path) -> None:
+    def hold(inputs: np.ndarray[Any, Any]) -> None:
+        inputs[2] = 0.25
+
+    outcome = swash("inspect", _with("inputs", hold)(tmp_path / "a.mat"))
+    assert outcome.code == 0
+    assert "servo_roll: never moves" in outcome.out
+
+
+def test_a_flight_without_an_input_is_refused(simulated: Path, tmp_path: Path) -> None:
+    from swashplate.flights.flight import Flight
+
+    flight = Flight.load(simulated)
+    streams = dict(flight.streams)
+    streams["inputs"] = streams["inputs"].drop_vars("motor_upper")
+    path = flight.with_streams(streams).save(tmp_path / "less.nc")
+    message = one_message(swash("identify", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit"))
+    assert "motor_upper" in message
+    assert not (tmp_path / "fit").exists()
+
+
+def _card(change: Callable[[str], str], path: Path) -> Path:
+    text = packaged_cards()["coax"].to_toml()
+    changed = change(text)
+    assert changed != text
+    return _text(path, changed)
+
+
+CARDS: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+    "missing": (lambda t: t.replace("[parameters.mass]", "[parameters.mass_2]", 1), ("mass", "missing")),
+    "misspelt": (
+        lambda t: t + '\n[parameters.masss]\nvalue = 1.0\nunit = "kg"\nsource = "?"\nstatus = "assumed"\n',
+        ("masss", "not a parameter"),
+    ),
+    "wrong unit": (lambda t: t.replace('unit = "kg"\n', 'unit = "g"\n', 1), ("mass", "'g'", "'kg'")),
+    "not a number": (lambda t: t.replace("value = 0.302", 'value = "0.302"', 1), ("mass", "number")),
+    "not TOML": (lambda t: t.replace("[parameters.mass]", "[parameters.mass", 1), ("TOML",)),
+    "another kind": (lambda t: t.replace('kind = "vehicle"', 'kind = "toaster"', 1), ("toaster",)),
+    "other equations": (lambda t: t.replace('vehicle = "coax"', 'vehicle = "kite"', 1), ("kite", "coax")),
+}
+
+
+@pytest.mark.parametrize("case", CARDS)
+def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> None:
+    change, expected = CARDS[case]
+    card = _card(change, tmp_path / "card.toml")
+    for arguments in (
+        ("vehicles", "show", card),
+        ("identify", "--vehicle", card, "--flight", simulated, "--out", tmp_path / "fit"),
+        ("validate", "--model", card, "--flight", simulated, "--out", tmp_path / "fit"),
+        ("simulate", "--vehicle", card, "--maneuver", "step:roll,1s", "--out", tmp_path / "flight.nc"),
+    ):
+        message = one_message(swash(*arguments))
+        for part in ("card.toml", *expected):
+            assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["card.toml"]
+
+
+@pytest.mark.parametrize(
+    ("extra", "expected"),
+    [
+        (("--fix", "mas=0.3"), ("mas", "no such parameter")),
+        (("--fix", "mass"), ("--fix", "NAME=VALUE")),
+        (("--fix", "mass=heavy"), ("--fix", "heavy")),
+        (("--fix", "mass=nan"), ("--fix", "nan")),
+        (("--fix", "mass=0.3", "--fix", "mass=0.4"), ("mass", "twice")),
+        (("--prior", "mass=0.3"), ("--prior", "2 numbers")),
+        (("--prior", "tau_f_upper=1,-1"), ("tau_f_upper", "positive")),
+        (("--tie", "a_beta_u = __import__('os')"), ("__import__",)),
+        (("--tie", "nonsense = mass"), ("nonsense",)),
+        (("--free", "tau_f_uper"), ("tau_f_uper",)),
+        (("--free", "mass,mass"), ("twice",)),
+        (("--unit", "x"), ("--unit", "NAME=VALUE")),
+        (("--cutoff", "80"), ("80",)),
+    ],
+)
+def test_a_wrong_option_is_refused(
+    extra: tuple[str, ...], expected: tuple[str, ...], simulated: Path, tmp_path: Path
+) -> None:
+    message = one_message(
+        swash("identify", "--vehicle", "coax", "--flight", simulated, "--out", tmp_path / "fit", *extra)
+    )
+    for part in expected:
+        assert part in message, message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_vehicle_is_refused(simulated: Path) -> None:
+    message = one_message(swash("identify", "--vehicle", "coaks", "--flight", simulated))
+    assert "coaks" in message
+    assert "coax" in message.replace("coaks", "")
+
+
+def test_unknown_data_sets_and_files_are_refused() -> None:
+    assert "coax57" in one_message(swash("data", "fetch", "coax57"))
+    message = one_message(swash("inspect", "coax56/flight_of_fancy"))
+    assert "flight_of_fancy" in message
+    assert "flight_2011-08-01_vertical.mat" in message
+
+
+@pytest.mark.parametrize(
+    ("maneuver", "expected"),
+    [("swep:pitch,1-8Hz,60s", "swep"), ("sweep:pitch,0.1-8Hz,6s", "periods"), ("step:tail_rotor,1s", "tail_rotor")],
+)
+def test_a_wrong_maneuver_is_refused(maneuver: str, expected: str, tmp_path: Path) -> None:
+    outcome = swash("simulate", "--vehicle", "coax", "--maneuver", maneuver, "--out", tmp_path / "a.nc")
+    assert expected in one_message(outcome)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("out", ["a.xlsx", "nowhere/a.nc"])
+def test_a_simulation_that_cannot_be_saved_is_refused(out: str, tmp_path: Path) -> None:
+    outcome = swash("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / out)
+    assert out.split("/")[0] in one_message(outcome)
+
+
+def test_a_hold_out_that_the_fit_has_seen_is_refused(simulated: Path, tmp_path: Path) -> None:
+    alias = tmp_path / "alias.nc"
+    alias.symlink_to(simulated)
+    for flight, held in ((simulated, simulated), (simulated, alias), (f"{simulated}@0-6", f"{simulated}@4-9")):
+        message = one_message(swash("identify", "--vehicle", "coax", "--flight", flight, "--hold-out", held))
+        assert "same stretch" in message
+
+
+def test_a_window_outside_the_flight_is_refused(simulated: Path) -> None:
+    assert "window 50-60 s" in one_message(swash("inspect", f"{simulated}@50-60"))
+
+
+def test_an_output_folder_that_is_a_file_is_refused(simulated: Path, tmp_path: Path) -> None:
+    out = _text(tmp_path / "fit", "mine")
+    message = one_message(swash("identify", "--vehicle", "coax", "--flight", simulated, "--out", out))
+    assert "expected a folder" in message
+    assert out.read_text(encoding="utf-8") == "mine"

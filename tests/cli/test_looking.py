@@ -1,0 +1,103 @@
+"""Verbs that look and simulate: inspect, vehicles, data, simulate."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import swash
+
+from swashplate.flights.datasets import REGISTRY
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers import read
+from swashplate.vehicles.card import packaged_cards
+
+
+def test_inspect_shows_streams_channels_and_problems(simulated: Path) -> None:
+    outcome = swash("inspect", simulated)
+    assert (outcome.code, outcome.err) == (0, "")
+    for part in ("motion", "inputs", "servo_pitch", "problems", "notes"):
+        assert part in outcome.out
+
+
+def test_inspect_as_json(simulated: Path) -> None:
+    document = json.loads(swash("inspect", simulated, "--json").out)
+    assert {stream["name"] for stream in document["streams"]} == {"motion", "inputs"}
+    assert document["simulated"] is True
+
+
+def test_a_window_of_a_flight(simulated: Path) -> None:
+    document = json.loads(swash("inspect", f"{simulated}@2-5", "--json").out)
+    assert document["duration"] == pytest.approx(3.0, abs=0.02)
+
+
+def test_a_file_whose_name_looks_like_a_window(simulated: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "log@2-5"
+    odd.write_bytes(simulated.read_bytes())
+    assert json.loads(swash("inspect", odd, "--json").out)["duration"] > 9.0
+
+
+def test_vehicles_are_listed_with_what_they_are() -> None:
+    for arguments in (("vehicles",), ("vehicles", "list")):
+        outcome = swash(*arguments)
+        assert outcome.code == 0
+        for name, card in packaged_cards().items():
+            assert name in outcome.out
+            assert card.title in outcome.out
+
+
+def test_a_vehicle_is_shown_with_every_number() -> None:
+    outcome, card = swash("vehicles", "show", "coax"), packaged_cards()["coax"]
+    assert outcome.code == 0
+    assert card.trust in outcome.out
+    for name, parameter in card.parameters.items():
+        assert name in outcome.out
+        assert parameter.source in outcome.out
+
+
+def test_a_vehicle_as_json_and_its_hover() -> None:
+    document, card = json.loads(swash("vehicles", "show", "coax", "--json", "--trim").out), packaged_cards()["coax"]
+    assert {name: entry["value"] for name, entry in document["parameters"].items()} == card.values()
+    hover = document["trim"]["states"]
+    weight = card.values()["mass"] * 9.81
+    thrust = sum(card.values()[f"k_thrust_{r}"] * hover[f"omega_{r}"] ** 2 for r in ("upper", "lower"))
+    assert thrust == pytest.approx(weight, rel=1e-2)  # the two discs are level: the air's density differs a little
+    assert "eigenvalue" in swash("vehicles", "show", "coax", "--trim").out
+
+
+def test_data_sets_are_listed_with_where_they_are() -> None:
+    rows = json.loads(swash("data", "list", "--json").out)
+    assert {(row["name"], row["file"]) for row in rows} == {(n, f) for n, data in REGISTRY.items() for f in data.files}
+    text = swash("data", "list").out
+    assert all(row["file"] in text for row in rows)
+
+
+def _simulate(out: Path, *extra: str) -> None:
+    outcome = swash("simulate", "--vehicle", "coax", "--maneuver", "doublet:roll,0.5s,0.1", "--out", out, *extra)
+    assert outcome.code == 0, outcome.err
+
+
+def test_simulate_writes_a_flight_that_can_be_read(tmp_path: Path) -> None:
+    _simulate(tmp_path / "a.nc")
+    flight = Flight.load(tmp_path / "a.nc")
+    assert flight.provenance.simulated
+    assert np.ptp(flight.values("servo_roll")) > 0.15
+    assert np.ptp(flight.values("phi")) > np.ptp(flight.values("theta"))
+
+
+def test_the_same_seed_gives_the_same_flight_and_another_does_not(tmp_path: Path) -> None:
+    for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+        _simulate(tmp_path / f"{name}.nc", "--sensors", "real", "--seed", seed, "--quiet")
+    a, b, c = (Flight.load(tmp_path / f"{name}.nc") for name in "abc")
+    assert np.array_equal(a.values("x"), b.values("x"))
+    assert a.values("x").shape != c.values("x").shape or not np.array_equal(a.values("x"), c.values("x"))
+
+
+def test_simulate_into_csv_and_in_wind(tmp_path: Path) -> None:
+    _simulate(tmp_path / "calm.csv")
+    _simulate(tmp_path / "windy.csv", "--wind", "1,0,0")
+    calm, windy = read(tmp_path / "calm.csv"), read(tmp_path / "windy.csv")
+    assert np.all(windy.values("wind_north") == 1.0)
+    assert not np.allclose(calm.values("x"), windy.values("x"))

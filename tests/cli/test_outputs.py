@@ -1,0 +1,238 @@
+"""What a run leaves in its folder: all of it or nothing, and never a model beside a failed fit."""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import one_message, swash
+
+import swashplate as sp
+from swashplate.cli.console import as_json
+from swashplate.cli.outputs import folder_when_complete
+from swashplate.flights.flight import Flight
+from swashplate.identification.fit import Estimate, Fit
+from swashplate.identification.stochastic import Nuisance
+from swashplate.validation.validation import AxisVerdict, Score, Validation
+from swashplate.vehicles.vehicle import Vehicle
+
+
+def _fit(vehicle: Vehicle, flights: list[Flight]) -> Fit:
+    one = np.eye(1)
+    estimate = Estimate("tau_f_upper", "s", 1.6, 1.3, 0.02, float("nan"))
+    return Fit(
+        vehicle=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
+        published=vehicle,
+        method="prediction-error",
+        choice="given",
+        parameters=(estimate,),
+        record_estimates=(),
+        noise=None,
+        nuisance=Nuisance(),
+        names=("tau_f_upper",),
+        covariance=one,
+        covariance_corrected=one,
+        correlation=one,
+        directions=(),
+        excitation=(),
+        history=(3.0, 1.0),
+        converged=True,
+        problems=(),
+        failed=False,
+        comparisons=(),
+        flights=tuple(flights),
+        seconds=0.5,
+    )
+
+
+def _validation(fit: Fit, flights: list[Flight]) -> Validation:
+    scores = [
+        Score(channel, 1.0, predictor, fit_percent, 0.02, 0.3, 40)
+        for channel in ("phi", "theta")
+        for predictor, fit_percent in (("model", 81.0), ("published card", 35.0), ("hold", 0.0))
+    ]
+    return Validation(
+        vehicle=fit.vehicle,
+        published=fit.published,
+        scores=tuple(scores),
+        innovations=(),
+        log_likelihood={},
+        verdict=(AxisVerdict("roll", "good", "Predicts."), AxisVerdict("yaw", "cannot be judged", "Not moved.")),
+        thresholds={},
+        examples=(),
+        records=(),
+        measured=(),
+        flights=tuple(flights),
+        settings={},
+    )
+
+
+class Work:
+    """Stands in for the minutes of computing; a test changes what comes out of it."""
+
+    def __init__(self) -> None:
+        self.asked: dict[str, Any] = {}
+        self.changes: dict[str, Any] = {}
+        self.trouble: BaseException | None = None
+
+    def identify(self, vehicle: Vehicle, flights: list[Flight], *, progress: Any, **asked: Any) -> Fit:
+        self.asked = {"vehicle": vehicle, "flights": flights, **asked}
+        progress(1, 2.0)
+        return replace(_fit(vehicle, flights), **self.changes)
+
+    def validate(self, model: Any, flights: list[Flight], *, progress: Any, **asked: Any) -> Validation:
+        progress(0, 1)
+        self.asked |= {"model": model, "hold_outs": flights, **asked}
+        fit = model if isinstance(model, Fit) else _fit(model, flights)
+        return _validation(fit, flights)
+
+    def report(self, fit: Any = None, validation: Any = None, *, path: Path, title: str | None = None) -> Path:
+        if self.trouble is not None:
+            raise self.trouble
+        Path(path).write_text(f"{'FAILED' if fit and fit.failed else 'fine'} {title}", encoding="utf-8")
+        return Path(path)
+
+
+@pytest.fixture
+def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
+    done = Work()
+    for verb in ("identify", "validate", "report"):
+        monkeypatch.setitem(vars(sp), verb, getattr(done, verb))  # in the dictionary: nothing else is loaded
+    return done
+
+
+def _identify(simulated: Path, *extra: str | Path) -> Any:
+    return swash("identify", "--vehicle", "coax", "--flight", f"{simulated}@0-6", *extra)
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simulated: Path, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "fit"
+    outcome = _identify(simulated, "--hold-out", f"{simulated}@6-10", "--out", out)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert _names(out) == ["fit.json", "model.toml", "report.html", "validation.json"]
+    assert _names(tmp_path) == ["deep"]
+    assert _names(tmp_path / "deep") == ["fit"]
+    assert sp.vehicle(out / "model.toml").card.values()["tau_f_upper"] == 1.3
+    assert json.loads((out / "fit.json").read_text())["parameters"][0]["sigma_corrected"] is None  # NaN is not JSON
+    last = outcome.out.rstrip().splitlines()[-6:]
+    assert [line.split(":")[0] for line in last] == ["What", "Fit", "Prediction", "Verdict", "Beware", "Report"]
+    assert "81" in last[2]
+    assert "35" in last[2]
+    assert "cannot be judged: yaw" in last[3]
+    assert last[5].endswith(str(out / "report.html"))
+    assert "SIMULATED FLIGHT" in outcome.out
+
+
+def test_what_the_user_said_reaches_the_identification(work: Work, simulated: Path) -> None:
+    said = ("--free", "tau_f_upper,linkage_lower", "--method", "output-error", "--fix", "mass=0.333", "--tie")
+    outcome = _identify(
+        simulated, *said, "a_beta_u = a_alpha_v", "--prior", "tau_f_upper=1.6,0.4", "--iterations", "7", "--rate", "50"
+    )
+    assert outcome.code == 0
+    assert work.asked["free"] == ["tau_f_upper", "linkage_lower"]
+    assert work.asked["method"] == "output-error"
+    assert work.asked["fixed"] == {"mass": 0.333}
+    assert work.asked["ties"] == ("a_beta_u = a_alpha_v",)
+    assert work.asked["priors"] == {"tau_f_upper": (1.6, 0.4)}
+    assert work.asked["iterations"] == 7
+    (flight,) = work.asked["flights"]
+    assert flight.rate("phi") == pytest.approx(50.0)
+    assert not any(step.operation == "lowpass" for step in flight.history)
+
+
+def test_a_failed_fit_leaves_a_report_that_says_so_and_no_model(work: Work, simulated: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    assert _identify(simulated, "--hold-out", f"{simulated}@6-10", "--out", out).code == 0
+    (out / "notes.txt").write_text("mine", encoding="utf-8")
+    work.changes = {"failed": True, "problems": ("inertia_xx is negative.",)}
+    outcome = _identify(simulated, "--hold-out", f"{simulated}@6-10", "--out", out)
+    assert outcome.code == 2
+    assert "inertia_xx is negative." in outcome.err
+    # The earlier run's model and validation must not lie beside the report of a failed fit; the user's file stays.
+    assert _names(out) == ["fit.json", "notes.txt", "report.html"]
+    assert (out / "report.html").read_text(encoding="utf-8").startswith("FAILED")
+
+
+@pytest.mark.parametrize(
+    ("trouble", "code"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "report.html"), 2),
+        (PermissionError(errno.EACCES, "Permission denied", "report.html"), 2),
+        (RuntimeError("a bug"), 1),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_trouble_leaves_the_folder_as_it_was(
+    trouble: BaseException, code: int, work: Work, simulated: Path, tmp_path: Path
+) -> None:
+    work.trouble = trouble
+    out = tmp_path / "fit"
+    outcome = _identify(simulated, "--out", out)
+    assert outcome.code == code
+    assert outcome.err.count("\n") == 1
+    assert "Traceback" not in outcome.err
+    assert _names(tmp_path) == []
+    out.mkdir()
+    (out / "model.toml").write_text("an earlier one", encoding="utf-8")
+    assert _identify(simulated, "--out", out).code == code
+    assert _names(out) == ["model.toml"]
+
+
+def test_json_is_all_that_stands_on_standard_output(work: Work, simulated: Path) -> None:
+    document = json.loads(_identify(simulated, "--json").out)
+    assert document["fit"]["parameters"][0]["name"] == "tau_f_upper"
+    assert document["validation"] is None
+    assert json.loads(swash("validate", "--model", "coax", "--flight", simulated, "--json").out)["kind"] == "validation"
+
+
+def test_quiet_is_quiet(work: Work, simulated: Path, tmp_path: Path) -> None:
+    outcome = _identify(simulated, "--quiet", "--out", tmp_path / "fit")
+    assert (outcome.code, outcome.out, outcome.err) == (0, "", "")
+
+
+def test_validate_prints_every_rival_and_the_verdict(work: Work, simulated: Path, tmp_path: Path) -> None:
+    out = tmp_path / "validation"
+    outcome = swash("validate", "--model", "coax", "--flight", simulated, "--horizons", "0.5,1", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert work.asked["horizons"] == (0.5, 1.0)
+    for part in ("fit % model", "card", "hold", "rms", "Theil", "81", "35", "cannot be judged"):
+        assert part in outcome.out
+    assert _names(out) == ["report.html", "validation.json"]
+
+
+def test_wrong_horizons_are_refused(work: Work, simulated: Path) -> None:
+    for text in ("-1,2", "soon"):
+        message = one_message(swash("validate", "--model", "coax", "--flight", simulated, f"--horizons={text}"))
+        assert "--horizons" in message
+
+
+def test_json_has_no_nan_and_no_numpy() -> None:
+    odd = {"a": float("nan"), "b": np.float64(2.0), "c": np.array([1.0, np.inf]), "d": (1, True, None), "e": Path("x")}
+    assert json.loads(as_json(odd)) == {"a": None, "b": 2.0, "c": [1.0, None], "d": [1, True, None], "e": "x"}
+
+
+def test_a_folder_is_replaced_file_by_file(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    target.mkdir()
+    for name in ("old", "both", "mine"):
+        (target / name).write_text("before", encoding="utf-8")
+    with folder_when_complete(target, ours=("old", "both", "new")) as folder:
+        assert folder is not None
+        for name in ("both", "new"):
+            (folder / name).write_text("after", encoding="utf-8")
+        assert _names(target)[-3:] == ["both", "mine", "old"]
+    assert {name: (target / name).read_text() for name in _names(target)} == {
+        "both": "after",
+        "mine": "before",
+        "new": "after",
+    }

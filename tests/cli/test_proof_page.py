@@ -1,0 +1,45 @@
+"""The page that `make proof` writes from what its tests and benchmarks left."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def proof() -> Any:
+    spec = importlib.util.spec_from_file_location("proof", ROOT / "scripts" / "proof.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_result_becomes_a_section(proof: Any, tmp_path: Path) -> None:
+    recovery = {
+        "title": "Recovery",
+        "text": "50 seeds.",
+        "columns": ["a|b", "x"],
+        "rows": [["m", 0.123456]],
+        "passed": True,
+    }
+    (tmp_path / "a.json").write_text(json.dumps(recovery), encoding="utf-8")
+    machine = {"processor": "P", "cores": 2, "load_before": 0.5}
+    slow = {"name": "scan", "rate": 1000.0, "target": 2000.0, "note": "", "met": False}
+    (tmp_path / "benchmarks.json").write_text(json.dumps({"machine": machine, "results": [slow]}), encoding="utf-8")
+    page = proof.assemble(tmp_path, [{"command": "python -m pytest", "code": 1, "seconds": 3.0}])
+    for part in (
+        "## Recovery\n\n**Passed.** 50 seeds.",
+        "| a\\|b | x |\n| --- | --- |\n| m | 0.1235 |",
+        "## Speed\n\n**Missed.** ",
+        "| scan | 1,000 | 2,000 | no |  |",
+        "| `python -m pytest` | FAILED | 3 |",
+    ):
+        assert part in page, page

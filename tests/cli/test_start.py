@@ -1,0 +1,156 @@
+"""The command itself: quick help, version, completion, and what happens on a bug, an interrupt or a broken pipe."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import swash, swash_process
+
+import swashplate as sp
+from swashplate.flights import inspect as inspect_module
+
+HELP_TIME = 0.3  # s
+
+
+def _best_time(*arguments: str, repeats: int = 7) -> float:
+    """The shortest of several runs [s]: other programs only ever make it longer."""
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def test_help_comes_at_once() -> None:
+    assert _best_time("-m", "swashplate", "--help") < HELP_TIME
+
+
+def test_importing_the_package_is_light() -> None:
+    assert _best_time("-c", "import swashplate") - _best_time("-c", "pass") < 0.1
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["identify", "--help"], ["vehicles", "show", "--help"]])
+def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
+    code = (
+        "import sys\nfrom swashplate.cli.app import app\n"
+        f"app({arguments!r}, standalone_mode=False)\n"
+        "heavy = {'jax', 'numpy', 'scipy', 'xarray', 'rich', 'plotly'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_importing_changes_no_setting_of_jax_and_the_first_verb_does() -> None:
+    code = (
+        "import jax\nimport swashplate as sp\nsp.vehicle('coax'); sp.CHOICES\n"
+        "assert not jax.config.jax_enable_x64\nsp.trim\nassert jax.config.jax_enable_x64\n"
+        "assert jax.config.jax_compilation_cache_dir"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", sp.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(sp, name) is not None
+    assert name in dir(sp)
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        sp.nonsense  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_version() -> None:
+    outcome = swash("--version")
+    assert (outcome.code, outcome.out.split()[1]) == (0, sp.__version__)
+
+
+def test_without_a_verb_there_is_help_and_a_usage_error() -> None:
+    assert swash().code == 2
+
+
+def test_an_unknown_verb_and_a_missing_option_are_usage_errors() -> None:
+    for arguments in (("idntify",), ("identify", "--vehicle", "coax"), ("simulate", "--rate", "fast")):
+        outcome = swash(*arguments)
+        assert outcome.code == 2
+        assert "Error" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [("swash ide", "identify"), ("swash identify --vehicle c", "coax"), ("swash inspect coax56/", "coax56/flight")],
+)
+def test_shell_completion(line: str, expected: str) -> None:
+    outcome = swash_process(
+        _SWASH_COMPLETE="complete_bash",
+        COMP_WORDS=line,
+        COMP_CWORD=str(len(line.split()) - 1),
+    )
+    assert expected in outcome.out
+
+
+def _broken(*_: Any, **__: Any) -> None:
+    raise ZeroDivisionError("float division by zero")
+
+
+def test_a_bug_is_one_line_and_exit_code_1(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inspect_module, "inspect", _broken)
+    monkeypatch.setattr(sys, "argv", ["swash", "inspect", "a b.nc"])
+    outcome = swash("inspect", simulated)
+    assert outcome.code == 1
+    assert outcome.err.count("\n") == 1
+    for part in ("ZeroDivisionError: float division by zero", "bug in swashplate", "swash --debug inspect 'a b.nc'"):
+        assert part in outcome.err
+
+
+def test_debug_shows_the_traceback(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inspect_module, "inspect", _broken)
+    assert "Traceback" in swash("--debug", "inspect", simulated).err
+    monkeypatch.setenv("SWASHPLATE_DEBUG", "1")
+    assert "Traceback" in swash("inspect", simulated).err
+    monkeypatch.setenv("SWASHPLATE_DEBUG", "0")
+    assert "Traceback" not in swash("inspect", simulated).err
+
+
+def test_an_interrupt_is_130(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(inspect_module, "inspect", interrupted)
+    outcome = swash("inspect", simulated)
+    assert (outcome.code, "Stopped" in outcome.err) == (130, True)
+
+
+def test_a_closed_pipe_is_quiet(simulated: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "swashplate", "inspect", str(simulated)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert b"Traceback" not in process.stderr.read()
+
+
+def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path) -> None:
+    code = (
+        "import time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"
+        "import swashplate as sp\n"
+        "def slow(*_, **__):\n    print('fitting', flush=True)\n    time.sleep(60)\n"
+        "sp.identify = slow\nmain()"
+    )
+    arguments = ["identify", "--vehicle", "coax", "--flight", str(simulated), "--out", "fit"]
+    with subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=tmp_path, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"fitting\n"
+        assert os.listdir(tmp_path) != []  # the temporary folder, until then
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) == 128 + signal.SIGTERM
+    assert os.listdir(tmp_path) == []
