@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.fft import next_fast_len, rfft
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
@@ -52,7 +53,8 @@ def corrected_covariance(
 
         Sigma = M^-1 [ sum_i sum_j S_i' R^-1 Rvv(i-j) R^-1 S_j ] M^-1
 
-    in whitened form. The sample autocorrelations are tapered linearly (Bartlett), which keeps the result positive.
+    in whitened form. The sample autocorrelations are tapered linearly (Bartlett), which keeps the result positive; the
+    double sum is taken in the frequency domain, where it is one product per frequency.
 
     Args:
         plain: M^-1, scaled, shape (p, p).
@@ -61,19 +63,30 @@ def corrected_covariance(
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
     """
-    p = plain.shape[0]
     middle = np.diag(prior).astype(np.float64)
     for residual, sensitivity in zip(whitened, sensitivities, strict=True):
-        n = residual.shape[0]
-        middle_record = np.zeros((p, p))
-        for lag in range(min(lags, n - 1) + 1):
-            correlation = residual[: n - lag].T @ residual[lag:] / n
-            left = (sensitivity[:, : n - lag] @ correlation).reshape(p, -1)
-            product = left @ sensitivity[:, lag:].reshape(p, -1).T
-            taper = 1.0 - lag / (lags + 1.0)
-            middle_record += taper * (product if lag == 0 else product + product.T)
-        middle += middle_record
+        moving = np.flatnonzero(sensitivity.any(axis=(1, 2)))  # a window's residuals know nothing of other windows
+        middle[np.ix_(moving, moving)] += _spread(residual, sensitivity[moving], lags=lags)
     return np.asarray(plain @ middle @ plain)
+
+
+def _spread(residual: Array, sensitivity: Array, *, lags: int) -> Array:
+    """Covariance of sum_t S_t' v_t for residuals v with the tapered autocorrelation of `residual`, shape (p, p)."""
+    n, m = residual.shape
+    reach = min(lags, n - 1)
+    size = next_fast_len(n + reach, real=True)  # long enough for the sums over t and t + lag not to wrap round
+    correlation = np.zeros((size, m, m))
+    for lag in range(reach + 1):
+        tapered = (1.0 - lag / (lags + 1.0)) * (residual[: n - lag].T @ residual[lag:]) / n
+        correlation[-lag], correlation[lag] = tapered, tapered.T
+    spectrum = rfft(correlation, axis=0)
+    moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
+    share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
+    share[0] = 1.0 / size
+    if size % 2 == 0:
+        share[-1] = 1.0 / size
+    left = (moved.conj() * share[:, None, None]).reshape(-1, moved.shape[2])
+    return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
 
 
 def marginal_information(information: Array, prior: Array, places: Array) -> Array:
