@@ -112,7 +112,9 @@ def test_a_batch_in_blocks_is_the_batch(coax: Vehicle) -> None:
 
 def test_single_precision_is_near(coax: Vehicle) -> None:
     inputs, masses = excited(coax, 201), {"mass": np.array([0.302, 0.31, 0.333])}
-    double, single = (simulate_batch(coax, inputs, parameters=masses, precision=kind) for kind in ("float64", "float32"))
+    double, single = (
+        simulate_batch(coax, inputs, parameters=masses, precision=kind) for kind in ("float64", "float32")
+    )
     assert single.states.dtype == np.float32
     assert 0.0 < np.max(np.abs(double["theta"] - single["theta"])[:101]) < 1e-5
 
