@@ -13,9 +13,13 @@ from commands import one_message, swash
 from scipy.io import savemat
 
 from made_logs import coax_record, dimensions, write_coax
+from swashplate.flights.flight import Flight
 from swashplate.vehicles.card import packaged_cards
 
 LONG = 600  # samples: 4 s, long enough for what is not about length
+SERVOS = ("servo_roll", "servo_pitch")
+TOLD_BY_NOTHING = ("--free", "tau_f_upper,linkage_lower", "--method", "output-error")
+"""The same free parameters as in the end-to-end test: nothing compiles anew."""
 
 
 def _gigantic(path: Path) -> Path:
@@ -107,9 +111,55 @@ def test_a_constant_input_is_seen_by_inspect(tmp_path: Path) -> None:
     assert "servo_roll: never moves" in outcome.out
 
 
-def test_a_flight_without_an_input_is_refused(simulated: Path, tmp_path: Path) -> None:
-    from swashplate.flights.flight import Flight
+def _standing(path: Path) -> Path:
+    """A log long enough to work on in which no command ever moves."""
+    record = coax_record(LONG)
+    return _mat(path, Data={**record, "inputs": np.tile([[0.55], [0.55], [0.0], [0.1]], (1, LONG))})
 
+
+def test_a_flight_whose_inputs_are_all_constant_is_refused(simulated: Path, tmp_path: Path) -> None:
+    """By every verb that learns or judges; the simulated flight stands beside it and does not help."""
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    path = _standing(logs / "a.mat")
+    for arguments in (
+        ("identify", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit"),
+        ("validate", "--model", "coax", "--flight", path, "--out", tmp_path / "fit"),
+    ):
+        message = one_message(swash(*arguments))
+        for part in ("a.mat", "servo_roll", "no input ever moves", "fly a sweep"):
+            assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["logs"]
+
+
+def test_a_constant_input_is_named_in_words_and_refuses_what_only_it_could_tell(
+    simulated: Path, tmp_path: Path
+) -> None:
+    """Both servos stand still at zero, so their linkage leaves no trace; the motors move on."""
+    flight = Flight.load(simulated)
+    streams = dict(flight.streams)
+    streams["inputs"] = streams["inputs"].assign({name: 0.0 * streams["inputs"][name] for name in SERVOS})
+    path = flight.with_streams(streams).save(tmp_path / "still.nc")
+    out = tmp_path / "fit"
+    message = one_message(swash("identify", "--vehicle", "coax", "--flight", path, *TOLD_BY_NOTHING, "--out", out))
+    for part in ("still.nc", "linkage_lower", "no information", "fly what moves it"):
+        assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["still.nc"]
+
+
+def test_a_parameter_that_the_flight_cannot_tell_is_refused(simulated: Path, tmp_path: Path) -> None:
+    """Without a linkage from the bar to the blades its time constant leaves no trace."""
+    refused = swash(
+        *("identify", "--vehicle", "coax", "--flight", simulated, *TOLD_BY_NOTHING),
+        *("--fix", "linkage_upper=0", "--out", tmp_path / "fit"),
+    )
+    message = one_message(refused)
+    for part in ("simulated", "tau_f_upper", "no information", "prior"):
+        assert part in message, message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_without_an_input_is_refused(simulated: Path, tmp_path: Path) -> None:
     flight = Flight.load(simulated)
     streams = dict(flight.streams)
     streams["inputs"] = streams["inputs"].drop_vars("motor_upper")
@@ -162,12 +212,15 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--fix", "mas=0.3"), ("mas", "no such parameter")),
         (("--fix", "mass"), ("--fix", "NAME=VALUE")),
         (("--fix", "mass=heavy"), ("--fix", "heavy")),
+        (("--fix", "mass=-0.3"), ("mass", "-0.3 kg", "physics allows")),
         (("--fix", "mass=nan"), ("--fix", "nan")),
         (("--fix", "mass=0.3", "--fix", "mass=0.4"), ("mass", "twice")),
         (("--prior", "mass=0.3"), ("--prior", "2 numbers")),
         (("--prior", "tau_f_upper=1,-1"), ("tau_f_upper", "positive")),
         (("--tie", "a_beta_u = __import__('os')"), ("__import__",)),
         (("--tie", "nonsense = mass"), ("nonsense",)),
+        (("--tie", "drag_x = drag_y", "--tie", "drag_y = drag_x"), ("circle", "drag_x")),
+        (("--prior", "mass=0.3,0.1"), ("mass", "not free")),
         (("--free", "tau_f_uper"), ("tau_f_uper",)),
         (("--free", "mass,mass"), ("twice",)),
         (("--unit", "x"), ("--unit", "NAME=VALUE")),

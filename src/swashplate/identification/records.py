@@ -62,7 +62,7 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
             f"the flights have different rates (steps of {sorted(steps)} s).",
             hint="Condition all of them to the same rate.",
         )
-    if not any(np.ptp(piece.inputs, axis=0).any() for piece in pieces):
+    if not any((np.ptp(piece.inputs, axis=0) > _STILL).any() for piece in pieces):
         raise FlightError(
             "no input ever moves, so nothing can be learnt about what they do.",
             where=pieces[0].name,
@@ -110,6 +110,9 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
         voltage_known=known,
     )
 
+
+_STILL = 1e-6
+"""Change of a command that is no change: what interpolation leaves of a constant."""
 
 _BATTERY = 1.0
 """Seconds over which a logged voltage is averaged: a battery sags slowly, a volt of noise is 14 rad/s of rotor."""
