@@ -58,8 +58,8 @@ def _with(name: str, change: Callable[[np.ndarray[Any, Any]], Any]) -> Callable[
     return write
 
 
-def _nan_everywhere(x: np.ndarray[Any, Any]) -> None:
-    x[1] = np.nan
+def _one_nan(position: np.ndarray[Any, Any]) -> None:
+    position[1, 100] = np.nan
 
 
 def _back(time: np.ndarray[Any, Any]) -> None:
@@ -74,17 +74,22 @@ BAD: dict[str, tuple[Callable[[Path], Path], str, tuple[str, ...]]] = {
     "missing file": (lambda p: p, "a.mat", ("no such file",)),
     "a folder": (lambda p: (p.mkdir(), p)[1], "a.mat", ("is a folder",)),
     "empty file": (lambda p: _text(p, ""), "a.mat", ("empty",)),
-    "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ()),
+    "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ("is not a MATLAB .mat file",)),
     "wrong struct": (lambda p: _mat(p, Bench=np.ones(3)), "a.mat", ("Bench", "struct 'Data'")),
     "missing channel": (lambda p: write_coax(p, orientation=None), "a.mat", ("orientation",)),
+    "one NaN": (_with("position", _one_nan), "a.mat", ("position", "1 of 600 samples", "sample 100")),
     "wrong units": (_with("position", lambda x: 1000.0 * x + 1e6), "a.mat", ("position",)),
-    "NaN only": (_with("inputs", lambda x: np.full_like(x, np.nan)), "a.mat", ()),
+    "NaN only": (_with("inputs", lambda x: np.full_like(x, np.nan)), "a.mat", ("inputs", "600 of 600 samples")),
     "time backwards": (_with("time", _back), "a.mat", ("time",)),
     "time doubled": (_with("time", _twice), "a.mat", ("time",)),
-    "one sample": (lambda p: _mat(p, Data={k: np.atleast_2d(v)[:, :1] for k, v in coax_record().items()}), "a.mat", ()),
-    "too short": (lambda p: write_coax(p), "a.mat", ()),
+    "one sample": (
+        lambda p: _mat(p, Data={k: np.atleast_2d(v)[:, :1] for k, v in coax_record().items()}),
+        "a.mat",
+        ("time", "one sample"),
+    ),
+    "too short": (lambda p: write_coax(p), "a.mat", ("0.073 s", "1.000 s")),
     "gigantic header": (_gigantic, "a.mat", ("claims 10,000,000,000",)),
-    "csv without units": (lambda p: _text(p, "time,x\n0,1\n1,2\n"), "a.csv", ()),
+    "csv without units": (lambda p: _text(p, "time,x\n0,1\n1,2\n"), "a.csv", ("time", "no unit")),
     "csv wrong unit": (lambda p: _text(p, "time [s],x [kg]\n0,1\n1,2\n"), "a.csv", ("x", "kg")),
 }
 
@@ -225,6 +230,7 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--free", "mass,mass"), ("twice",)),
         (("--unit", "x"), ("--unit", "NAME=VALUE")),
         (("--cutoff", "80"), ("80",)),
+        (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
     ],
 )
 def test_a_wrong_option_is_refused(
