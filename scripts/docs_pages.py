@@ -24,6 +24,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -172,40 +173,58 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
                         yield Shown(command.line, command.shown, run_command(command), fence)
 
 
+@lru_cache
+def _log(name: str) -> Any:
+    """A short simulated log that stands in for a real one."""
+    import swashplate as sp
+    from swashplate.simulation.sensors import QUIET
+
+    vehicle = sp.vehicle("coax")
+    flown = sp.simulate_maneuver(
+        vehicle, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1.0, tail=1.0
+    )
+    log = sp.observe(flown, vehicle, sensors=QUIET, seed=len(name))
+    return replace(log, provenance=replace(log.provenance, source=name))
+
+
 @contextlib.contextmanager
 def stand_ins() -> Iterator[None]:
     """Short simulated logs in place of the real flights, a small fit in place of a long one: the calls are tried."""
     import swashplate as sp
     from swashplate.identification.parameters import parameterize
-    from swashplate.simulation.sensors import QUIET
 
     read, identify, validate = sp.read, sp.identify, sp.validate
 
     def reading(name: str, **options: Any) -> Any:
-        if not str(name).startswith(_REAL):
-            return read(name, **options)
-        vehicle = sp.vehicle("coax")
-        seed = len(str(name)) % 7
-        flown = sp.simulate_maneuver(
-            vehicle, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1.0, tail=1.0
-        )
-        log = sp.observe(flown, vehicle, sensors=QUIET, seed=seed)
-        return replace(log, provenance=replace(log.provenance, source=str(name)))
+        return _log(str(name)) if str(name).startswith(_REAL) else read(name, **options)
 
     def identifying(*given: Any, **options: Any) -> Any:
         asked = inspect.signature(identify).bind(*given, **options)
         asked.apply_defaults()
+        vehicle, flights = asked.arguments["vehicle"], asked.arguments["flights"]
         question = {name: asked.arguments[name] for name in ("ties", "fixed", "priors")}
-        parameterize(asked.arguments["vehicle"], asked.arguments["free"], **question)  # are the names right?
+        parameterize(vehicle, asked.arguments["free"], **question)  # are the names right?
         small = {"free": ["tau_f_upper", "linkage_lower"], "method": "output-error", "iterations": 3}
-        return identify(asked.arguments["vehicle"], asked.arguments["flights"], **small)
+        return _once(("identify", flights.provenance.source), lambda: identify(vehicle, flights, **small))
 
     def validating(*given: Any, **options: Any) -> Any:
-        inspect.signature(validate).bind(*given, **options)
-        return validate(*given, **{**options, "every": 0.5, "horizons": (0.5, 1.0)})
+        asked = inspect.signature(validate).bind(*given, **options).arguments
+        small = {**options, "every": 0.5, "horizons": (0.5, 1.0)}
+        key = ("validate", type(asked["model"]).__name__, asked["flights"].provenance.source)
+        return _once(key, lambda: validate(*given, **small))
 
     with mock.patch.multiple(sp, read=reading, identify=identifying, validate=validating):
         yield
+
+
+_DONE: dict[tuple[str, ...], Any] = {}
+
+
+def _once(key: tuple[str, ...], work: Callable[[], Any]) -> Any:
+    """What a stand-in found the first time: pages ask the same of the same logs."""
+    if key not in _DONE:
+        _DONE[key] = work()
+    return _DONE[key]
 
 
 def same(said: str, came: str, *, tolerance: float = 2e-2) -> bool:

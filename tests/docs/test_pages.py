@@ -14,8 +14,10 @@ import matplotlib as mpl
 import pytest
 import typer
 
+import report_samples
 from swashplate.cli.app import app
 from swashplate.flights import datasets
+from swashplate.reporting.compose import compose
 
 ROOT = Path(__file__).resolve().parents[2]
 _FLIGHTS = ("flight_2011-08-01_vertical.mat", "flight_2011-07-25_hover_crash.mat")
@@ -129,3 +131,11 @@ def test_every_page_can_be_reached_from_the_index() -> None:
         n for n in PAGES if n.startswith("docs/") and n != "docs/index.md" and n.removeprefix("docs/") not in index
     ]
     assert not missing
+
+
+def test_the_guide_to_the_report_names_its_sections() -> None:
+    page = PAGES["docs/howto/read-the-report.md"]
+    named = set(re.findall(r"\*\*(.+?)\*\*", page)) - {"Banners", "Summary"}
+    report = compose(report_samples.fit(), report_samples.validation(), modes=report_samples.modes())
+    titles = {section.title for section in report.sections}
+    assert named <= titles
