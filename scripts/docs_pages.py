@@ -161,16 +161,20 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
             if fence.file:
                 Path(fence.file).write_text(fence.text, encoding="utf-8")
             elif fence.language == "python":
+                if _REAL in fence.text and not (data_is_here or standing_in):
+                    yield Shown(fence.text, "", None, fence)
+                    return  # what comes after builds on it
                 printed = run_python(fence, namespace)
                 following = found[number + 1] if number + 1 < len(found) else None
                 if following and following.language == "text" and following.follows:
                     yield Shown(fence.text, following.text.strip("\n"), None if standing_in else printed, following)
             elif fence.language == "console":
                 for command in commands(fence):
-                    if _REAL in command.line and not data_is_here:
-                        yield Shown(command.line, command.shown, None, fence)
-                    elif command.runs and (real or not command.slow):
-                        yield Shown(command.line, command.shown, run_command(command), fence)
+                    if not command.runs or (command.slow and not real):
+                        continue
+                    missing = _REAL in command.line and not data_is_here
+                    came = None if missing else run_command(command)
+                    yield Shown(command.line, command.shown, came, fence)
 
 
 @lru_cache
