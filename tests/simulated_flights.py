@@ -8,6 +8,9 @@ import swashplate as sp
 from swashplate.flights.flight import Flight
 from swashplate.simulation.sensors import QUIET
 
+FREE = ("tau_f_upper", "linkage_lower")
+TIE = "design_angle_lower = 2 * linkage_lower"  # nothing depends on that angle, so the fit is as without the tie
+
 
 @lru_cache(maxsize=1)
 def ten_seconds() -> Flight:

@@ -13,12 +13,13 @@ from commands import one_message, swash
 from scipy.io import savemat
 
 from made_logs import coax_record, dimensions, write_coax
+from simulated_flights import FREE, TIE
 from swashplate.flights.flight import Flight
 from swashplate.vehicles.card import packaged_cards
 
 LONG = 600  # samples: 4 s, long enough for what is not about length
 SERVOS = ("servo_roll", "servo_pitch")
-TOLD_BY_NOTHING = ("--free", "tau_f_upper,linkage_lower", "--method", "output-error")
+TOLD_BY_NOTHING = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
 """The same free parameters as in the end-to-end test: nothing compiles anew."""
 
 

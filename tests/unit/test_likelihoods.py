@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from simulated_flights import ten_seconds
+from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
 from swashplate.identification import accuracy
 from swashplate.identification.output_error import WINDOW, OutputError
@@ -20,8 +20,6 @@ from swashplate.identification.prediction_error import PredictionError, stack_re
 from swashplate.identification.records import Record, records
 from swashplate.identification.scoring import minimise
 from swashplate.validation.calibration import first_part
-
-FREE = ["tau_f_upper", "linkage_lower"]
 
 
 @lru_cache(maxsize=1)
@@ -37,12 +35,12 @@ def _start() -> Record:
 
 @lru_cache(maxsize=1)
 def _output_error() -> OutputError:
-    return OutputError(parameterize(sp.vehicle("coax"), FREE), [_record()])
+    return OutputError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_record()])
 
 
 @lru_cache(maxsize=1)
 def _prediction_error() -> PredictionError:
-    return PredictionError(parameterize(sp.vehicle("coax"), FREE), [_start()])
+    return PredictionError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_start()])
 
 
 @pytest.fixture(params=["output error", "prediction error"])
@@ -169,7 +167,7 @@ def test_windows_start_where_they_should_and_share_nothing_but_the_record() -> N
 
 def test_a_record_shorter_than_a_window_is_refused() -> None:
     with pytest.raises(IdentificationError, match=r"longest record has 10\.0 s, expected more than one"):
-        OutputError(parameterize(sp.vehicle("coax"), FREE), [_record()], window=20.0)
+        OutputError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_record()], window=20.0)
 
 
 def test_records_of_different_lengths_stand_side_by_side() -> None:
