@@ -25,24 +25,35 @@ def _first_order(rng: np.random.Generator, shape: tuple[int, int], rho: float) -
 
 @pytest.mark.parametrize("n", [7, 24, 61])
 def test_the_corrected_bound_is_the_double_sum(n: int) -> None:
-    """Morelli and Klein's formula written out, sample by sample, for two records of different lengths."""
+    """Morelli and Klein's formula written out, sample by sample, where the fit has taken nothing out of the errors.
+
+    A tiny bound says so: then the residuals are the errors.
+    """
     rng = np.random.default_rng(n)
     p, m, lags = 4, 3, 10
-    residuals = [_first_order(rng, (length, m), 0.7) @ rng.standard_normal((m, m)) for length in (n, n + 5)]
-    sensitivities = [rng.standard_normal((p, len(r), m)) for r in residuals]
-    sensitivities[0][1] = 0.0  # an entry that the first record does not know
-    prior, plain = rng.uniform(0.0, 1.0, p), np.eye(p) + 0.1
+    v, S = _first_order(rng, (n, m), 0.7) @ rng.standard_normal((m, m)), rng.standard_normal((p, n, m))
+    prior, plain = rng.uniform(0.0, 1.0, p), 1e-9 * (np.eye(p) + 0.1)
     middle = np.diag(prior)
-    for v, S in zip(residuals, sensitivities, strict=True):
-        length = len(v)
-        for i in range(length):
-            for j in range(max(0, i - lags), min(length, i + lags + 1)):
-                lag = abs(j - i)
-                R = v[: length - lag].T @ v[lag:] / length * (1.0 - lag / (lags + 1.0))
-                middle += S[:, i] @ (R if j >= i else R.T) @ S[:, j].T
-    found = accuracy.corrected_covariance(plain, prior, residuals, sensitivities, lags=lags)
-    np.testing.assert_allclose(found, plain @ middle @ plain, rtol=1e-10)
+    for i in range(n):
+        for j in range(max(0, i - lags), min(n, i + lags + 1)):
+            lag = abs(j - i)
+            R = v[: n - lag].T @ v[lag:] / n * (1.0 - lag / (lags + 1.0))
+            middle += S[:, i] @ (R if j >= i else R.T) @ S[:, j].T
+    found = accuracy.corrected_covariance(plain, prior, [v], [S], lags=lags)
+    np.testing.assert_allclose(found, plain @ middle @ plain, rtol=1e-6)
     assert np.linalg.eigvalsh(found).min() > 0.0
+
+
+def test_records_that_know_nothing_of_each_other_add_up() -> None:
+    """Twice the same record is twice the information; an entry that a record does not know gets nothing from it."""
+    rng = np.random.default_rng(12)
+    v, S = _first_order(rng, (300, 2), 0.8), rng.standard_normal((3, 300, 2))
+    S[2] = 0.0
+    plain, prior = 1e-9 * np.eye(3), np.zeros(3)
+    one = accuracy.corrected_covariance(plain, prior, [v], [S], lags=30)
+    two = accuracy.corrected_covariance(plain, prior, [v, v], [S, S], lags=30)
+    np.testing.assert_allclose(two, 2.0 * one, rtol=1e-6)
+    assert not one[2].any()
 
 
 def test_white_residuals_leave_the_bound_alone() -> None:
