@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
@@ -53,8 +53,10 @@ def corrected_covariance(
 
         Sigma = M^-1 [ sum_i sum_j S_i' R^-1 Rvv(i-j) R^-1 S_j ] M^-1
 
-    in whitened form. The sample autocorrelations are tapered linearly (Bartlett), which keeps the result positive; the
-    double sum is taken in the frequency domain, where it is one product per frequency.
+    in whitened form, with one autocorrelation for all records. Residuals are the errors less what the fit took out of
+    them, `v = (1 - S M^-1 S') e`, so their products fall short of the errors'; what a white error loses is added back
+    (without it windows with their own initial states look less correlated than they are). The autocorrelation is
+    tapered linearly (Bartlett), which keeps the result positive; the double sum is taken in the frequency domain.
 
     Args:
         plain: M^-1, scaled, shape (p, p).
@@ -63,23 +65,42 @@ def corrected_covariance(
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
     """
+    moved = [np.flatnonzero(np.any(sensitivity, axis=(1, 2))) for sensitivity in sensitivities]
+    pieces = [sensitivity[own] for sensitivity, own in zip(sensitivities, moved, strict=True)]
+    products = [
+        _products(residual, residual, lags) + _products(*_taken(piece, plain[np.ix_(own, own)]), lags)
+        for residual, piece, own in zip(whitened, pieces, moved, strict=True)
+    ]
+    taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
+    correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
     middle = np.diag(prior).astype(np.float64)
-    for residual, sensitivity in zip(whitened, sensitivities, strict=True):
-        moving = np.flatnonzero(sensitivity.any(axis=(1, 2)))  # a window's residuals know nothing of other windows
-        middle[np.ix_(moving, moving)] += _spread(residual, sensitivity[moving], lags=lags)
+    for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
+        middle[np.ix_(own, own)] += _spread(correlation, piece)
     return np.asarray(plain @ middle @ plain)
 
 
-def _spread(residual: Array, sensitivity: Array, *, lags: int) -> Array:
-    """Covariance of sum_t S_t' v_t for residuals v with the tapered autocorrelation of `residual`, shape (p, p)."""
-    n, m = residual.shape
-    reach = min(lags, n - 1)
-    size = next_fast_len(n + reach, real=True)  # long enough for the sums over t and t + lag not to wrap round
-    correlation = np.zeros((size, m, m))
-    for lag in range(reach + 1):
-        tapered = (1.0 - lag / (lags + 1.0)) * (residual[: n - lag].T @ residual[lag:]) / n
-        correlation[-lag], correlation[lag] = tapered, tapered.T
-    spectrum = rfft(correlation, axis=0)
+def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
+    """Two rows of which the products over time are what the fit takes out of a white error, each (n, m, p)."""
+    seen = sensitivity.transpose(1, 2, 0)
+    return seen @ plain, seen
+
+
+def _products(left: Array, right: Array, lags: int) -> Array:
+    """sum_t left(t) right(t + lag)' for lags 0 to `lags`, over a last axis too where there is one; (lags + 1, m, m)."""
+    n = len(left)
+    size = next_fast_len(n + lags, real=True)  # long enough for the sums not to wrap round
+    a, b = (rfft(x.reshape(n, x.shape[1], -1), size, axis=0) for x in (left, right))
+    return np.asarray(irfft(a.conj() @ b.transpose(0, 2, 1), size, axis=0)[: lags + 1])
+
+
+def _spread(correlation: Array, sensitivity: Array) -> Array:
+    """Covariance of sum_t S_t' v_t for errors v with a one-sided autocorrelation (lags + 1, m, m), shape (p, p)."""
+    n, lags, m = sensitivity.shape[1], len(correlation) - 1, correlation.shape[1]
+    size = next_fast_len(n + lags, real=True)
+    both = np.zeros((size, m, m))
+    both[: lags + 1] = correlation.transpose(0, 2, 1)
+    both[size - lags :] = correlation[:0:-1]
+    spectrum = rfft(both, axis=0)
     moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
     share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
     share[0] = 1.0 / size

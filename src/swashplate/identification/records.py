@@ -114,7 +114,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
 _STILL = 1e-6
 """Change of a command that is no change: what interpolation leaves of a constant."""
 
-_BATTERY = 1.0
+_BATTERY = 8.0
 """Seconds over which a logged voltage is averaged: a battery sags slowly, a volt of noise is 14 rad/s of rotor."""
 
 
