@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from swashplate.errors import FlightError
@@ -29,6 +30,7 @@ class Record:
         voltage: battery voltage [V], shape (n,).
         output_names: names of the measured channels.
         voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
+        log: the flight it is a piece of; the pieces of one log share their delays, trims and lever arm.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Record:
     voltage: Array
     output_names: tuple[str, ...]
     voltage_known: bool
+    log: str = ""
 
     @property
     def dt(self) -> float:
@@ -50,10 +53,13 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
     Raises:
         FlightError: where a flight lacks a channel, is not on a uniform grid or holds NaN, or where no input moves.
     """
-    pieces = []
+    pieces: list[Record] = []
     for flight in [flights] if isinstance(flights, Flight) else list(flights):
+        source = flight.provenance.source or "flight"
+        again = sum(1 for name in logs(pieces)[0] if name.split(" #")[0] == source)
+        log = f"{source} #{again + 1}" if again else source
         for piece in flight.split():
-            pieces.append(_record(piece, vehicle, tuple(outputs)))
+            pieces.append(_record(piece, vehicle, tuple(outputs), log=log))
     if not pieces:
         raise FlightError("there is no flight to work on.")
     steps = {round(piece.dt, 9) for piece in pieces}
@@ -72,7 +78,13 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
     return pieces
 
 
-def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Record:
+def logs(pieces: Sequence[Record]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of the logs, in order, and which of them each piece comes from."""
+    names = tuple(dict.fromkeys(piece.log for piece in pieces))
+    return names, np.array([names.index(piece.log) for piece in pieces], dtype=np.intp)
+
+
+def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:
     source = flight.provenance.source or "flight"
     wanted = (*vehicle.input_names, *outputs)
     missing = [name for name in wanted if name not in flight]
@@ -108,6 +120,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
         voltage=_slow(flight.values("voltage"), float(np.mean(steps))) if known else np.full(time.size, nominal),
         output_names=outputs,
         voltage_known=known,
+        log=log,
     )
 
 
