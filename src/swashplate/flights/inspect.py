@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import CHANNELS, QUATERNION, channel
+from swashplate.flights.schema import QUATERNION, channel, is_known
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -109,7 +109,7 @@ class Inspection:
         rows = []
         for c in self.channels:
             remarks = ["never moves"] * c.constant + [f"{c.missing} missing"] * bool(c.missing)
-            remarks += ["not in the schema"] * (c.name not in CHANNELS)
+            remarks += ["not in the schema"] * (not is_known(c.name))
             numbers = (f"{c.low:.4g}", f"{c.median:.4g}", f"{c.high:.4g}", f"{c.outliers or '-'}")
             rows.append((c.name, c.unit, c.stream, *numbers, ", ".join(remarks)))
         return [head, *rows]

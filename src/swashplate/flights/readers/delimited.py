@@ -30,7 +30,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
-from swashplate.flights.schema import CHANNELS, channel
+from swashplate.flights.schema import channel, is_known
 
 NAME = "csv"
 VERSION = "1"
@@ -224,7 +224,7 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
     keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
     channels = {name: values[keep] for name, values in channels.items()}
-    foreign = {name: labels[name] for name in channels if name not in CHANNELS}
+    foreign = {name: labels[name] for name in channels if not is_known(name)}
     notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
     return Flight(
         streams={"log": stream(time[keep], channels, foreign)},

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Provenance
@@ -55,14 +56,14 @@ class Source:
             control = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in self.content[:4096])
             return None if control else self.content.decode("latin-1")
 
-    def provenance(self, reader: str, version: str, *, vehicle: str = "", notes: tuple[str, ...] = ()) -> Provenance:
+    def provenance(self, reader: str, version: str, **found: Any) -> Provenance:
+        """The file's name and hash, the reader's, and what it `found` (vehicle, notes, damage, parameters, events)."""
         return Provenance(
             source=self.path.name,
             sha256=self.sha256,
             reader=reader,
             reader_version=version,
-            vehicle=vehicle,
-            notes=notes,
+            **found,
         )
 
 

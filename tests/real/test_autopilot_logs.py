@@ -1,0 +1,89 @@
+"""Genuine ArduPilot and PX4 logs: what was flown is found, and every number is the one that the log holds."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers import read
+from swashplate.flights.readers.dataflash import messages
+
+# NOTES.md beside the logs: file, axis, magnitude, band, fades and record as flown, rate of the fast messages.
+FLOWN = [
+    ("heli_sid_roll_mix.BIN", 10, 0.15, (0.15, 18.0), (4.0, 1.0), 55.0, 200.0),
+    ("heli_sid_pitch_mix.BIN", 11, 0.15, (0.15, 15.0), (4.0, 1.0), 56.0, 100.0),
+    ("heli_sid_coll_mix.BIN", 13, 0.08, (0.15, 12.0), (4.0, 1.0), 56.0, 100.0),
+    ("heli_sid_allbits_roll_rate.BIN", 7, 15.0, (1.5, 10.0), (0.5, 0.5), 3.0, 400.0),
+]
+
+
+@pytest.fixture(scope="module")
+def logs(shared_data: Path) -> dict[str, Flight]:
+    return {name: read(shared_data / "ardupilot_sitl" / name) for name, *_ in FLOWN}
+
+
+@pytest.mark.parametrize(("name", "axis", "magnitude", "band", "fades", "record", "rate"), FLOWN)
+def test_a_sitl_log_says_what_was_flown(
+    logs: dict[str, Flight],
+    name: str,
+    axis: int,
+    magnitude: float,
+    band: tuple[float, float],
+    fades: tuple[float, float],
+    record: float,
+    rate: float,
+) -> None:
+    flight = logs[name]
+    assert flight.provenance.damage == ()
+    assert flight.rate("p") == pytest.approx(rate, rel=1e-3)
+    assert flight.rate("phi") == flight.rate("mixer_roll")
+    (sweep,) = (event for event in flight.provenance.events if event.kind == "sweep")
+    flown = sweep.details
+    assert (flown["axis"], flown["record"]) == (axis, record)
+    assert (flown["fade_in"], flown["fade_out"]) == fades
+    assert_allclose([flown["start_hz"], flown["stop_hz"], flown["magnitude"]], [*band, magnitude], rtol=1e-6)
+    assert flown["stop"] - flown["start"] == pytest.approx(record, abs=0.02)  # its clock counts loops
+    assert "SYSTEMID" in [event.text for event in flight.provenance.events if event.kind == "mode"]
+    assert flight.provenance.parameter("FRAME_CLASS") == 6.0
+    assert flight.provenance.parameter("SID_AXIS", at=flown["start"]) == axis
+
+
+@pytest.mark.parametrize("name", [row[0] for row in FLOWN])
+def test_the_chirp_is_the_one_that_arducopter_computed(logs: dict[str, Flight], shared_data: Path, name: str) -> None:
+    (sweep,) = (event for event in logs[name].provenance.events if event.kind == "sweep")
+    chirp = Chirp(**{key: value for key, value in sweep.details.items() if key in Chirp.__dataclass_fields__})
+    # By the mode's own clock, which counts loops and is not the stamps'.
+    logged = messages((shared_data / "ardupilot_sitl" / name).read_bytes()).tables["SIDD"]
+    own = logged.number("Time") - START_DELAY
+    # Single precision: 330 periods make 2,000 rad, which are rounded to 1.2e-4 rad at each step.
+    assert np.abs(logged.number("Targ") - chirp.signal(own)).max() < 1e-3 * chirp.magnitude
+    assert_allclose(logged.number("F"), chirp.frequency(own), rtol=1e-6)
+    assert logs[name].values("sid_target").size == len(logged)
+
+
+def test_hover_has_the_right_signs(logs: dict[str, Flight]) -> None:
+    flight = logs["heli_sid_coll_mix.BIN"]
+    assert np.median(flight.values("az")) == pytest.approx(-9.81, abs=0.05)
+    assert np.median(flight.values("z")) < -20.0  # flown at 40 m
+    assert np.median(flight.values("omega_rotor")) == pytest.approx(1500.0 * 2 * np.pi / 60, rel=1e-3)
+    roll = logs["heli_sid_roll_mix.BIN"]
+    # Positive mixer command rolls right (NOTES): at low frequency the rate follows it.
+    t = np.arange(110.0, 125.0, 0.02)
+    command, rate = (np.interp(t, roll.time(n), roll.values(n)) for n in ("mixer_roll", "p"))
+    assert np.corrcoef(command, rate)[0, 1] > 0.9
+    assert np.polyfit(command, rate, 1)[0] == pytest.approx(3.6, rel=0.2)
+
+
+def test_five_megabytes_take_less_than_half_a_second(shared_data: Path) -> None:
+    best = np.inf
+    for _ in range(3):
+        begin = time.perf_counter()
+        read(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
+        best = min(best, time.perf_counter() - begin)
+    assert best < 0.5
