@@ -125,3 +125,83 @@ def ardupilot_rows(
     if disarm:
         rows.append(("EV", (us(times[-1]), 11)))
     return [row for row in rows if until is None or row[1][0] <= us(until)]
+
+
+PX4LOG: dict[str, tuple[int, str, str]] = {
+    "TIME": (129, "Q", "StartTime"),
+    "ATT": (2, "ffffff", "Roll,Pitch,Yaw,RollRate,PitchRate,YawRate"),
+    "IMU": (4, "ffffff", "AccX,AccY,AccZ,GyroX,GyroY,GyroZ"),
+    "ATTC": (9, "ffff", "Roll,Pitch,Yaw,Thrust"),
+    "OUT0": (12, "fff", "Out0,Out1,Out2"),
+    "STAT": (10, "Bf", "MainState,Load"),
+    "VER": (11, "NZ", "Arch,FwGit"),
+    "PARM": (13, "Nf", "Name,Value"),
+    "FOO": (14, "f", "Bar"),
+}
+
+
+def px4_rows(n: int = 60) -> list[Row]:
+    rows: list[Row] = [("VER", ("PX4FMU_V2", "abcdef")), ("PARM", ("MC_ROLL_P", 6.5))]
+    for k in range(n):
+        rows.append(("TIME", (5_000_000 + 20_000 * k,)))
+        rows.append(("IMU", (0.1, 0.2, -9.8, 0.01, 0.02, 0.03)))
+        if k % 2 == 0:
+            rows.append(("ATT", (0.1, 0.2, 0.3, 0.01 * k, 0.0, 0.0)))
+            rows.append(("ATTC", (0.01 * k, 0.0, 0.1, 0.5)))
+        if k % 10 == 0:
+            rows += [("OUT0", (1500.0, 1400.0, float("nan"))), ("STAT", (0 if k < 30 else 2, 0.3)), ("FOO", (1.0,))]
+    return rows
+
+
+def _ulog_message(kind: str, body: bytes) -> bytes:
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+def _ulog_info(kind: str, type_and_key: str, value: bytes) -> bytes:
+    return _ulog_message(kind, bytes([len(type_and_key)]) + type_and_key.encode() + value)
+
+
+ULOG_TOPICS = {
+    "vehicle_angular_velocity": "uint64_t timestamp;uint64_t timestamp_sample;float[3] xyz;",
+    "vehicle_attitude": "uint64_t timestamp;uint64_t timestamp_sample;float[4] q;",
+    "vehicle_torque_setpoint": "uint64_t timestamp;uint64_t timestamp_sample;float[3] xyz;",
+    "vehicle_thrust_setpoint": "uint64_t timestamp;uint64_t timestamp_sample;float[3] xyz;",
+    "sensor_combined": "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;",
+    "actuator_servos": "uint64_t timestamp;float[4] control;",
+    "vehicle_status": "uint64_t timestamp;uint8_t arming_state;uint8_t nav_state;uint8_t[6] _padding0;",
+    "strange_topic": "uint64_t timestamp;float foo;",
+}
+
+
+def ulog(n: int = 100, *, dropout: bool = False, period_us: int = 4000) -> bytes:
+    """A ULog file: header, flag bits, formats, information, parameters, subscriptions, data."""
+    out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1_000_000), _ulog_message("B", bytes(40))]
+    out += [_ulog_message("F", f"{name}:{fields}".encode()) for name, fields in ULOG_TOPICS.items()]
+    out.append(_ulog_info("I", "char[3] sys_name", b"PX4"))
+    out.append(_ulog_info("P", "float MC_ROLLRATE_P", struct.pack("<f", 0.15)))
+    out.append(_ulog_info("P", "int32_t MAV_TYPE", struct.pack("<i", 4)))
+    out += [_ulog_message("A", struct.pack("<BH", 0, i) + name.encode()) for i, name in enumerate(ULOG_TOPICS)]
+
+    def data(topic: str, form: str, *values: Any) -> bytes:
+        return _ulog_message("D", struct.pack("<H" + form, list(ULOG_TOPICS).index(topic), *values))
+
+    for k in range(n):
+        t = 2_000_000 + period_us * k
+        x = float(np.sin(2 * np.pi * k / 25))
+        out.append(data("vehicle_angular_velocity", "QQ3f", t, t - 1000, 0.5 * x, 0.1, 0.0))
+        out.append(data("vehicle_torque_setpoint", "QQ3f", t, t - 1000, 0.1 * x, 0.0, 0.05))
+        out.append(data("vehicle_thrust_setpoint", "QQ3f", t, t - 1000, 0.0, 0.0, -0.6))
+        if k % 2 == 0:
+            half = 0.05 * x
+            out.append(data("vehicle_attitude", "QQ4f", t, 0, np.cos(half), np.sin(half), 0.0, 0.0))
+            out.append(data("sensor_combined", "Q6f", t, 0.5 * x, 0.1, 0.0, 0.1, 0.2, -9.8))
+        if k % 10 == 0:
+            out.append(data("actuator_servos", "Q4f", t, 0.1 * x, 0.2, 0.3, float("nan")))
+            out.append(data("vehicle_status", "QBB", t, 2 if k else 1, 10))
+            out.append(data("strange_topic", "Qf", t, 1.0))
+        if k == n // 2:
+            out.append(_ulog_message("L", b"6" + struct.pack("<Q", t) + b"Armed by RC"))
+            out.append(_ulog_info("P", "float MC_ROLLRATE_P", struct.pack("<f", 0.2)))
+            if dropout:
+                out.append(_ulog_message("O", struct.pack("<H", 120)))
+    return b"".join(out)

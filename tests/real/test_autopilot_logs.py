@@ -87,3 +87,20 @@ def test_five_megabytes_take_less_than_half_a_second(shared_data: Path) -> None:
         read(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
         best = min(best, time.perf_counter() - begin)
     assert best < 0.5
+
+
+def test_an_early_px4_log(shared_data: Path) -> None:
+    flight = read(shared_data / "logs" / "2016-07-14_06_53_11.px4log")
+    assert flight.provenance.reader == "px4log"
+    assert flight.provenance.damage == ()
+    assert len(flight.provenance.parameters) > 600
+    assert flight.duration == pytest.approx(42.2, abs=0.1)
+    assert np.median(flight.values("az")) == pytest.approx(-9.7, abs=0.2)  # on the ground, forward-right-down
+    assert set(flight.channels) >= {"phi", "p", "mixer_roll", "x", "vx", "rcout_1", "voltage"}
+
+
+def test_a_dataflash_log_of_four_messages_with_a_sensor_on_its_back(shared_data: Path) -> None:
+    flight = read(shared_data / "logs" / "dataflash_reference.bin")
+    assert flight.rate("az") == pytest.approx(181.0, rel=0.01)
+    assert flight.rate("phi") == pytest.approx(49.8, rel=0.01)
+    assert any("forward-right-down" in note for note in flight.provenance.notes)

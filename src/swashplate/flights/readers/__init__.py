@@ -12,7 +12,7 @@ from typing import Any, Protocol, cast
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import ardupilot, coax56, delimited, netcdf, optitrack, vicon
+from swashplate.flights.readers import ardupilot, coax56, delimited, netcdf, optitrack, px4log, ulog, vicon
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
 
@@ -29,7 +29,7 @@ class Reader(Protocol):
 
 
 # Asked in this order; the plain table comes last because nearly any text looks like one.
-READERS = cast(tuple[Reader, ...], (ardupilot, coax56, netcdf, optitrack, vicon, delimited))
+READERS = cast(tuple[Reader, ...], (ardupilot, px4log, ulog, coax56, netcdf, optitrack, vicon, delimited))
 
 
 def read(

@@ -17,6 +17,7 @@ from swashplate.flights.schema import channel
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_END = 1 << 62  # behind every place in a file
 _FALL = 1.0  # s: messages overtake each other by milliseconds; a clock that falls by more was started anew
 _WINDOW = 11  # messages: fewer damaged stamps than half of that do not look like a reset
 
@@ -73,7 +74,7 @@ def longest_run(place: NDArray[np.int64], time: Array) -> tuple[tuple[int, int],
     Returns:
         The part, and in words what was left out ("" where the clock never falls back).
     """
-    edges = [0, *resets(place, time).tolist(), int(place[-1]) + 1 if place.size else 1]
+    edges = [0, *resets(place, time).tolist(), _END]
     counts = np.histogram(place, bins=edges)[0] if len(edges) > 2 else np.array([place.size])
     best = int(np.argmax(counts))
     said = ""
