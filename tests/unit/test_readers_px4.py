@@ -58,7 +58,7 @@ def test_a_damaged_ulog_gives_what_is_left(tmp_path: Path) -> None:
 def test_a_ulog_without_known_topics_or_with_forged_arrays_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FlightError, match=r"a\.ulg: holds no flight"):
         _flight(tmp_path, ulog(1), "a.ulg")
-    forged = ulog().replace(b"float[3] xyz", b"float[999999] xyz")
+    forged = ulog().replace(b"_sample;float[3] xyz", b"_sa;float[99999] xyz")  # as long as before
     with pytest.raises(FlightError, match="damaged or forged"):
         _flight(tmp_path, forged, "a.ulg")
     with pytest.raises(FlightError, match="does not read as a ULog file"):

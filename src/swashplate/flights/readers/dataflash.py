@@ -52,7 +52,8 @@ class Table:
         values = self.columns.get(name)
         if values is None or values.dtype.kind not in "fiub" or values.ndim != 1:
             return np.full(len(self), np.nan)
-        return np.asarray(values, dtype=np.float64)
+        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+            return np.asarray(values, dtype=np.float64)
 
     def text(self, name: str) -> list[str]:
         """A column as texts, empty where the field is missing."""

@@ -18,6 +18,7 @@ LARGEST_CONTENT = 2 << 30
 # numbers hardly shrink; beyond this ratio the sizes in the header are nonsense.
 _FREE_CONTENT = 16 << 20
 _LARGEST_RATIO = 40
+_FOLDER_MARK = "metadata.yaml"  # of a rosbag2 folder
 
 
 @dataclass(frozen=True)
@@ -84,24 +85,33 @@ def refuse_oversized(claimed: int, *, size: int, where: str, what: str) -> None:
         )
 
 
+def _files(place: Path) -> list[Path]:
+    """The files of a log: itself, or those of a rosbag2 folder, its metadata first."""
+    if not place.is_dir():
+        return [place]
+    metadata = place / _FOLDER_MARK
+    if not metadata.is_file():
+        raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
+    return [metadata, *sorted(file for file in place.iterdir() if file.is_file() and file != metadata)]
+
+
 def open_source(path: str | Path) -> Source:
-    """Reads a file's bytes.
+    """Reads a log's bytes: those of a file, or of all files of a rosbag2 folder.
 
     Raises:
         FlightError: where it is missing, a folder, unreadable, empty or too large.
     """
     place = Path(path)
     try:
-        if place.is_dir():
-            raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
-        size = place.stat().st_size
+        files = _files(place)
+        size = sum(file.stat().st_size for file in files)
         if size > LARGEST_FILE:
             raise FlightError(
                 f"has {size:,} bytes; the largest file that is read has {LARGEST_FILE:,}.",
                 where=place,
                 hint="Split it into shorter flights.",
             )
-        content = place.read_bytes()
+        content = b"".join(file.read_bytes() for file in files)
     except FileNotFoundError:
         raise FlightError("there is no such file.", where=place, hint="Check the path.") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte

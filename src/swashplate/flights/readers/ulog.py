@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +23,7 @@ from swashplate.flights.readers import checks, clocked
 from swashplate.flights.readers.extras import needed
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
+from swashplate.flights.readers.ulog_messages import MAGIC, Whole, whole_messages
 from swashplate.flights.schema import QUATERNION
 
 NAME = "ulog"
@@ -31,8 +31,6 @@ VERSION = "1"
 
 Array = NDArray[np.float64]
 
-_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
-_HEADER = 16
 _LARGEST = 65535  # bytes of a message: its size is two bytes
 _ARMED = 2
 
@@ -102,7 +100,7 @@ _TOPICS = (
 
 def recognises(source: Source) -> bool:
     """The magic bytes of a ULog file."""
-    return source.content.startswith(_MAGIC)
+    return source.content.startswith(MAGIC)
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -117,7 +115,8 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Leave them out.",
         )
-    log = _decoded(source)
+    whole = whole_messages(source.content)
+    log = _decoded(whole.content, source.name)
     notes: list[str] = []
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
@@ -143,26 +142,26 @@ def read(source: Source, options: Options) -> Flight:
         VERSION,
         vehicle=" ".join(str(info[key]) for key in ("sys_name", "ver_hw", "ver_sw") if key in info),
         notes=tuple(notes),
-        damage=tuple(_damage(source, log)),
+        damage=tuple(_damage(whole, log)),
         parameters={str(k): float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)},
         events=_events(log, first),
     )
     return Flight(streams, provenance)
 
 
-def _decoded(source: Source) -> Any:
+def _decoded(content: bytes, where: str) -> Any:
     """What pyulog makes of the bytes; whatever it stumbles over is the file's fault."""
-    core = needed("pyulog.core", where=source.name, kind="PX4 ULog file")
-    sizes = re.findall(rb"\w\[(\d{1,20})\] ", source.content)
+    core = needed("pyulog.core", where=where, kind="PX4 ULog file")
+    sizes = re.findall(rb"\w\[(\d{1,20})\] ", content)
     if any(int(size) > _LARGEST for size in sizes):
-        raise FlightError("describes an array that no message can hold: it is damaged or forged.", where=source.name)
+        raise FlightError("describes an array that no message can hold: it is damaged or forged.", where=where)
     try:
         with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            return core.ULog(io.BytesIO(source.content))
+            return core.ULog(io.BytesIO(content))
     except Exception as error:  # a damaged file can raise anything in there
         raise FlightError(
             f"does not read as a ULog file: {str(error) or type(error).__name__}.",
-            where=source.name,
+            where=where,
             hint="It is damaged: copy it again.",
         ) from error
 
@@ -179,20 +178,20 @@ def _stream(
     columns: dict[str, tuple[Array, str]] = {}
     for field, (channel, unit, factor) in topic.fields.items():
         if field in data and channel not in taken and channel not in columns:
-            values = factor * np.asarray(data[field], dtype=np.float64)
+            with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+                values = factor * np.asarray(data[field], dtype=np.float64)
             if unit != "us" or np.any(values > 0.0):  # outputs that nothing is connected to
                 columns[channel] = (values, unit)
     return clocked.made_stream(topic.stream, time, columns, notes=notes)
 
 
-def _damage(source: Source, log: Any) -> list[str]:
+def _damage(whole: Whole, log: Any) -> list[str]:
     found = []
-    if log.file_corruption:
-        found.append("parts of the file are damaged: pyulog skipped them")
-    at, content = _HEADER, source.content
-    while at + 3 <= len(content):
-        at += 3 + struct.unpack_from("<H", content, at)[0]
-    if at != len(content):
+    if whole.lost:
+        found.append(f"{whole.lost} bytes in the middle belong to no message: they were skipped")
+    elif log.file_corruption:
+        found.append("some messages do not fit their descriptions: pyulog skipped them")
+    if whole.unfinished:
         found.append("the log is cut off: its last message is unfinished")
     lost = sum(float(dropout.duration) for dropout in log.dropouts) / 1e3
     if log.dropouts:
