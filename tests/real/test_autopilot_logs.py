@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import read
 from swashplate.flights.readers.dataflash import messages
+from swashplate.flights.sweeps import sweeps
 
 # NOTES.md beside the logs: file, axis, magnitude, band, fades and record as flown, rate of the fast messages.
 FLOWN = [
@@ -104,3 +106,43 @@ def test_a_dataflash_log_of_four_messages_with_a_sensor_on_its_back(shared_data:
     assert flight.rate("az") == pytest.approx(181.0, rel=0.01)
     assert flight.rate("phi") == pytest.approx(49.8, rel=0.01)
     assert any("forward-right-down" in note for note in flight.provenance.notes)
+
+
+@pytest.mark.parametrize("name", ["heli_sid_roll_mix.BIN", "heli_sid_pitch_mix.BIN", "heli_sid_coll_mix.BIN"])
+def test_the_sweep_is_also_seen_in_the_commands_alone(logs: dict[str, Flight], name: str) -> None:
+    flight = logs[name]
+    (told,) = sweeps(flight)
+    streams = {key: data for key, data in flight.streams.items() if key != "system_identification"}
+    blind = replace(flight, provenance=replace(flight.provenance, events=()), streams=streams)
+    (seen,) = sweeps(blind)
+    assert (
+        seen.channel
+        == {10: "mixer_roll", 11: "mixer_pitch", 13: "mixer_collective"}[
+            next(e.details["axis"] for e in flight.provenance.events if e.kind == "sweep")
+        ]
+    )
+    # The loop takes most of the slow end out of the command: it is seen some seconds late.
+    assert seen.start == pytest.approx(told.start, abs=9.0)
+    assert seen.stop == pytest.approx(told.stop, abs=1.0)
+    assert seen.low == pytest.approx(told.low, rel=0.2)
+    assert seen.high == pytest.approx(told.high, rel=0.1)
+
+
+def test_a_real_multirotor_sweep_is_seen_in_a_bare_table(shared_data: Path) -> None:
+    columns = {"time": {"column": 1, "unit": "s"}, "controller": {"column": 2, "unit": "1"}}
+    flight = read(shared_data / "x8" / "x8roll.csv", mapping={"header": False, "channels": columns})
+    (seen,) = sweeps(flight)
+    assert seen.channel == "controller"
+    assert seen.low < 0.2
+    assert seen.high == pytest.approx(14.0, rel=0.2)
+    assert seen.stop == pytest.approx(70.0, abs=1.0)
+
+
+def test_nothing_is_seen_where_nothing_was_swept(shared_data: Path, flight_august: Path) -> None:
+    names = ("time", "stick_lateral", "stick_longitudinal", "stick_pedal", "stick_collective")
+    columns = {name: {"column": name, "unit": "s" if name == "time" else "1"} for name in names}
+    for flight in (
+        read(shared_data / "trex550" / "trex550_flight.csv", mapping={"channels": columns}),
+        read(flight_august),
+    ):
+        assert sweeps(flight) == ()

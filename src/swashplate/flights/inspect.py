@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION, channel, is_known
+from swashplate.flights.sweeps import Sweep, sweeps
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 _GAP = 3.0  # median steps; a step longer than this has lost at least two samples
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
+_NEAR = 25  # changes on each side that are its neighbours
+_ORDINARY = ("rcin_", "rcout_")  # switches and unused outputs hardly ever move
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 
 
@@ -52,8 +55,8 @@ class ChannelSummary:
         low, high, median: over the finite samples.
         missing: samples that are not finite.
         constant: never moves.
-        outliers: sample-to-sample changes beyond 12 robust standard deviations (1.4826 MAD) of all of them; for the
-            four channels of a quaternion, those of the rotation between samples.
+        outliers: sample-to-sample changes beyond 12 robust standard deviations (1.4826 MAD) of all of them and of their
+            neighbours; for the four channels of a quaternion, those of the rotation between samples.
     """
 
     name: str
@@ -69,7 +72,13 @@ class ChannelSummary:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What `inspect` found; prints as tables in a terminal (rich) and as text."""
+    """What `inspect` found; prints as tables in a terminal (rich) and as text.
+
+    Attributes:
+        sweeps: frequency sweeps in the flight.
+        damage: what is broken in the file itself; it stands among the problems too.
+        vehicle: as the log names it.
+    """
 
     source: str
     simulated: bool
@@ -78,6 +87,9 @@ class Inspection:
     channels: tuple[ChannelSummary, ...]
     notes: tuple[str, ...]
     problems: tuple[str, ...]
+    sweeps: tuple[Sweep, ...] = ()
+    damage: tuple[str, ...] = ()
+    vehicle: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain JSON types (NaN becomes None)."""
@@ -115,14 +127,18 @@ class Inspection:
         return [head, *rows]
 
     def _title(self) -> str:
-        return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{', simulated' if self.simulated else ''}"
+        whose = f", {self.vehicle}" if self.vehicle else ""
+        return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{whose}{', simulated' if self.simulated else ''}"
+
+    def _lists(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        return (("sweeps", tuple(map(str, self.sweeps))), ("problems", self.problems), ("notes", self.notes))
 
     def __str__(self) -> str:
         lines = [self._title()]
         for rows in (self.stream_rows(), self.channel_rows()):
             widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
             lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
-        for heading, texts in (("problems", self.problems), ("notes", self.notes)):
+        for heading, texts in self._lists():
             lines += ["", f"{heading}: {'' if texts else 'none'}".rstrip(), *(f"  - {text}" for text in texts)]
         return "\n".join(lines)
 
@@ -139,8 +155,8 @@ class Inspection:
             for row in rows:
                 table.add_row(*map(escape, row))
             parts += ["", table]
-        parts += ["", "[bold]problems[/bold]", *(f"  • {escape(text)}" for text in self.problems or ("none",))]
-        parts += ["", "[bold]notes[/bold]", *(f"  • {escape(text)}" for text in self.notes or ("none",))]
+        for title, texts in self._lists():
+            parts += ["", f"[bold]{title}[/bold]", *(f"  • {escape(text)}" for text in texts or ("none",))]
         return Group(*parts)
 
 
@@ -169,11 +185,17 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
 def _jumps(changes: Array) -> NDArray[np.bool_]:
     """Changes between samples that are far outside the scatter of all changes (Hampel's identifier on differences).
 
-    A channel that is held between updates has a scatter of zero; only channels that move at most samples are judged.
+    They must be outside the scatter of their neighbours too: a sweep's changes grow with its frequency, all of them. A
+    channel that is held between updates has a scatter of zero; only channels that move at most samples are judged.
     """
     off = np.abs(changes - np.median(changes)) if changes.size else changes
     sigma = _MAD_TO_SIGMA * float(np.median(off)) if changes.size else 0.0
-    return np.asarray(off > _OUTLIER * sigma) if sigma > 0.0 else np.zeros(changes.shape, dtype=np.bool_)
+    if sigma == 0.0:
+        return np.zeros(changes.shape, dtype=np.bool_)
+    jumps = np.asarray(off > _OUTLIER * sigma)
+    for i in np.flatnonzero(jumps).tolist():
+        jumps[i] = off[i] > _OUTLIER * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
+    return jumps
 
 
 def _attitude_jumps(flight: Flight) -> int:
@@ -233,7 +255,7 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
     problems = []
     if summary.missing:
         problems.append(f"{summary.name}: {summary.missing} samples are not finite")
-    if summary.constant:
+    if summary.constant and not summary.name.startswith(_ORDINARY):
         problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
     if summary.outliers:
         name = "attitude" if summary.name in QUATERNION else summary.name
@@ -243,13 +265,14 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
 
 
 def inspect(flight: Flight) -> Inspection:
-    """Summary of a flight: channels, units, rates, gaps, jitter, constant channels, jumps, and the problems in words.
+    """Summary of a flight: channels, units, rates, gaps, jitter, constants, jumps, sweeps, the problems in words.
 
     Nothing is repaired; conditioning does that.
     """
     streams = tuple(_summarise_stream(name, data) for name, data in flight.streams.items())
     channels = tuple(_summarise_channel(flight, name, flight.stream_of(name)) for name in flight.channels)
-    problems = [text for stream in streams for text in _stream_problems(stream)]
+    damage = flight.provenance.damage
+    problems = [*damage, *(text for stream in streams for text in _stream_problems(stream))]
     problems += [text for summary in channels for text in _channel_problems(summary)]
     return Inspection(
         source=flight.provenance.source,
@@ -259,4 +282,7 @@ def inspect(flight: Flight) -> Inspection:
         channels=channels,
         notes=flight.provenance.notes,
         problems=tuple(dict.fromkeys(problems)),  # the attitude's jumps stand at each of its four channels
+        sweeps=sweeps(flight),
+        damage=damage,
+        vehicle=flight.provenance.vehicle,
     )

@@ -109,6 +109,14 @@ _VARIANTS = {
 }
 _VARIED = (*ATTITUDE, *RATES, "ax", "ay", "az", "vx", "vy", "vz")
 _PULSES = {"rcin": "pulse width received from the pilot", "rcout": "pulse width sent to a servo or motor"}
+_LOGGED = {
+    entry.name: entry
+    for entry in (
+        Channel("sid_target", "", "what ArduPilot's System ID mode adds, in the unit of its axis"),
+        Channel("sid_frequency", "Hz", "frequency of ArduPilot's chirp"),
+        Channel("altitude_baro", "m", "barometric altitude above the start, up positive"),
+    )
+}
 _NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")
 
 
@@ -116,6 +124,8 @@ def _family(name: str) -> Channel | None:
     """The entry of a name that stands for a family: `p_imu2`, `phi_demand`, `rcin_3`, `rcout_12`."""
     if _NUMBERED.fullmatch(name):
         return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us")
+    if name in _LOGGED:
+        return _LOGGED[name]
     base, _, variant = name.partition("_")
     if base in _VARIED and variant in _VARIANTS:
         plain = CHANNELS[base]
