@@ -12,7 +12,18 @@ from typing import Any, Protocol, cast
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import ardupilot, coax56, delimited, netcdf, optitrack, px4log, rosbag, ulog, vicon
+from swashplate.flights.readers import (
+    analogue,
+    ardupilot,
+    coax56,
+    delimited,
+    netcdf,
+    optitrack,
+    px4log,
+    rosbag,
+    ulog,
+    vicon,
+)
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
 
@@ -53,7 +64,8 @@ def read(
         units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
             or the wrong ones.
         mapping: a TOML file, or its content as a dictionary, that says which columns of a CSV file are which channels
-            (`readers/delimited.py`); its table `[mocap]` may hold the next four.
+            (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a table `[recorder]` it is the
+            calibration of an analogue recorder (`readers/analogue.py`).
         body: the tracked body, where a motion capture file has several.
         rotation: how three logged angles are meant: "helical" or "euler_xyz", where the file does not say.
         body_axes: where the tracked body's logged axes point, for example "forward-left-up" (a bag's default).
@@ -76,6 +88,8 @@ def read(
         world_axes=world_axes,
         bad_stamps=bad_stamps,
     )
+    if analogue.is_calibration(options.mapping):
+        return analogue.read(source, options)
     for reader in READERS:
         if reader.recognises(source):
             return reader.read(source, options)
