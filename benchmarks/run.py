@@ -1,4 +1,4 @@
-"""What swashplate promises about the simulation's speed, side by side with its peers, measured in one run.
+"""What swashplate promises about speed, side by side with its peers, measured in one run.
 
 python -m benchmarks.run [--short] [--out FILE.json]
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import many, peers, single
+from benchmarks import identifying, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -76,8 +76,21 @@ def main() -> None:
         verdict = "" if result.target is None else ("met" if result.met else "MISSED")
         table.add_row(result.name, f"{result.rate:,.0f}", promised, verdict, result.note)
     Console().print(table)
+    spans = identifying.measure(short=options.short)
+    table = Table(title="Seconds of an identification")
+    for heading in ("what", "seconds", "promised", "", "note"):
+        table.add_column(heading, justify="right" if heading in ("seconds", "promised") else "left")
+    for span in spans:
+        table.add_row(
+            span.name, f"{span.seconds:.2f}", f"{span.target:.2f}", "met" if span.met else "MISSED", span.note
+        )
+    Console().print(table)
     if options.out is not None:
-        document = {"machine": where, "results": [result.as_json() for result in results]}
+        document = {
+            "machine": where,
+            "results": [result.as_json() for result in results],
+            "spans": [span.as_json() for span in spans],
+        }
         options.out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 

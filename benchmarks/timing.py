@@ -1,4 +1,4 @@
-"""How a rate is measured: the best of several repeats, since other programs only ever make it slower."""
+"""How rates and durations are told; a rate is the best of several repeats, since others only ever make it slower."""
 
 from __future__ import annotations
 
@@ -26,6 +26,32 @@ class Result:
     @property
     def met(self) -> bool:
         return self.target is None or self.rate >= self.target
+
+    def as_json(self) -> dict[str, object]:
+        return {**asdict(self), "met": self.met}
+
+
+@dataclass(frozen=True)
+class Span:
+    """One measured duration.
+
+    Attributes:
+        name: what ran.
+        seconds: how long.
+        target: the most that is promised.
+        note: what must be known to compare it.
+        kept: other promises about the same run (memory).
+    """
+
+    name: str
+    seconds: float
+    target: float
+    note: str = ""
+    kept: bool = True
+
+    @property
+    def met(self) -> bool:
+        return self.kept and self.seconds <= self.target
 
     def as_json(self) -> dict[str, object]:
         return {**asdict(self), "met": self.met}

@@ -6,16 +6,10 @@ from pathlib import Path
 
 import pytest
 
-import swashplate as sp
-from swashplate.simulation.sensors import QUIET
+from simulated_flights import ten_seconds
 
 
 @pytest.fixture(scope="session")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated log of 10 s, as netCDF."""
-    coax = sp.vehicle("coax")
-    flight = sp.simulate_maneuver(coax, "multisine:roll+pitch,0.4-4Hz,8s,0.1", controller=sp.hover_hold, lead=1, tail=1)
-    log = sp.observe(flight, coax, sensors=QUIET, seed=3)
-    # The battery's own rate is left out: this flight is about the motion.
-    log = log.with_streams({name: data for name, data in log.streams.items() if name != "battery"})
-    return log.save(tmp_path_factory.mktemp("flights") / "simulated.nc")
+    return ten_seconds().save(tmp_path_factory.mktemp("flights") / "simulated.nc")

@@ -13,9 +13,14 @@ from commands import one_message, swash
 from scipy.io import savemat
 
 from made_logs import coax_record, dimensions, write_coax
+from simulated_flights import FREE, TIE
+from swashplate.flights.flight import Flight
 from swashplate.vehicles.card import packaged_cards
 
 LONG = 600  # samples: 4 s, long enough for what is not about length
+SERVOS = ("servo_roll", "servo_pitch")
+TOLD_BY_NOTHING = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
+"""The same free parameters as in the end-to-end test: nothing compiles anew."""
 
 
 def _gigantic(path: Path) -> Path:
@@ -54,8 +59,8 @@ def _with(name: str, change: Callable[[np.ndarray[Any, Any]], Any]) -> Callable[
     return write
 
 
-def _nan_everywhere(x: np.ndarray[Any, Any]) -> None:
-    x[1] = np.nan
+def _one_nan(position: np.ndarray[Any, Any]) -> None:
+    position[1, 100] = np.nan
 
 
 def _back(time: np.ndarray[Any, Any]) -> None:
@@ -70,17 +75,22 @@ BAD: dict[str, tuple[Callable[[Path], Path], str, tuple[str, ...]]] = {
     "missing file": (lambda p: p, "a.mat", ("no such file",)),
     "a folder": (lambda p: (p.mkdir(), p)[1], "a.mat", ("is a folder",)),
     "empty file": (lambda p: _text(p, ""), "a.mat", ("empty",)),
-    "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ()),
+    "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ("is not a MATLAB .mat file",)),
     "wrong struct": (lambda p: _mat(p, Bench=np.ones(3)), "a.mat", ("Bench", "struct 'Data'")),
     "missing channel": (lambda p: write_coax(p, orientation=None), "a.mat", ("orientation",)),
+    "one NaN": (_with("position", _one_nan), "a.mat", ("position", "1 of 600 samples", "sample 100")),
     "wrong units": (_with("position", lambda x: 1000.0 * x + 1e6), "a.mat", ("position",)),
-    "NaN only": (_with("inputs", lambda x: np.full_like(x, np.nan)), "a.mat", ()),
+    "NaN only": (_with("inputs", lambda x: np.full_like(x, np.nan)), "a.mat", ("inputs", "600 of 600 samples")),
     "time backwards": (_with("time", _back), "a.mat", ("time",)),
     "time doubled": (_with("time", _twice), "a.mat", ("time",)),
-    "one sample": (lambda p: _mat(p, Data={k: np.atleast_2d(v)[:, :1] for k, v in coax_record().items()}), "a.mat", ()),
-    "too short": (lambda p: write_coax(p), "a.mat", ()),
+    "one sample": (
+        lambda p: _mat(p, Data={k: np.atleast_2d(v)[:, :1] for k, v in coax_record().items()}),
+        "a.mat",
+        ("time", "one sample"),
+    ),
+    "too short": (lambda p: write_coax(p), "a.mat", ("0.073 s", "1.000 s")),
     "gigantic header": (_gigantic, "a.mat", ("claims 10,000,000,000",)),
-    "csv without units": (lambda p: _text(p, "time,x\n0,1\n1,2\n"), "a.csv", ()),
+    "csv without units": (lambda p: _text(p, "time,x\n0,1\n1,2\n"), "a.csv", ("time", "no unit")),
     "csv wrong unit": (lambda p: _text(p, "time [s],x [kg]\n0,1\n1,2\n"), "a.csv", ("x", "kg")),
 }
 
@@ -107,9 +117,55 @@ def test_a_constant_input_is_seen_by_inspect(tmp_path: Path) -> None:
     assert "servo_roll: never moves" in outcome.out
 
 
-def test_a_flight_without_an_input_is_refused(simulated: Path, tmp_path: Path) -> None:
-    from swashplate.flights.flight import Flight
+def _standing(path: Path) -> Path:
+    """A log long enough to work on in which no command ever moves."""
+    record = coax_record(LONG)
+    return _mat(path, Data={**record, "inputs": np.tile([[0.55], [0.55], [0.0], [0.1]], (1, LONG))})
 
+
+def test_a_flight_whose_inputs_are_all_constant_is_refused(simulated: Path, tmp_path: Path) -> None:
+    """By every verb that learns or judges; the simulated flight stands beside it and does not help."""
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    path = _standing(logs / "a.mat")
+    for arguments in (
+        ("identify", "--vehicle", "coax", "--flight", path, "--out", tmp_path / "fit"),
+        ("validate", "--model", "coax", "--flight", path, "--out", tmp_path / "fit"),
+    ):
+        message = one_message(swash(*arguments))
+        for part in ("a.mat", "servo_roll", "no input ever moves", "fly a sweep"):
+            assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["logs"]
+
+
+def test_a_constant_input_is_named_in_words_and_refuses_what_only_it_could_tell(
+    simulated: Path, tmp_path: Path
+) -> None:
+    """Both servos stand still at zero, so their linkage leaves no trace; the motors move on."""
+    flight = Flight.load(simulated)
+    streams = dict(flight.streams)
+    streams["inputs"] = streams["inputs"].assign({name: 0.0 * streams["inputs"][name] for name in SERVOS})
+    path = flight.with_streams(streams).save(tmp_path / "still.nc")
+    out = tmp_path / "fit"
+    message = one_message(swash("identify", "--vehicle", "coax", "--flight", path, *TOLD_BY_NOTHING, "--out", out))
+    for part in ("still.nc", "linkage_lower", "no information", "fly what moves it"):
+        assert part in message, message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["still.nc"]
+
+
+def test_a_parameter_that_the_flight_cannot_tell_is_refused(simulated: Path, tmp_path: Path) -> None:
+    """Without a linkage from the bar to the blades its time constant leaves no trace."""
+    refused = swash(
+        *("identify", "--vehicle", "coax", "--flight", simulated, *TOLD_BY_NOTHING),
+        *("--fix", "linkage_upper=0", "--out", tmp_path / "fit"),
+    )
+    message = one_message(refused)
+    for part in ("simulated", "tau_f_upper", "no information", "prior"):
+        assert part in message, message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_without_an_input_is_refused(simulated: Path, tmp_path: Path) -> None:
     flight = Flight.load(simulated)
     streams = dict(flight.streams)
     streams["inputs"] = streams["inputs"].drop_vars("motor_upper")
@@ -162,16 +218,20 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--fix", "mas=0.3"), ("mas", "no such parameter")),
         (("--fix", "mass"), ("--fix", "NAME=VALUE")),
         (("--fix", "mass=heavy"), ("--fix", "heavy")),
+        (("--fix", "mass=-0.3"), ("mass", "-0.3 kg", "physics allows")),
         (("--fix", "mass=nan"), ("--fix", "nan")),
         (("--fix", "mass=0.3", "--fix", "mass=0.4"), ("mass", "twice")),
         (("--prior", "mass=0.3"), ("--prior", "2 numbers")),
         (("--prior", "tau_f_upper=1,-1"), ("tau_f_upper", "positive")),
         (("--tie", "a_beta_u = __import__('os')"), ("__import__",)),
         (("--tie", "nonsense = mass"), ("nonsense",)),
+        (("--tie", "drag_x = drag_y", "--tie", "drag_y = drag_x"), ("circle", "drag_x")),
+        (("--prior", "mass=0.3,0.1"), ("mass", "not free")),
         (("--free", "tau_f_uper"), ("tau_f_uper",)),
         (("--free", "mass,mass"), ("twice",)),
         (("--unit", "x"), ("--unit", "NAME=VALUE")),
         (("--cutoff", "80"), ("80",)),
+        (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
     ],
 )
 def test_a_wrong_option_is_refused(

@@ -9,15 +9,16 @@ import pytest
 from commands import swash
 
 import swashplate as sp
+from simulated_flights import FREE, TIE
 
-FREE = "tau_f_upper,linkage_lower"
+ASKED = ("--free", ",".join(FREE), "--tie", TIE)
 METHOD = ("--method", "output-error")  # nothing disturbs this flight, and it is the quicker one
 
 
 @pytest.fixture(scope="module")
 def fitted(simulated: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("end-to-end") / "fit"
-    outcome = swash("identify", "--vehicle", "coax", "--flight", simulated, "--free", FREE, *METHOD, "--out", out)
+    outcome = swash("identify", "--vehicle", "coax", "--flight", simulated, *ASKED, *METHOD, "--out", out)
     assert outcome.code == 0, outcome.err
     return out
 
@@ -26,7 +27,7 @@ def test_the_truth_is_recovered(fitted: Path) -> None:
     fit, truth = json.loads((fitted / "fit.json").read_text(encoding="utf-8")), sp.vehicle("coax").card.values()
     assert not fit["failed"]
     by_name = {entry["name"]: entry for entry in fit["parameters"]}
-    for name in FREE.split(","):
+    for name in FREE:
         entry = by_name[name]
         assert abs(entry["value"] - truth[name]) < 4.0 * entry["sigma_corrected"], entry
 

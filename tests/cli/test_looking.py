@@ -24,7 +24,7 @@ def test_inspect_shows_streams_channels_and_problems(simulated: Path) -> None:
 
 def test_inspect_as_json(simulated: Path) -> None:
     document = json.loads(swash("inspect", simulated, "--json").out)
-    assert {stream["name"] for stream in document["streams"]} == {"motion", "inputs"}
+    assert {stream["name"] for stream in document["streams"]} == {"motion", "inputs", "battery"}
     assert document["simulated"] is True
 
 

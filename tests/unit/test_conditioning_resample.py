@@ -108,6 +108,14 @@ def test_the_shortest_record_is_just_long_enough(order: int, cutoff: float | tup
         filtered(values[1:], rate=100.0, cutoff=cutoff, order=order)
 
 
+def test_a_piece_shorter_than_one_period_of_the_corner_is_an_error() -> None:
+    t = np.arange(400) / 100.0
+    flight = Flight({"uniform": stream(t, {"x": np.sin(t)})}, segments=((0.0, 2.5), (2.6, 3.99)))
+    assert lowpass(flight, cutoff=0.8).channels == ("x",)
+    with pytest.raises(FlightError, match=r"a piece of 1\.390 s is too short for a filter of 0\.5 Hz.*2\.000 s"):
+        lowpass(flight, cutoff=0.5)
+
+
 def test_a_corner_above_half_the_rate_is_an_error() -> None:
     with pytest.raises(FlightError, match=r"60\.0.* 100 Hz"):
         filtered(np.zeros(100), rate=100.0, cutoff=60.0)

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from swashplate.control.hold import hover_hold
 from swashplate.flights.flight import Flight, Provenance, stream
 from swashplate.flights.inspect import inspect
+from swashplate.simulation.closed_loop import simulate_maneuver
+from swashplate.vehicles.catalogue import vehicle
 
 N = 400
 
@@ -61,6 +64,41 @@ def test_constant_missing_and_outlying_channels_are_named() -> None:
     assert "y: 1 samples are not finite" in found.problems
     assert "motor_lower: never moves, so nothing can be learnt from it" in found.problems
     assert len(found.problems) == 3
+
+
+def test_a_command_may_step_but_not_spike_and_not_leave_its_range() -> None:
+    stepped, spiked, wild = (0.001 * np.sin(np.arange(N)) for _ in range(3))
+    stepped[100:200] += 0.2
+    spiked[50] += 0.2
+    wild[-3:] = (1.0, 1.01, 1.2)
+    problems = inspect(_flight(servo_roll=stepped, servo_pitch=spiked, motor_upper=0.5 + 0.4 * wild)).problems
+    assert problems == ("servo_pitch: 2 jumps beyond 12 robust sigmas (outliers?)",)
+    problems = inspect(_flight(servo_roll=wild)).problems
+    assert problems == ("servo_roll: 2 samples outside -1 to 1, which no command is",)
+
+
+@pytest.mark.parametrize("between", [0.0, 1e-17])
+@pytest.mark.parametrize("every", [2, 5, 40])
+def test_a_channel_that_a_slower_clock_updates_has_no_jumps(between: float, every: int) -> None:
+    """Between its updates it holds, or moves by rounding."""
+    rng = np.random.default_rng(every)
+    held = np.repeat(rng.standard_normal(N // every), every) + between * np.arange(N)
+    assert inspect(_flight(x=held)).problems == ()
+
+
+def test_a_slight_change_of_a_still_channel_is_no_jump_and_a_large_one_is() -> None:
+    rng = np.random.default_rng(1)
+    slight = np.concatenate([np.linspace(0.0, 5.0, N // 2), 5.0 + 1e-6 * rng.standard_normal(N // 2)])
+    slight[300] += 4e-3
+    assert inspect(_flight(x=slight)).problems == ()
+    slight[300] += 2.0
+    assert inspect(_flight(x=slight)).problems == ("x: 2 jumps beyond 12 robust sigmas (outliers?)",)
+
+
+def test_a_simulated_maneuver_under_a_slow_controller_has_no_jumps() -> None:
+    """Commands of a 50 Hz controller in a 100 Hz log stand still at every other sample."""
+    flown = simulate_maneuver(vehicle("coax"), "sweep:pitch,2-8Hz,5s", controller=hover_hold)
+    assert [problem for problem in inspect(flown).problems if "jump" in problem] == []
 
 
 def test_a_quaternion_that_flips_its_sign_has_no_outliers_but_one_that_jumps_has() -> None:

@@ -92,4 +92,4 @@ def simulated_log(vehicle: Vehicle, maneuver: str, *, seed: int, rate: float = 1
         start=start,
         rate=rate,
     )
-    return sp.observe(flight, aircraft, sensors=sp.Sensors(voltage_rate=50.0), seed=seed)
+    return sp.observe(flight, aircraft, seed=seed)

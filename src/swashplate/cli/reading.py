@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,7 +38,7 @@ def split_window(text: str) -> tuple[str, tuple[float, float] | None]:
 
 
 def read(text: str, *, how: Reading | None = None) -> Flight:
-    """The flight, or the window of one, that `text` names, as logged.
+    """The flight, or the window of one, that `text` names, as logged; a saved simulation by its file's name.
 
     Raises:
         FlightError, UnitError, DatasetError: as the readers say.
@@ -53,6 +53,9 @@ def read(text: str, *, how: Reading | None = None) -> Flight:
         units=chosen.units,
         bad_stamps="drop" if chosen.drop_bad_stamps else "error",
     )
+    if flight.provenance.simulated:
+        # Messages and reports name the file, not "simulated coax", of which there may be several.
+        flight = replace(flight, provenance=replace(flight.provenance, source=Path(file).name))
     if window is None:
         return flight
     start, stop = window

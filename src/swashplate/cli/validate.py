@@ -22,7 +22,7 @@ def validate(
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
     every: Annotated[float, typer.Option("--every", help="Seconds between start points.", min=0.01)] = 0.1,
     calibration: Annotated[
-        float, typer.Option("--calibration", help="Seconds at each start that tell delays and trims.", min=0.0)
+        float, typer.Option("--calibration", help="Seconds at each start that tell delays and trims.", min=1.0)
     ] = 5.0,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,

@@ -100,10 +100,18 @@ def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool =
         zero_phase: False runs it once, forwards, as a recorder's own filter would.
 
     Raises:
-        FlightError: a segment is shorter than the filter needs.
+        FlightError: a segment is shorter than the filter needs, or than one period of its corner.
     """
     rate = uniform_rate(flight)
     ((name, data),) = flight.streams.items()
+    briefest = min(stop - start for start, stop in flight.segments or ((flight.start, flight.stop),))
+    if cutoff > 0 and briefest < 1.0 / cutoff:
+        raise FlightError(
+            f"a piece of {briefest:.3f} s is too short for a filter of {cutoff:g} Hz, expected at least one period "
+            f"({1.0 / cutoff:.3f} s).",
+            where=flight.provenance.source or None,
+            hint="Raise the cutoff, use a longer record, or condition with cutoff=0 (no filter).",
+        )
     values = {str(n): np.asarray(v.values, dtype=np.float64) for n, v in data.data_vars.items()}
     try:
         smooth = {

@@ -24,6 +24,11 @@ _OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
 _NEAR = 25  # changes on each side that are its neighbours
 _ORDINARY = ("rcin_", "rcout_")  # switches and unused outputs hardly ever move
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
+_Q95_TO_SIGMA = 1.0 / 1.95996  # of a normal distribution: 1 / Phi^-1(0.975)
+_SLIGHT = 1e-3  # of the channel's span; a smaller change is no jump, however still the channel is otherwise
+_COMMANDS = {"motor_lower": (0, 1), "motor_upper": (0, 1), "servo_roll": (-1, 1), "servo_pitch": (-1, 1)}
+"""Channels that may step, and their ranges."""
+_STEPPING = ("mixer_", "stick_", *_ORDINARY)  # commands of autopilots and pilots: they may step too
 
 
 @dataclass(frozen=True)
@@ -55,8 +60,10 @@ class ChannelSummary:
         low, high, median: over the finite samples.
         missing: samples that are not finite.
         constant: never moves.
-        outliers: sample-to-sample changes beyond 12 robust standard deviations (1.4826 MAD) of all of them and of their
-            neighbours; for the four channels of a quaternion, those of the rotation between samples.
+        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them and of their neighbours;
+            for the four channels of a quaternion, those of the rotation between samples; for a command, which may step,
+            only those that the next sample takes back.
+        outside: samples of a command that lie outside its range (motors 0 to 1, servos -1 to 1).
     """
 
     name: str
@@ -68,6 +75,7 @@ class ChannelSummary:
     missing: int
     constant: bool
     outliers: int
+    outside: int
 
 
 @dataclass(frozen=True)
@@ -185,17 +193,29 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
 def _jumps(changes: Array) -> NDArray[np.bool_]:
     """Changes between samples that are far outside the scatter of all changes (Hampel's identifier on differences).
 
-    They must be outside the scatter of their neighbours too: a sweep's changes grow with its frequency, all of them. A
-    channel that is held between updates has a scatter of zero; only channels that move at most samples are judged.
+    The scatter is the larger of what half and what 95 % of the changes give: a channel that is held between the updates
+    of a slower clock (and moves there by rounding only) is judged by its updates. One that hardly ever moves is not
+    judged, and a change that is slight beside the channel's span is no jump. Nor is one that is usual among its
+    neighbours: a sweep's changes grow with its frequency, all of them.
     """
-    off = np.abs(changes - np.median(changes)) if changes.size else changes
-    sigma = _MAD_TO_SIGMA * float(np.median(off)) if changes.size else 0.0
-    if sigma == 0.0:
+    if not changes.size:
+        return np.zeros(0, dtype=np.bool_)
+    off = np.abs(changes - np.median(changes))
+    sigma = max(_MAD_TO_SIGMA * float(np.median(off)), _Q95_TO_SIGMA * float(np.quantile(off, 0.95)))
+    span = float(np.ptp(np.cumsum(changes)))
+    if not sigma > np.finfo(np.float64).eps * span:
         return np.zeros(changes.shape, dtype=np.bool_)
-    jumps = np.asarray(off > _OUTLIER * sigma)
+    jumps = np.asarray(off > max(_OUTLIER * sigma, _SLIGHT * span))
     for i in np.flatnonzero(jumps).tolist():
         jumps[i] = off[i] > _OUTLIER * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
     return jumps
+
+
+def _spikes(changes: Array) -> NDArray[np.bool_]:
+    """Jumps that the next sample takes back: what no flight computer commands."""
+    jumps = _jumps(changes)
+    there = jumps[:-1] & jumps[1:] & (changes[:-1] * changes[1:] < 0.0)
+    return np.append(there, False) | np.insert(there, 0, False)
 
 
 def _attitude_jumps(flight: Flight) -> int:
@@ -220,10 +240,13 @@ def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
     shown = values * known.shown_factor
     finite = shown[np.isfinite(shown)]
     low, median, high = (finite.min(), np.median(finite), finite.max()) if finite.size else (np.nan,) * 3
+    bounds = _COMMANDS.get(name, (-np.inf, np.inf))
     if name in QUATERNION and all(other in flight for other in QUATERNION):
         outliers = _attitude_jumps(flight)
     else:
-        outliers = int(np.sum(_jumps(np.diff(values[np.isfinite(values)]))))
+        changes = np.diff(values[np.isfinite(values)])
+        steps = name in _COMMANDS or name.startswith(_STEPPING) or name.endswith("_demand")
+        outliers = int(np.sum(_spikes(changes) if steps else _jumps(changes)))
     return ChannelSummary(
         name=name,
         stream=home,
@@ -234,6 +257,7 @@ def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
         missing=int(values.size - finite.size),
         constant=bool(finite.size > 1 and low == high),
         outliers=outliers,
+        outside=int(np.sum((finite < bounds[0]) | (finite > bounds[1]))),
     )
 
 
@@ -257,6 +281,10 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
         problems.append(f"{summary.name}: {summary.missing} samples are not finite")
     if summary.constant and not summary.name.startswith(_ORDINARY):
         problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
+    if summary.outside:
+        low, high = _COMMANDS[summary.name]
+        samples = "sample" if summary.outside == 1 else "samples"
+        problems.append(f"{summary.name}: {summary.outside} {samples} outside {low} to {high}, which no command is")
     if summary.outliers:
         name = "attitude" if summary.name in QUATERNION else summary.name
         jumps = "jump" if summary.outliers == 1 else "jumps"

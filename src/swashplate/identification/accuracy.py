@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
@@ -52,7 +53,10 @@ def corrected_covariance(
 
         Sigma = M^-1 [ sum_i sum_j S_i' R^-1 Rvv(i-j) R^-1 S_j ] M^-1
 
-    in whitened form. The sample autocorrelations are tapered linearly (Bartlett), which keeps the result positive.
+    in whitened form, with one autocorrelation for all records. Residuals are the errors less what the fit took out of
+    them, `v = (1 - S M^-1 S') e`, so their products fall short of the errors'; what a white error loses is added back
+    (without it windows with their own initial states look less correlated than they are). The autocorrelation is
+    tapered linearly (Bartlett), which keeps the result positive; the double sum is taken in the frequency domain.
 
     Args:
         plain: M^-1, scaled, shape (p, p).
@@ -61,19 +65,49 @@ def corrected_covariance(
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
     """
-    p = plain.shape[0]
+    moved = [np.flatnonzero(np.any(sensitivity, axis=(1, 2))) for sensitivity in sensitivities]
+    pieces = [sensitivity[own] for sensitivity, own in zip(sensitivities, moved, strict=True)]
+    products = [
+        _products(residual, residual, lags) + _products(*_taken(piece, plain[np.ix_(own, own)]), lags)
+        for residual, piece, own in zip(whitened, pieces, moved, strict=True)
+    ]
+    taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
+    correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
     middle = np.diag(prior).astype(np.float64)
-    for residual, sensitivity in zip(whitened, sensitivities, strict=True):
-        n = residual.shape[0]
-        middle_record = np.zeros((p, p))
-        for lag in range(min(lags, n - 1) + 1):
-            correlation = residual[: n - lag].T @ residual[lag:] / n
-            left = (sensitivity[:, : n - lag] @ correlation).reshape(p, -1)
-            product = left @ sensitivity[:, lag:].reshape(p, -1).T
-            taper = 1.0 - lag / (lags + 1.0)
-            middle_record += taper * (product if lag == 0 else product + product.T)
-        middle += middle_record
+    for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
+        middle[np.ix_(own, own)] += _spread(correlation, piece)
     return np.asarray(plain @ middle @ plain)
+
+
+def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
+    """Two rows of which the products over time are what the fit takes out of a white error, each (n, m, p)."""
+    seen = sensitivity.transpose(1, 2, 0)
+    return seen @ plain, seen
+
+
+def _products(left: Array, right: Array, lags: int) -> Array:
+    """sum_t left(t) right(t + lag)' for lags 0 to `lags`, over a last axis too where there is one; (lags + 1, m, m)."""
+    n = len(left)
+    size = next_fast_len(n + lags, real=True)  # long enough for the sums not to wrap round
+    a, b = (rfft(x.reshape(n, x.shape[1], -1), size, axis=0) for x in (left, right))
+    return np.asarray(irfft(a.conj() @ b.transpose(0, 2, 1), size, axis=0)[: lags + 1])
+
+
+def _spread(correlation: Array, sensitivity: Array) -> Array:
+    """Covariance of sum_t S_t' v_t for errors v with a one-sided autocorrelation (lags + 1, m, m), shape (p, p)."""
+    n, lags, m = sensitivity.shape[1], len(correlation) - 1, correlation.shape[1]
+    size = next_fast_len(n + lags, real=True)
+    both = np.zeros((size, m, m))
+    both[: lags + 1] = correlation.transpose(0, 2, 1)
+    both[size - lags :] = correlation[:0:-1]
+    spectrum = rfft(both, axis=0)
+    moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
+    share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
+    share[0] = 1.0 / size
+    if size % 2 == 0:
+        share[-1] = 1.0 / size
+    left = (moved.conj() * share[:, None, None]).reshape(-1, moved.shape[2])
+    return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
 
 
 def marginal_information(information: Array, prior: Array, places: Array) -> Array:

@@ -6,6 +6,7 @@ expression = number | name | expression (+ - * /) expression | -expression | (ex
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -18,6 +19,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: lambda a, b: a / b,
 }
 _LONGEST = 500
+_DEEPEST = 50
 
 
 class Expression:
@@ -35,10 +37,10 @@ class Expression:
             tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise _refused(text) from None
+        _check(tree, text)
         self.text = text.strip()
         self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
         self._tree = tree
-        _check(tree, text)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """The expression's value for the parameters' values (numbers or traced numbers)."""
@@ -61,17 +63,20 @@ def _refused(text: str) -> ExpressionError:
     )
 
 
-def _check(node: ast.expr, text: str) -> None:
+def _check(node: ast.expr, text: str, depth: int = 0) -> None:
+    if depth > _DEEPEST:
+        raise ExpressionError(f"an expression of more than {_DEEPEST} operations inside each other is too deep.")
     match node:
         case ast.Name():
             return
-        case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(value, bool):
-            return
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            if abs(value) > sys.float_info.max:
+                raise _refused(text)
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            _check(operand, text)
+            _check(operand, text, depth + 1)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-            _check(left, text)
-            _check(right, text)
+            _check(left, text, depth + 1)
+            _check(right, text, depth + 1)
         case _:
             raise _refused(text)
 

@@ -1,7 +1,9 @@
 """Does a record move each axis by itself, or is the command only a controller's answer to the motion?
 
 A command that past motion explains carries no information of its own: whatever relates it to the motion is the
-controller, and a fit of the aircraft to it may well find minus the controller's inverse (Ljung 1999, ch. 13).
+controller, and a fit of the aircraft to it may well find minus the controller's inverse (Ljung 1999, ch. 13). A slow
+sweep is explained by past motion too, because it can be foretold; but what the aircraft does comes after the command,
+so the motion that follows then explains it better still, which it does not where the command is an answer.
 """
 
 from __future__ import annotations
@@ -22,6 +24,12 @@ EXPLAINED = 0.99
 
 WEAK = 0.90
 """Share above which the excitation is called weak: what the axis tells then rests on the noise model and the priors."""
+
+FOLLOWS = 1.5
+"""How many times more of a command past motion must leave unexplained than later motion, for the motion to follow it.
+
+Measured: 1.4 to 4.6 with sweeps and multisines, 0.8 to 1.2 for controllers' answers, real ones included.
+"""
 
 _BAND = (0.3, 8.0)
 _LAGS = 0.3
@@ -71,10 +79,15 @@ def _judge(record: Record, axis: _Axis, command: Array, motion: dict[str, Array]
     sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
     banded = sosfiltfilt(sos, command)
     power = float(np.std(banded))
-    explained = _explained(command, [motion[name] for name in axis.motion], rate)
-    peak, phase = _coherence(command, motion[axis.response], rate, high)
     still = power < _MOVED
-    identifiable = not still and explained < EXPLAINED
+    explained, later, peak, phase = float("nan"), float("nan"), 0.0, float("nan")
+    if not still:
+        moved = [motion[name] for name in axis.motion]
+        explained = _explained(command, moved, rate)
+        later = _explained(command[::-1], [signal[::-1] for signal in moved], rate)
+        peak, phase = _coherence(command, motion[axis.response], rate, high)
+    follows = 1.0 - explained > FOLLOWS * (1.0 - later)
+    identifiable = not still and (explained < EXPLAINED or follows)
     return AxisExcitation(
         record=record.name,
         axis=axis.name,
@@ -84,7 +97,8 @@ def _judge(record: Record, axis: _Axis, command: Array, motion: dict[str, Array]
         phase=phase,
         power=power,
         identifiable=identifiable,
-        words=_words(axis.name, explained, peak, phase, still=still, identifiable=identifiable),
+        words=_words(axis.name, explained, peak, phase, still=still, identifiable=identifiable, follows=follows),
+        explained_later=later,
     )
 
 
@@ -116,11 +130,15 @@ def _coherence(command: Array, response: Array, rate: float, high: float) -> tup
     return float(squared[best]), float(np.angle(cross[best]))
 
 
-def _words(axis: str, explained: float, peak: float, phase: float, *, still: bool, identifiable: bool) -> str:
+def _words(
+    axis: str, explained: float, peak: float, phase: float, *, still: bool, identifiable: bool, follows: bool
+) -> str:
     if still:
         return f"{axis}: the command does not move. Fly a sweep or a multisine in {axis}."
     share = f"past motion explains {100 * explained:.0f} % of the command (coherence up to {peak:.2f}"
     share += f" at {np.degrees(phase):+.0f} deg)"
+    if identifiable and follows and explained > WEAK:
+        return f"{axis}: {share}, but the motion after it explains more: the motion follows the command."
     if identifiable and explained > WEAK:
         return f"{axis}: {share}: mostly a controller's answer; the axis is weakly excited, believe it with its bound."
     if identifiable:

@@ -77,12 +77,14 @@ class AxisExcitation:
         record: the record's name.
         axis: "roll", "pitch", "yaw" or "heave".
         command: the input that drives it.
-        explained: part of the command's variance that past motion explains (1: a controller's answer to the motion).
+        explained: part of the command's variance that past motion explains (1: a controller's answer to the motion;
+            NaN where the command stands still or the record is too short to tell).
         coherence: largest coherence between command and motion in the band.
-        phase: phase of motion over command there [rad].
+        phase: phase of motion over command there [rad] (NaN where the command stands still).
         power: standard deviation of the command in the band [1].
         identifiable: False where there is no independent excitation.
         words: the finding, and what to fly instead.
+        explained_later: part of the command's variance that the motion after it explains.
     """
 
     record: str
@@ -94,6 +96,7 @@ class AxisExcitation:
     power: float
     identifiable: bool
     words: str
+    explained_later: float = float("nan")
 
 
 @dataclass(frozen=True)

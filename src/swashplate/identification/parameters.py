@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
@@ -189,39 +190,102 @@ def parameterize(
     Args:
         vehicle: whose parameters they are.
         free: a ready choice ("flight": the paper's six; "full") or parameter names.
-        ties: "name = expression" each, beside those of the choice.
-        fixed: values held for parameters that are not free.
+        ties: "name = expression" each, beside those of the choice; one here replaces the choice's for the same name.
+        fixed: values held for parameters that are not to move, whatever the choice says of them.
         priors: mean and standard deviation by name; a prior here replaces the choice's.
 
     Raises:
-        IdentificationError: for a name that the card does not have, or one that is both free and tied.
+        IdentificationError: for a name that the card does not have, one that is both free and tied, a prior on one
+            that is not free, ties that go round in a circle, or a value that physics forbids.
+        ExpressionError: for a tie that does not parse.
     """
+    held = dict(fixed or {})
     if isinstance(free, str) and free in CHOICES:
         choice = CHOICES[free]
-        wanted, texts = list(choice.free), [*choice.ties, *ties]
+        given = {parse_tie(text)[0] for text in ties} | held.keys()
+        wanted = list(choice.free)
+        texts = [*(text for text in choice.ties if parse_tie(text)[0] not in given), *ties]
         vehicle = vehicle.with_values(dict(choice.fixed))
     else:
         names = [free] if isinstance(free, str) else list(free)
         wanted, texts = [_as_free(vehicle, item) for item in names], list(ties)
-    if fixed:
-        _known(vehicle, fixed)
-        vehicle = vehicle.with_values(fixed)
-        wanted = [item for item in wanted if item.name not in fixed]
-    for name, (mean, sigma) in (priors or {}).items():
-        _known(vehicle, [name])
-        if not sigma > 0.0:
-            raise IdentificationError(f"prior sigma is {sigma}, expected a positive number.", channel=name)
-        wanted = [replace(f, mean=mean, sigma=sigma, source="given prior") if f.name == name else f for f in wanted]
-    tied = [parse_tie(text) for text in texts]
+    _known(vehicle, held)
+    for name, value in held.items():
+        _possible(vehicle, name, value, "fixed")
+    vehicle = vehicle.with_values(held)
+    wanted = [item for item in wanted if item.name not in held]
     _known(vehicle, [f.name for f in wanted])
+    wanted = _with_priors(vehicle, wanted, priors or {})
+    tied = [parse_tie(text) for text in texts]
     for name, expression in tied:
         _known(vehicle, [name, *expression.names])
-    doubled = {f.name for f in wanted} & {name for name, _ in tied}
-    if doubled or len({f.name for f in wanted}) < len(wanted):
-        raise IdentificationError(f"{', '.join(sorted(doubled)) or 'a name'} is free twice or both free and tied.")
+    _once([f.name for f in wanted], [name for name, _ in tied], held)
     if not wanted:
         raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(CHOICES)}.")
-    return Parameterization(vehicle, tuple(wanted), tuple(tied))
+    table = Parameterization(vehicle, tuple(wanted), _in_order(dict(tied)))
+    _check_ties(table)
+    return table
+
+
+def _with_priors(vehicle: Vehicle, wanted: list[Free], priors: Mapping[str, tuple[float, float]]) -> list[Free]:
+    for name, (mean, sigma) in priors.items():
+        _known(vehicle, [name])
+        if not (sigma > 0.0 and np.isfinite(mean)):
+            raise IdentificationError(
+                f"prior is {mean} with sigma {sigma}, expected a number and a positive one.", channel=name
+            )
+        if name not in {f.name for f in wanted}:
+            raise IdentificationError(
+                "has a prior but is not free.",
+                channel=name,
+                hint=f"Free are {', '.join(f.name for f in wanted) or 'none'}.",
+            )
+        wanted = [replace(f, mean=mean, sigma=sigma, source="given prior") if f.name == name else f for f in wanted]
+    return wanted
+
+
+def _once(free: list[str], tied: list[str], held: Iterable[str]) -> None:
+    """That every name is free, tied or fixed once."""
+    names = [*free, *tied, *held]
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    if doubled:
+        raise IdentificationError(
+            f"{', '.join(doubled)} is given twice: a parameter is free, tied or fixed, once.",
+            hint="Leave out one of them.",
+        )
+
+
+def _in_order(ties: Mapping[str, Expression]) -> tuple[tuple[str, Expression], ...]:
+    """Ties in an order in which each uses only what stands before."""
+    sorter = TopologicalSorter({name: expression.names for name, expression in ties.items()})
+    try:
+        order = list(sorter.static_order())
+    except CycleError as error:
+        raise IdentificationError(
+            f"the ties go round in a circle: {' = '.join(reversed(error.args[1]))}.", hint="Leave one of them out."
+        ) from None
+    return tuple((name, ties[name]) for name in order if name in ties)
+
+
+def _check_ties(table: Parameterization) -> None:
+    """That every tie gives a possible number at the start."""
+    with np.errstate(all="ignore"):
+        try:
+            values = table.identified(table.starts())
+        except ZeroDivisionError:
+            values = {}
+    for name, expression in table.ties:
+        _possible(table.vehicle, name, values.get(name, float("nan")), f"tied to '{expression.text}'")
+
+
+def _possible(vehicle: Vehicle, name: str, value: float, how: str) -> None:
+    entry = vehicle.card.parameters[name]
+    low = -np.inf if entry.lower is None else entry.lower
+    high = np.inf if entry.upper is None else entry.upper
+    if not (np.isfinite(value) and low <= value <= high):
+        raise IdentificationError(
+            f"is {how}, which is {value:.4g} {entry.unit}; physics allows {low:g} to {high:g}.", channel=name
+        )
 
 
 def _as_free(vehicle: Vehicle, item: str | Free) -> Free:

@@ -118,7 +118,10 @@ class PredictionError:
             for name, (usual, scale, sigma) in _NUISANCE.items():
                 start = usual if nuisance is None else float(getattr(nuisance, name))
                 low = 0.0 if name.startswith("delay") else -np.inf
-                entries.append(Entry(f"{name}[{number}]", "nuisance", start, scale, low, np.inf, start, sigma))
+                kinked = name.startswith("delay")
+                entries.append(
+                    Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
+                )
         if estimate_noise:
             for name, value in self.noise._asdict().items():
                 log = float(np.log(value))

@@ -48,7 +48,7 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
     """The unbroken pieces of one or more conditioned flights.
 
     Raises:
-        FlightError: where a flight lacks a channel, is not on a uniform grid, holds NaN or a constant input only.
+        FlightError: where a flight lacks a channel, is not on a uniform grid or holds NaN, or where no input moves.
     """
     pieces = []
     for flight in [flights] if isinstance(flights, Flight) else list(flights):
@@ -61,6 +61,13 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
         raise FlightError(
             f"the flights have different rates (steps of {sorted(steps)} s).",
             hint="Condition all of them to the same rate.",
+        )
+    if not any((np.ptp(piece.inputs, axis=0) > _STILL).any() for piece in pieces):
+        raise FlightError(
+            "no input ever moves, so nothing can be learnt about what they do.",
+            where=pieces[0].name,
+            channel=", ".join(vehicle.input_names),
+            hint="Check that the commands were logged (swash inspect), or fly a sweep or a multisine.",
         )
     return pieces
 
@@ -104,7 +111,10 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
     )
 
 
-_BATTERY = 1.0
+_STILL = 1e-6
+"""Change of a command that is no change: what interpolation leaves of a constant."""
+
+_BATTERY = 8.0
 """Seconds over which a logged voltage is averaged: a battery sags slowly, a volt of noise is 14 rad/s of rotor."""
 
 

@@ -21,6 +21,7 @@ class Entry:
         lower, upper: bounds.
         mean, sigma: prior (sigma infinite: none).
         logarithmic: True where the row holds the natural logarithm.
+        kinked: True where the cost bends suddenly, as a delay's does when a held command passes a sample.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Entry:
     mean: float = 0.0
     sigma: float = np.inf
     logarithmic: bool = False
+    kinked: bool = False
 
 
 @dataclass(frozen=True)

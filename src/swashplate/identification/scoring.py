@@ -62,6 +62,9 @@ class Optimum:
 _HOPELESS = 1e8
 """Damping at which a step is so short that no descent is left."""
 
+_STILL = 1e4
+"""Damping at which a kinked entry hardly moves."""
+
 _LARGEST_STEP = {"parameter": 0.7, "noise": 0.7, "nuisance": 3.0, "initial": 10.0}
 """In scaled units: no entry of a group moves by more than this in one iteration."""
 
@@ -71,7 +74,7 @@ def minimise(
     *,
     start: Array | None = None,
     iterations: int = 60,
-    tolerance: float = 1e-2,
+    tolerance: float = 0.05,
     progress: Progress | None = None,
 ) -> Optimum:
     """The row of the highest posterior probability.
@@ -96,23 +99,30 @@ def minimise(
             "the model diverges from the flight at the first guess.",
             hint="Check units and signs with 'swash inspect', or start from a card that flies.",
         )
-    history, damping, converged = [cost], 1e-2, False
+    history, damping, caution, converged = [cost], 1e-2, 1e-2, False
+    kinked = row_of.column("kinked") > 0.0
     reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
     for iteration in range(iterations):
         found = None
         while damping < _HOPELESS:
-            step = np.clip(_step(row, gradient, information[1], damping, low, high), -reach, reach)
+            weights = np.where(kinked, max(damping, caution), damping)
+            step = np.clip(_step(row, gradient, information[1], weights, low, high), -reach, reach)
             trial = np.clip(row + step, low, high)
             trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
             if np.isfinite(trial_cost) and trial_cost < cost:
                 found = trial, trial_cost
                 break
-            damping *= 10.0
+            # A rejected step is blamed on the kinked entries first, which then stand still while the others go on.
+            if kinked.any() and caution < _STILL:
+                caution *= 100.0
+            else:
+                damping *= 10.0
         if found is None:
             converged = True  # no direction goes down any more
             break
         gained = cost - found[1]
-        row, damping = found[0], max(damping / 10.0, 1e-12)
+        row = found[0]
+        damping, caution = max(damping / 10.0, 1e-12), max(caution / 10.0, 1e-12)
         likelihood.refresh(row)
         cost, gradient, information = _posterior(likelihood, row)
         history.append(cost)
@@ -132,11 +142,11 @@ def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[
     return cost + prior_cost, gradient + prior_gradient, (information, information + np.diag(prior_information))
 
 
-def _step(row: Array, gradient: Array, hessian: Array, damping: float, low: Array, high: Array) -> Array:
+def _step(row: Array, gradient: Array, hessian: Array, damping: Array, low: Array, high: Array) -> Array:
     """A damped step that leaves out the entries which a bound stops."""
     free = np.ones(row.size, dtype=bool)
     step = np.zeros(row.size)
-    damped = hessian + damping * np.diag(np.diag(hessian) + 1e-6)
+    damped = hessian + np.diag(damping * (np.diag(hessian) + 1e-6))
     for _ in range(3):
         step = np.zeros(row.size)
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], -gradient[free])

@@ -9,9 +9,10 @@ from swashplate.physics.frames import Vector
 def drag_force(
     air_velocity: Vector, *, drag_x: Scalar, drag_y: Scalar, drag_z: Scalar, damping_w: Scalar, xp: Backend
 ) -> Vector:
-    """Force against the motion through the air [N]; `drag_*` [kg/m] quadratic, `damping_w` [N s/m] linear.
+    """Force against the motion through the air [N] (Fankhauser et al., eq. 7).
 
-    `drag_z` and `damping_w` (the loss of thrust in climb, lumped) are zero in the paper.
+    `drag_*` [kg/m] is quadratic, `damping_w` [N s/m] linear. `drag_z` and `damping_w` (the loss of thrust in
+    climb, lumped) are zero in the paper.
     """
     u, v, w = air_velocity
     return Vector(-drag_x * u * xp.abs(u), -drag_y * v * xp.abs(v), -drag_z * w * xp.abs(w) - damping_w * w)

@@ -30,8 +30,8 @@ def asked(fit: Fit | None, validation: Validation | None) -> Section:
             Text(
                 f"Predict {listed(_sources(validation.flights))} with the model "
                 f"{', '.join(f'{h:g}' for h in sorted({s.horizon for s in validation.scores}))} s ahead from "
-                f"many start "
-                "points, and compare with the published card (same observer, same trims), with holding the last value "
+                "many start points, and compare with the published card (same observer, trims from the same seconds), "
+                "with holding the last value "
                 "and with constant rates."
             )
         )

@@ -19,6 +19,9 @@ from swashplate.validation.validation import PREDICTORS, Example, Score, Validat
 _SHORT = {"model": "model", "published card": "card", "hold": "hold", "constant rates": "rates"}
 LEVEL_TONE = {"good": "good", "usable": "caution", "poor": "bad"}
 
+_HONEST = (0.5, 2.0)
+"""Mean squared innovation over its promised variance between which the promise counts as kept."""
+
 
 def verdict(validation: Validation) -> Section:
     """One line per axis, and the thresholds behind the words."""
@@ -151,7 +154,7 @@ def innovations(validation: Validation) -> Section:
     rows = []
     for check in validation.innovations:
         unit = channel(check.channel)
-        honest = 0.5 <= check.consistency <= 2.0
+        honest = _HONEST[0] <= check.consistency <= _HONEST[1]
         white = check.whiteness <= check.whiteness_bound
         rows.append(
             (
@@ -178,9 +181,8 @@ def innovations(validation: Validation) -> Section:
             "One-step prediction errors",
             ("channel", "unit", "RMS", "promised σ", "consistency", "size", "largest autocorrelation", "colour"),
             tuple(rows),
-            note="Consistency: mean squared error over promised variance; called as promised between 0.5 and 2. "
-            "White noise "
-            "keeps its autocorrelation below the bound at 99 %.",
+            note="Consistency: mean squared error over promised variance; called as promised between "
+            f"{_HONEST[0]:g} and {_HONEST[1]:g}. White noise keeps its autocorrelation below the bound at 99 %.",
         )
     ]
     if validation.log_likelihood:

@@ -16,6 +16,9 @@ from swashplate.vehicles.vehicle import Vehicle
 CALIBRATION = 5.0
 """Seconds at the start of a record that may be used; no prediction starts before they are over."""
 
+SHORTEST_CALIBRATION = 1.0
+"""Seconds: the filter has settled and a delay of a tenth of a second has left its trace."""
+
 
 def first_part(record: Record, seconds: float) -> Record:
     """The first `seconds` of a record (all of it where it is shorter)."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from swashplate.errors import FlightError
+from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.feedback import excitation
 from swashplate.identification.fit import AxisExcitation, Fit
@@ -18,7 +18,7 @@ from swashplate.identification.stochastic import Noise, Nuisance
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
-from swashplate.validation.calibration import CALIBRATION, calibrate
+from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
 from swashplate.validation.validation import Example, Score, Validation
@@ -67,6 +67,7 @@ def validate(
 
     Raises:
         FlightError: where no record is long enough for calibration and the shortest horizon.
+        SwashError: for a calibration that is too short to tell anything.
     """
     enable_double_precision()
     enable_compilation_cache()
@@ -76,6 +77,8 @@ def validate(
         vehicle, published = model, published or named_vehicle(model.name)
     noise, prior = observer_of(vehicle)
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    if not calibration >= SHORTEST_CALIBRATION:
+        raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
     shortest = calibration + min(horizons) + 1.0
     all_pieces = records(flights, vehicle)
     pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
@@ -105,7 +108,8 @@ def validate(
             )
         own = rivals["model"]
         truth = measured_states(piece, own.nuisance)
-        judged.extend(excitation(vehicle, piece, truth))
+        # The tracked point as it is: that is what a controller saw, whatever the lever arm.
+        judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
         for horizon in horizons:
             if horizon <= ahead:

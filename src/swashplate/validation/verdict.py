@@ -8,7 +8,7 @@ from swashplate.identification.fit import AxisExcitation
 from swashplate.validation.validation import AxisVerdict, Score
 
 THRESHOLDS = {"good": 50.0, "usable": 20.0}
-"""Prediction fit [%] of every channel of an axis at its horizon; "usable" must also beat every rival."""
+"""Prediction fit [%] of every channel of an axis at its horizon; both must also beat every rival."""
 
 _AXES = {
     # axis: channels, horizon [s]

@@ -1,0 +1,141 @@
+"""The documentation runs: every Python block, every `$ swash ...` line, every generated part and every link."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import matplotlib as mpl
+import pytest
+import typer
+
+import report_samples
+from swashplate.cli.app import app
+from swashplate.flights import datasets
+from swashplate.reporting.compose import compose
+
+ROOT = Path(__file__).resolve().parents[2]
+_FLIGHTS = ("flight_2011-08-01_vertical.mat", "flight_2011-07-25_hover_crash.mat")
+
+
+def _script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+docs, diagram = _script("docs_pages"), _script("block_diagram")
+PAGES = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in docs.pages()}
+COMMANDS = [
+    (name, command)
+    for name, text in PAGES.items()
+    for fence in docs.fences(text)
+    if fence.language == "console"
+    for command in docs.commands(fence)
+]
+
+
+def _anchors(text: str) -> set[str]:
+    """Anchors that a Markdown page's headings get."""
+    headings = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if docs.runs_something(text)])
+def test_a_page_runs_and_prints_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    mpl.use("Agg")
+    here = all(datasets.find("coax56", file) for file in _FLIGHTS)
+    left_out = []
+    for shown in docs.run_page(PAGES[name], real=False, data_is_here=here):
+        if shown.came is None:
+            left_out.append(shown.what.strip().splitlines()[0])
+        elif shown.said:
+            assert docs.same(shown.said, shown.came), f"{name}: {shown.what}\nprints now:\n{shown.came}"
+    if left_out and not here:
+        pytest.skip(f"the flights of coax56 are not here; not run: {'; '.join(left_out)}")
+
+
+@pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.name)
+def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(example), run_name="__main__")
+    assert list(tmp_path.iterdir()), "an example leaves something to look at"
+
+
+@pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[f"{name}: {c.line[:60]}" for name, c in COMMANDS])
+def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -> None:
+    words = command.words
+    if words[0] == "make":
+        assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)
+        return
+    assert words[0] == "swash", f"{name}: `{command.line}` is neither swash nor make"
+    parsed, rest = typer.main.get_command(app), words[1:]
+    context = parsed.make_context("swash", list(rest), resilient_parsing="--help" in rest)
+    while hasattr(parsed, "commands") and rest and rest[0] in parsed.commands:
+        parsed, rest = parsed.commands[rest[0]], rest[1:]
+        context = parsed.make_context(parsed.name, list(rest), parent=context, resilient_parsing="--help" in rest)
+
+
+@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if "<!-- generated:" in text])
+def test_what_is_generated_is_current(name: str) -> None:
+    assert docs.regenerated(PAGES[name]) == PAGES[name], "run: python scripts/docs_pages.py"
+
+
+def test_the_block_diagram_is_that_of_the_equations() -> None:
+    assert diagram.as_svg(diagram.Trace()) == diagram.PICTURE.read_text(encoding="utf-8"), (
+        "run: python scripts/block_diagram.py"
+    )
+
+
+def test_the_traced_diagram_has_the_arrows_of_the_paper() -> None:
+    arrows = diagram.Trace().arrows
+    # Fankhauser et al., Fig. 3: motors and battery drive the drive trains, their speeds the rotors and both phase lags,
+    # speed and rates the lower rotor, attitude the bar.
+    for side, tilts in (("upper", "stabilizer bar, upper"), ("lower", "swashplate, lower")):
+        train, turned = f"drive train, {side}", f"rotor, {side}"
+        assert {(f"motor_{side}", train), ("voltage", train), (train, tilts), (train, turned), (tilts, turned)} <= set(
+            arrows
+        )
+        assert (turned, "rigid body") in arrows
+    assert {"u", "v", "p", "q"} <= set(arrows["rigid body", "swashplate, lower"])
+    assert {"phi", "theta"} <= set(arrows["rigid body", "stabilizer bar, upper"])
+    assert not any(name.startswith("servo") and target != "swashplate, lower" for name, target in arrows)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_lead_somewhere(name: str) -> None:
+    page = ROOT / name
+    for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[name]):
+        if target.startswith(("http:", "https:", "mailto:")):
+            continue
+        path, _, anchor = target.partition("#")
+        place = (page.parent / path).resolve() if path else page
+        assert place.exists(), f"{name} links to {target}"
+        if anchor:
+            assert anchor in _anchors(place.read_text(encoding="utf-8")), f"{name} links to {target}"
+
+
+def test_every_page_can_be_reached_from_the_index() -> None:
+    index = PAGES["docs/index.md"]
+    missing = [
+        n for n in PAGES if n.startswith("docs/") and n != "docs/index.md" and n.removeprefix("docs/") not in index
+    ]
+    assert not missing
+
+
+def test_the_guide_to_the_report_names_its_sections() -> None:
+    page = PAGES["docs/howto/read-the-report.md"]
+    named = set(re.findall(r"\*\*(.+?)\*\*", page)) - {"Banners", "Summary"}
+    report = compose(report_samples.fit(), report_samples.validation(), modes=report_samples.modes())
+    titles = {section.title for section in report.sections}
+    assert named <= titles

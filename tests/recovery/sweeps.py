@@ -1,0 +1,67 @@
+"""Simulated sweeps with a known truth, and how far their estimates end from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import swashplate as sp
+from swashplate.flights.flight import Array, Flight
+from swashplate.vehicles.vehicle import Vehicle
+
+MANEUVER = "sweep:pitch,0.5-8Hz,34s"
+"""The band that Fankhauser et al. flew; 40 s with the hover before and after it."""
+
+OFF = {
+    "a_alpha_v": 0.02,
+    "a_alpha_u": 0.004,
+    "a_alpha_p": 0.008,
+    "tau_f_upper": 1.2,
+    "o_zeta_upper": -0.1,
+    "o_zeta_lower": 0.05,
+}
+"""Where the search starts: the six flight parameters, off by a quarter to a half."""
+
+
+def truth() -> Vehicle:
+    return sp.vehicle("coax")
+
+
+def flown() -> Flight:
+    """The maneuver in calm air under a hold of height and heading, every state known."""
+    return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold)
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """One seed's estimates against the truth.
+
+    Attributes:
+        names: parameters.
+        error: estimate less truth.
+        sigma: predicted standard deviation (corrected for coloured residuals).
+    """
+
+    names: tuple[str, ...]
+    error: Array
+    sigma: Array
+
+    @property
+    def distance(self) -> Array:
+        """Errors in predicted standard deviations."""
+        return np.asarray(self.error / self.sigma)
+
+
+def recover(flight: Flight, *, seed: int) -> Recovery:
+    """What one seed of the usual sensors (noise, gaps, outliers, jitter, battery) makes of a flight."""
+    vehicle = truth()
+    logged = sp.observe(flight, vehicle, seed=seed, sensors=sp.Sensors()).condition(rate=100.0, cutoff=0.0)
+    fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method="output-error")
+    free = [estimate for estimate in fit.parameters if not estimate.tie]
+    known = vehicle.card.values()
+    return Recovery(
+        names=tuple(estimate.name for estimate in free),
+        error=np.array([estimate.value - known[estimate.name] for estimate in free]),
+        sigma=np.array([estimate.sigma_corrected for estimate in free]),
+    )

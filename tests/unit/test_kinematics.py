@@ -1,0 +1,137 @@
+"""Velocities and rates from a pose: against motions whose truth is a formula, and against the equations' own start."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from swashplate.identification.kinematics import PREDICTED, measured_states
+from swashplate.identification.records import POSE, Record
+from swashplate.identification.start_states import hover, slopes, start_state
+from swashplate.identification.stochastic import Nuisance
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.trim import trim
+from swashplate.vehicles.catalogue import vehicle
+
+COAX = vehicle("coax")
+LEVER = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03)
+RATE = 100.0
+
+
+@pytest.fixture(autouse=True)
+def _double() -> None:
+    enable_double_precision()
+
+
+def _tumble(time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position and rotation vector rates of a smooth three-axis motion: position, velocity, attitude, body rates.
+
+    The attitude is a product of rotations about fixed axes, whose body rates add up by the chain rule.
+    """
+    position = np.stack([np.sin(time), 0.5 * np.cos(0.7 * time), -1.0 + 0.2 * np.sin(1.3 * time)], axis=1)
+    velocity = np.stack([np.cos(time), -0.35 * np.sin(0.7 * time), 0.26 * np.cos(1.3 * time)], axis=1)
+    angles = np.stack([0.5 * np.sin(0.9 * time), 0.3 * np.sin(1.1 * time), 0.4 * np.cos(0.8 * time)], axis=1)
+    rates = np.stack([0.45 * np.cos(0.9 * time), 0.33 * np.cos(1.1 * time), -0.32 * np.sin(0.8 * time)], axis=1)
+    turns = [Rotation.from_euler(axis, angles[:, i : i + 1]) for i, axis in enumerate("ZYX")]
+    axes = np.eye(3)[::-1]
+    omega = rates[:, 2:] * axes[2]
+    omega = omega + turns[2].apply(rates[:, 1:2] * axes[1], inverse=True)
+    omega = omega + (turns[1] * turns[2]).apply(rates[:, :1] * axes[0], inverse=True)
+    return position, velocity, (turns[0] * turns[1] * turns[2]), omega  # type: ignore[return-value]
+
+
+def _record(nuisance: Nuisance, seconds: float = 4.0) -> tuple[Record, np.ndarray]:
+    """What is measured of that motion at a point off the centre of gravity, and the true body states."""
+    time = np.arange(round(seconds * RATE) + 1) / RATE
+    position, velocity, attitude, omega = _tumble(time)
+    arm = np.array([float(getattr(nuisance, f"lever_{axis}")) for axis in "xyz"])
+    euler = attitude.as_euler("ZYX")[:, ::-1]
+    shown = euler + np.array([float(nuisance.level_phi), float(nuisance.level_theta), 0.0])
+    outputs = np.concatenate([position + attitude.apply(arm), shown], axis=1)
+    body = attitude.apply(velocity, inverse=True)
+    inputs = np.tile(trim(COAX).inputs, (time.size, 1))
+    record = Record("a", time, inputs, outputs, np.full(time.size, 12.0), POSE, True)
+    return record, np.concatenate([position, body, euler, omega], axis=1)
+
+
+@pytest.mark.parametrize("nuisance", [Nuisance(), LEVER])
+def test_states_come_back_from_the_pose_of_any_point(nuisance: Nuisance) -> None:
+    record, truth = _record(nuisance)
+    found = measured_states(record, nuisance)
+    inside = slice(10, -10)
+    np.testing.assert_allclose(found[inside], truth[inside], atol=2e-4)
+
+
+def test_a_lever_that_is_forgotten_shows_as_a_velocity() -> None:
+    """omega x arm, in body axes: the sign of every lever component."""
+    record, truth = _record(Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1))
+    found = measured_states(record, Nuisance())
+    expected = truth[:, 3:6] + np.cross(truth[:, 9:12], [0.05, 0.18, -0.1])
+    np.testing.assert_allclose(found[10:-10, 3:6], expected[10:-10], atol=2e-4)
+
+
+@pytest.mark.parametrize("nuisance", [Nuisance(), LEVER])
+def test_the_first_guess_of_the_equations_agrees(nuisance: Nuisance) -> None:
+    """The other implementation, on traced numbers: from slopes of the same pose to a flat state of the vehicle."""
+    record, truth = _record(nuisance)
+    place = 150
+    value, rate = slopes(record, np.array([place]))
+    x = start_state(
+        COAX,
+        POSE,
+        COAX.values(),
+        nuisance,
+        value=jnp.asarray(value[0]),
+        rate=jnp.asarray(rate[0]),
+        inputs=jnp.asarray(record.inputs[place]),
+        voltage=12.0,
+    )
+    found = np.array([float(x[COAX.index(name)]) for name in PREDICTED])
+    np.testing.assert_allclose(found, truth[place], atol=8e-3)  # straight lines over 0.3 s of a curved motion
+    assert float(x[COAX.index("eta_bar")]) == pytest.approx(truth[place, 6], abs=2e-3)
+    assert float(x[COAX.index("zeta_bar")]) == pytest.approx(truth[place, 7], abs=2e-3)
+
+
+@pytest.mark.parametrize("voltage", [11.1, 12.22])
+def test_the_closed_form_of_hover_is_the_trim(voltage: float) -> None:
+    found = trim(COAX, voltage=voltage)
+    x, u = hover(COAX, COAX.values(), voltage)
+    np.testing.assert_allclose(np.asarray(u), found.inputs, atol=1e-9)
+    speeds = [COAX.index("omega_lower"), COAX.index("omega_upper")]
+    np.testing.assert_allclose(np.asarray(x)[speeds], found.state[speeds], rtol=1e-9)
+    assert np.abs(np.delete(np.asarray(x), speeds)).max() == 0.0
+
+
+def test_the_first_guess_of_rotor_speeds_is_steady_and_knows_its_trim() -> None:
+    """One percent of motor is 4.4 rad/s at the lower rotor, one volt 13.6 rad/s: the card's slopes."""
+    record, _ = _record(Nuisance())
+    value, rate = slopes(record, np.array([100]))
+
+    def speed(trim_lower: float, voltage: float) -> jax.Array:
+        x = start_state(
+            COAX,
+            POSE,
+            COAX.values(),
+            Nuisance(trim_motor_lower=trim_lower),
+            value=jnp.asarray(value[0]),
+            rate=jnp.asarray(rate[0]),
+            inputs=jnp.asarray(record.inputs[100]),
+            voltage=voltage,
+        )
+        return x[COAX.index("omega_lower")]
+
+    card = COAX.card.values()
+    assert float(speed(0.01, 12.0) - speed(0.0, 12.0)) == pytest.approx(0.01 * card["k_drive_lower"])
+    assert float(speed(0.0, 12.0) - speed(0.0, 11.0)) == pytest.approx(card["k_drive_voltage"])
+
+
+def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
+    record, _ = _record(Nuisance())
+    line = np.outer(record.time, [1.0, -2.0, 0.5, 0.1, 0.2, 3.0]) + 1.0
+    straight = Record("a", record.time, record.inputs, line, record.voltage, POSE, True)
+    value, rate = slopes(straight, np.array([0, 200, 400]))
+    np.testing.assert_allclose(value, line[[0, 200, 400]], atol=1e-12)
+    np.testing.assert_allclose(rate, np.tile([1.0, -2.0, 0.5, 0.1, 0.2, 3.0], (3, 1)), atol=1e-12)
