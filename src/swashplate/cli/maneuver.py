@@ -24,7 +24,9 @@ def maneuver(
         Path | None,
         typer.Option("--out", metavar="FILE", help="The series as .csv; without it the rules are checked only."),
     ] = None,
-    rate: options.Rate = 100.0,
+    rate: Annotated[
+        float, typer.Option("--rate", help="Of the series and of the log [Hz].", min=1.0, max=10000.0)
+    ] = 100.0,
     noise: Annotated[
         float | None, typer.Option("--noise", help="Standard deviation of the output's noise, in its unit.", min=0.0)
     ] = None,

@@ -22,6 +22,7 @@ _GAP = 3.0  # median steps; a step longer than this has lost at least two sample
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
 _NEAR = 25  # changes on each side that are its neighbours
+_UNUSUAL = 4.0  # robust standard deviations of the neighbours; a sweep's own changes reach one
 _ORDINARY = ("rcin_", "rcout_")  # switches and unused outputs hardly ever move
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 _Q95_TO_SIGMA = 1.0 / 1.95996  # of a normal distribution: 1 / Phi^-1(0.975)
@@ -60,7 +61,7 @@ class ChannelSummary:
         low, high, median: over the finite samples.
         missing: samples that are not finite.
         constant: never moves.
-        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them and of their neighbours;
+        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them (4 of their neighbours);
             for the four channels of a quaternion, those of the rotation between samples; for a command, which may step,
             only those that the next sample takes back.
         outside: samples of a command that lie outside its range (motors 0 to 1, servos -1 to 1).
@@ -207,7 +208,7 @@ def _jumps(changes: Array) -> NDArray[np.bool_]:
         return np.zeros(changes.shape, dtype=np.bool_)
     jumps = np.asarray(off > max(_OUTLIER * sigma, _SLIGHT * span))
     for i in np.flatnonzero(jumps).tolist():
-        jumps[i] = off[i] > _OUTLIER * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
+        jumps[i] = off[i] > _UNUSUAL * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
     return jumps
 
 

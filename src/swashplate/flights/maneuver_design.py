@@ -204,7 +204,8 @@ def _multisine_checks(maneuver: Maneuver, rate: float) -> list[Check]:
     found.append(Check("peak factor", f"{peak:.2f}", "at most 1.2 (a sine has 1)", peak <= 1.2))
     if len(maneuver.axes) > 1:
         largest = float(np.max(np.abs(np.corrcoef(signals) - np.eye(len(signals)))))
-        found.append(Check("orthogonal axes", f"largest correlation {largest:.1e}", "at most 0.01", largest <= 0.01))
+        words = "none" if largest < 1e-9 else f"{largest:.1g}"  # below that it is rounding
+        found.append(Check("orthogonal axes", f"correlation: {words}", "at most 0.01", largest <= 0.01))
     return found
 
 
