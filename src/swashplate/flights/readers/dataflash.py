@@ -125,7 +125,6 @@ class _Scan:
         self.kinds: dict[int, _Kind] = {}
         self.lengths = [0] * 256
         self.lengths[FMT] = _FMT_LENGTH
-        self.undescribed: dict[int, int] = {}
         self.lost: list[tuple[int, int]] = []
         self.unfinished = 0
         self._run(content)
@@ -134,16 +133,18 @@ class _Scan:
         size, at, lengths = len(content), 0, self.lengths
         erased = min(len(content.rstrip(b"\xff")), len(content.rstrip(b"\0")))  # flash memory comes in blocks
         places: list[list[int]] = [[] for _ in range(256)]
+        headed = content.startswith(HEAD)
         while at < size:
-            kind = content[at + 2] if at + 2 < size and content[at : at + 2] == HEAD else -1
+            kind = content[at + 2] if headed and at + 2 < size else -1
             length = lengths[kind] if kind >= 0 else 0
             after = at + length
             # A message counts where another one, or the end, follows it: a torn one would swallow its neighbour.
-            if length and after <= size and (after >= erased or HEAD.startswith(content[after : after + 2])):
+            following_head = content[after : after + 2]
+            if length and after <= size and (following_head == HEAD or len(following_head) < 2 or after >= erased):
                 if kind == FMT:
                     self._learn(content, at)
                 places[kind].append(at)
-                at = after
+                at, headed = after, following_head == HEAD
                 continue
             if length and after > size and content.find(HEAD, at + 3) < 0:
                 self.unfinished = size - at
@@ -151,7 +152,7 @@ class _Scan:
             following = content.find(HEAD, at + 1)
             following = size if following < 0 else following
             self._skip(content, at, following)
-            at = following
+            at, headed = following, True
         for number, described in self.kinds.items():
             described.at = places[number]
 
@@ -168,29 +169,29 @@ class _Scan:
             self.lost[-1] = (self.lost[-1][0], stop)
         elif stop == len(content) and len(set(content[start:stop])) == 1 and content[start] in (0x00, 0xFF):
             self.unfinished = stop - start
+        elif stop == len(content) and HEAD.startswith(content[start:stop]):
+            self.unfinished = stop - start
         else:
             self.lost.append((start, stop))
 
 
-def _gathered(content: NDArray[np.uint8], kind: _Kind) -> Table:
-    places = np.asarray(kind.at, dtype=np.int64)
+def _gathered(content: bytes, kind: _Kind) -> Table:
     size = kind.dtype.itemsize
-    payload = content[(places[:, None] + 3) + np.arange(size)] if size else np.zeros((len(places), 0), np.uint8)
-    records = np.ascontiguousarray(payload).reshape(-1).view(kind.dtype) if size else np.zeros(len(places), kind.dtype)
+    payload = b"".join([content[at + 3 : at + 3 + size] for at in kind.at])
+    records = np.frombuffer(payload, kind.dtype) if size else np.zeros(len(kind.at), kind.dtype)
     columns = {
         name: records[name] if factor == 1.0 else records[name] * factor for name, factor in kind.factors.items()
     }
-    return Table(columns, places)
+    return Table(columns, np.asarray(kind.at, dtype=np.int64))
 
 
 def messages(content: bytes) -> Messages:
     """Every message in the bytes that is whole, whatever stands between them."""
     scan = _Scan(content)
-    array = np.frombuffer(content, np.uint8)
     tables: dict[str, Table] = {}
     for kind in scan.kinds.values():
         if kind.at and kind.name not in tables:
-            tables[kind.name] = _gathered(array, kind)
+            tables[kind.name] = _gathered(content, kind)
     notes, damage = [], []
     if scan.unfinished:
         notes.append(f"the last {scan.unfinished} bytes are an unfinished message or an unused block: not read")
