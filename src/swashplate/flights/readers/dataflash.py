@@ -165,11 +165,10 @@ class _Scan:
             self.kinds.setdefault(kind, described)
 
     def _skip(self, content: bytes, start: int, stop: int) -> None:
+        rest = content[start:stop]
         if self.lost and self.lost[-1][1] == start:
             self.lost[-1] = (self.lost[-1][0], stop)
-        elif stop == len(content) and len(set(content[start:stop])) == 1 and content[start] in (0x00, 0xFF):
-            self.unfinished = stop - start
-        elif stop == len(content) and HEAD.startswith(content[start:stop]):
+        elif stop == len(content) and (HEAD.startswith(rest) or set(rest) in ({0x00}, {0xFF})):
             self.unfinished = stop - start
         else:
             self.lost.append((start, stop))
