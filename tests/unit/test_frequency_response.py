@@ -123,7 +123,7 @@ def test_composite_of_agreeing_windows_is_their_value_and_the_better_window_deci
 
 def test_joint_estimate_is_unbiased_in_a_loop_where_the_direct_one_is_not() -> None:
     n, random = 30_000, np.random.default_rng(7)
-    reference, gust = coloured(8, n), 0.7 * coloured(9, n)
+    reference, gust = coloured(8, n), 0.5 * coloured(9, n)
     b, a, _ = signal.cont2discrete(([4.0], [1.0, 2.0]), 1 / RATE)
     b = b.ravel()
     u, y, x = np.zeros(n), np.zeros(n), 0.0
@@ -140,7 +140,7 @@ def test_joint_estimate_is_unbiased_in_a_loop_where_the_direct_one_is_not() -> N
     def off(found: FrequencyResponse) -> float:
         return float(np.median(np.abs(20 * np.log10(np.abs(found.pair("out", "stick")[0] / truth)))))
 
-    assert off(joint) < 0.7 < 3.0 < off(direct)
+    assert off(joint) < 0.7 < 1.8 < off(direct)
     assert any("feedback biases the direct estimate" in text for text in joint.warnings)
 
 

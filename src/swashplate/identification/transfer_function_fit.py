@@ -1,0 +1,324 @@
+"""Transfer functions from frequency responses: one or several outputs, shared poles, structures tried and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Array
+from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.response_cost import (
+    ParameterAccuracy,
+    ResponseCost,
+    Target,
+    accuracy_of,
+    cost_of,
+    target,
+)
+from swashplate.identification.rows import Entry, Row
+from swashplate.identification.scoring import Optimum, minimise
+from swashplate.identification.spectra import Complex
+from swashplate.identification.transfer_function import USUAL, Form, TransferFunction
+
+STARTS = 12
+"""Starting points of a fit; poles at several places of the band, seeded."""
+
+_LONGEST_DELAY = 0.5
+"""s: a longer one is no delay of a flying thing."""
+
+
+@dataclass(frozen=True)
+class TransferFunctionFit:
+    """Fitted transfer functions of one input.
+
+    Attributes:
+        models: one per output, poles shared.
+        targets: the measured responses that they were fitted to.
+        costs: J of each.
+        parameters: numbers with their bounds, shared poles once.
+        correlation: of the free parameters, in the order of `parameters` without the fixed ones.
+        converged: False where the iterations ran out.
+        warnings: what a reader must know.
+    """
+
+    models: tuple[TransferFunction, ...]
+    targets: tuple[Target, ...]
+    costs: tuple[float, ...]
+    parameters: tuple[ParameterAccuracy, ...]
+    correlation: Array
+    converged: bool
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """Mean J."""
+        return float(np.mean(self.costs))
+
+    @property
+    def form(self) -> Form:
+        return self.models[0].form
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers and words as JSON types."""
+        return {
+            "kind": "transfer-function",
+            "form": self.form.text,
+            "models": [
+                {"output": m.output, "input": m.input, "values": dict(m.values), "text": repr(m), "J": cost}
+                for m, cost in zip(self.models, self.costs, strict=True)
+            ],
+            "parameters": [vars(parameter) for parameter in self.parameters],
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+        }
+
+    def __repr__(self) -> str:
+        lines = [f"{model!r}   J = {cost:.1f}" for model, cost in zip(self.models, self.costs, strict=True)]
+        lines.append(f"  {'parameter':<24}{'value':>12}{'CR %':>9}{'I %':>9}")
+        for p in self.parameters:
+            cells = "    fixed" if p.fixed else f"{p.cramer_rao_percent:>9.1f}{p.insensitivity_percent:>9.1f}"
+            lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}")
+        return "\n".join([*lines, *(f"! {text}" for text in self.warnings)])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One structure that was tried: its form, number of parameters, mean J and the fit."""
+
+    form: Form
+    parameters: int
+    cost: float
+    fit: TransferFunctionFit
+
+
+def fit_transfer_function(
+    responses: FrequencyResponse,
+    form: Form | str,
+    *,
+    input: str,
+    outputs: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    least_coherence: float = 0.6,
+    seed: int = 0,
+) -> TransferFunctionFit:
+    """Fit transfer functions of one input; several outputs share their poles.
+
+    Args:
+        responses: from `respond`.
+        form: of all outputs, e.g. "1/2".
+        input: the input channel.
+        outputs: all outputs where None.
+        band: limits [Hz] within each response's coherent band.
+        fixed: values of parameters that are not to move, e.g. {"tau": 0.05} (several outputs: "tau p" for one).
+        least_coherence: from which a response is used.
+        seed: of the starting points.
+
+    Raises:
+        IdentificationError: no coherent response, or a fixed name that the form does not have.
+    """
+    form = Form.parse(form) if isinstance(form, str) else form
+    wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
+    return _fit(wanted, form, fixed=dict(fixed or {}), seed=seed)
+
+
+def targets_of(
+    responses: FrequencyResponse,
+    *,
+    input: str,
+    outputs: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    least: float = 0.6,
+) -> list[Target]:
+    """The coherent responses of outputs to one input.
+
+    Raises:
+        IdentificationError: where one has no coherent band.
+    """
+    names = tuple(outputs) if outputs else responses.outputs
+    found = []
+    for name in names:
+        one = target(responses, name, input, band=band, least=least)
+        if one is None:
+            raise IdentificationError(
+                f"the coherence reaches {least:g} nowhere over a quarter of an octave"
+                + (f" within {band[0]:g}-{band[1]:g} Hz." if band else "."),
+                channel=f"{name} / {input}",
+                hint="Nothing can be fitted to this response; leave it out or fly a better sweep.",
+            )
+        found.append(one)
+    return found
+
+
+def suggest(
+    responses: FrequencyResponse,
+    *,
+    input: str,
+    outputs: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    forms: Sequence[Form] = USUAL,
+    least_coherence: float = 0.6,
+    seed: int = 0,
+) -> tuple[Trial, tuple[Trial, ...]]:
+    """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
+
+    Hardly: J within 10 of, or within 1.5 times, the least J of all (the pair of Tischler and Remple's "acceptable" and
+    "indistinguishable" lies a factor of two apart).
+
+    Returns:
+        The suggestion, and all trials by number of parameters.
+    """
+    wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
+    trials = []
+    for form in forms:
+        fit = _fit(wanted, form, fixed={}, seed=seed)
+        trials.append(Trial(form, len(fit.parameters), fit.cost, fit))
+    trials.sort(key=lambda trial: (trial.parameters, trial.cost))
+    least = min(trial.cost for trial in trials)
+    good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]
+    return good[0], tuple(trials)
+
+
+def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed: int) -> TransferFunctionFit:
+    shared = form.pole_names
+    several = len(targets) > 1
+    owner = [{name: f"{name} {t.output}" if several else name for name in form.own_names} for t in targets]
+    names = [*(name for own in owner for name in own.values()), *shared]
+    spread = {own[name]: fixed[name] for own in owner for name in own if name in fixed}
+    spread |= {name: value for name, value in fixed.items() if name in names}
+    unknown = sorted(set(fixed) - set(names) - set(form.own_names))
+    if unknown:
+        raise IdentificationError(
+            f"is no parameter of the form {form.text}; it has {', '.join(names)}.", channel=", ".join(unknown)
+        )
+    free = [name for name in names if name not in spread]
+
+    def models(values: Mapping[str, float]) -> list[TransferFunction]:
+        return [
+            TransferFunction(
+                form,
+                {n: float(values[own[n]]) for n in form.own_names} | {n: float(values[n]) for n in shared},
+                t.output,
+                t.input,
+            )
+            for t, own in zip(targets, owner, strict=True)
+        ]
+
+    def evaluate(numbers: Array) -> tuple[list[Complex], list[Complex]]:
+        values = spread | dict(zip(free, numbers, strict=True))
+        answers, slopes = [], []
+        for t, own, model in zip(targets, owner, models(values), strict=True):
+            h, by_name = model.with_slopes(t.omega)
+            column = {own.get(name, name): slope for name, slope in by_name.items()}
+            zero = np.zeros(t.omega.size, dtype=np.complex128)
+            answers.append(h)
+            slopes.append(np.stack([column.get(name, zero) for name in free], axis=1))
+        return answers, slopes
+
+    best: tuple[Optimum, ResponseCost] | None = None
+    for start in _starts(targets, form, owner, seed):
+        numbers = {**start, **spread}
+        row = Row(tuple(_entry(name, numbers[name], start, targets) for name in free))
+        cost = ResponseCost(row, targets, evaluate)
+        if not np.isfinite(cost.cost(row.starts())):
+            continue
+        optimum = minimise(cost, tolerance=1e-5, iterations=80)
+        if best is None or optimum.cost < best[0].cost * (1.0 - 1e-6):
+            best = optimum, cost
+    if best is None:
+        raise IdentificationError("no starting point of the transfer function gives finite responses.")
+    optimum, cost = best
+    found = dict(zip(free, optimum.row * cost.row.scale, strict=True))
+    values = spread | found
+    _, slopes = cost.residuals(optimum.row)
+    bounds = accuracy_of(slopes / cost.row.scale)
+    place = {name: i for i, name in enumerate(free)}
+    parameters = tuple(
+        ParameterAccuracy(name, _unit(name), values[name], values[name], fixed=True)
+        if name in spread
+        else ParameterAccuracy(
+            name,
+            _unit(name),
+            cost.row.entries[place[name]].start,
+            float(values[name]),
+            float(bounds[0][place[name]]),
+            float(bounds[1][place[name]]),
+            at_bound=name in optimum.at_bound,
+        )
+        for name in names
+    )
+    made = tuple(models(values))
+    costs = tuple(cost_of(model.response(t.omega), t) for model, t in zip(made, targets, strict=True))
+    return TransferFunctionFit(
+        made, tuple(targets), costs, parameters, bounds[2], optimum.converged, _words(made, costs, parameters)
+    )
+
+
+def _words(
+    models: Sequence[TransferFunction], costs: Sequence[float], parameters: Sequence[ParameterAccuracy]
+) -> tuple[str, ...]:
+    words = [
+        f"{m.output} / {m.input}: J = {cost:.0f}, above 100: the structure does not fit."
+        for m, cost in zip(models, costs, strict=True)
+        if cost > 100.0
+    ]
+    vague = [p.name for p in parameters if not p.fixed and p.cramer_rao_percent > 20.0]
+    if vague:
+        words.append(f"Cramér-Rao bound above 20 %: {', '.join(vague)}; fewer parameters may do.")
+    if any(pole.real > 1e-9 for pole in models[0].poles):
+        words.append("the model is unstable.")
+    return tuple(words)
+
+
+def _unit(name: str) -> str:
+    kind = name.split(" ")[0].split("_")[0]
+    return {"tau": "s", "zero": "1/s", "pole": "1/s", "omega": "rad/s", "zeta": "1"}.get(kind, "")
+
+
+def _entry(name: str, value: float, start: Mapping[str, float], targets: Sequence[Target]) -> Entry:
+    low, high = min(t.omega[0] for t in targets), max(t.omega[-1] for t in targets)
+    kind = name.split(" ")[0].split("_")[0]
+    if kind == "tau":
+        return Entry(name, "parameter", value, 0.05, 0.0, _LONGEST_DELAY)
+    if kind == "zeta":
+        return Entry(name, "parameter", value, 0.3, -2.0, 10.0)
+    if kind == "omega":
+        return Entry(name, "parameter", value, max(abs(value), low) / 2.0, low / 100.0, high * 30.0)
+    if kind in ("zero", "pole"):
+        return Entry(name, "parameter", value, max(abs(value), low) / 2.0, -high * 30.0, high * 30.0)
+    return Entry(name, "parameter", value, abs(value) / 2.0)
+
+
+def _starts(
+    targets: Sequence[Target], form: Form, owner: Sequence[Mapping[str, str]], seed: int
+) -> list[dict[str, float]]:
+    """Roots spread over the band; gain (with its sign) and delay by least squares on what the roots leave."""
+    random = np.random.default_rng(seed)
+    low, high = min(t.omega[0] for t in targets), max(t.omega[-1] for t in targets)
+    made = []
+    number = 1 if not form.pole_names and not form.zero_names else STARTS
+    for k in range(number):
+        values: dict[str, float] = {}
+        for name in (*form.pole_names, *form.zero_names):
+            at = np.exp(random.uniform(np.log(low), np.log(high)))
+            values[name] = float(random.uniform(0.1, 1.0) if name.startswith("zeta") else at)
+            if name.startswith("zero") and k % 3 == 2:
+                values[name] = -values[name]
+        for t, own in zip(targets, owner, strict=True):
+            shape = TransferFunction(form, {**values, "K": 1.0, "tau": 0.0})
+            left = t.measured / shape.response(t.omega)
+            phase = np.unwrap(np.angle(left))
+            slope = float(np.polyfit(t.omega, phase, 1)[0]) if form.delay else 0.0
+            tau = float(np.clip(-slope, 0.0, 0.8 * _LONGEST_DELAY))
+            turned = left * np.exp(1j * tau * t.omega)
+            sign = np.sign(np.sum(turned.real / np.abs(turned))) or 1.0
+            gain = float(sign * np.exp(np.mean(np.log(np.abs(left)))))
+            values |= {own[n]: values[n] for n in form.zero_names} | {own["K"]: gain}
+            if form.delay:
+                values[own["tau"]] = tau
+        made.append(values)
+    return made
