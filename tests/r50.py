@@ -54,7 +54,9 @@ def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0,
     random = np.random.default_rng(seed)
     a, b, c, d = model.explicit()
     n, m, dt = len(model.states), len(model.inputs), 1.0 / RATE
-    weights = np.diag([{"u": 0.004, "v": 0.004, "w": 0.002, "phi": 0.05, "theta": 0.05, "r": 0.01}.get(s, 1e-4) for s in model.states])
+    weights = np.diag(
+        [{"u": 0.004, "v": 0.004, "w": 0.002, "phi": 0.05, "theta": 0.05, "r": 0.01}.get(s, 1e-4) for s in model.states]
+    )
     gain = np.linalg.solve(np.eye(m), b.T @ solve_continuous_are(a, b, weights, np.eye(m)))
     # Inputs and wind run straight between samples (first-order hold, by an augmented exponential).
     wind = a[:, [model.states.index(s) for s in ("u", "v", "w")]]
@@ -94,4 +96,6 @@ def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0,
     columns |= {name: commands[:, i] for i, name in enumerate(model.inputs)}
     columns["sweep"] = sweep
     units = dict.fromkeys((*model.inputs, "sweep"), "1")
-    return Flight({"uniform": stream(time, columns, units)}, Provenance(source=f"R-50 {axis} sweep {seed}", simulated=True))
+    return Flight(
+        {"uniform": stream(time, columns, units)}, Provenance(source=f"R-50 {axis} sweep {seed}", simulated=True)
+    )

@@ -30,6 +30,9 @@ SURE = 0.2
 """Random error below which two estimates are compared."""
 INJECTED = ("sweep", "sid", "reference", "excitation")
 """Names of signals that a program adds to a command: they are part of an input, not another one."""
+PERIODS = 4.0
+"""Periods that a window must hold for it to count beside longer ones. The book trusts it from one period on; measured
+on an R-50 in hover, it is off by 3 dB at two periods and by 0.1 dB at four. Only the longest goes down to one."""
 MIXED = 0.5
 """Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
 
@@ -205,9 +208,11 @@ def _reference_columns(
 def _matrices(
     pieces: Sequence[Signals], omega: Array, lengths: Sequence[float], overlap: float
 ) -> tuple[list[SpectralMatrix], list[str]]:
-    found, notes = [], []
+    found: list[SpectralMatrix] = []
+    notes: list[str] = []
     for length in lengths:
-        matrix = spectral_matrix(pieces, omega, window=length, overlap=overlap)
+        periods = PERIODS if found else 1.0
+        matrix = spectral_matrix(pieces, omega, window=length, overlap=overlap, periods=periods)
         if matrix is None:
             notes.append(f"no record is as long as the window of {length:.3g} s; it was left out.")
             continue

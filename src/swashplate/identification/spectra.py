@@ -73,7 +73,7 @@ class SpectralMatrix:
         window: its length [s].
         averages: number of independent windows, n_d (total length of the records over the window's).
         values: one-sided spectral densities [units^2/Hz], `values[f, i, j]` = average of conj(Z_i) Z_j; NaN at
-            frequencies below one period per window. Shape (n_frequencies, n_channels, n_channels).
+            frequencies below `periods` per window. Shape (n_frequencies, n_channels, n_channels).
         used: names of the records that are long enough for this window.
     """
 
@@ -83,7 +83,9 @@ class SpectralMatrix:
     used: tuple[str, ...]
 
 
-def spectral_matrix(pieces: Sequence[Signals], omega: Array, *, window: float, overlap: float) -> SpectralMatrix | None:
+def spectral_matrix(
+    pieces: Sequence[Signals], omega: Array, *, window: float, overlap: float, periods: float = 1.0
+) -> SpectralMatrix | None:
     """The spectral matrix from windows of one length, never across the join of two records.
 
     Args:
@@ -91,6 +93,7 @@ def spectral_matrix(pieces: Sequence[Signals], omega: Array, *, window: float, o
         omega: frequencies [rad/s].
         window: length [s].
         overlap: share of a window that the next one repeats, 0 to below 1.
+        periods: of the lowest frequency that a window must hold.
 
     Returns:
         None where no record is as long as the window.
@@ -101,7 +104,7 @@ def spectral_matrix(pieces: Sequence[Signals], omega: Array, *, window: float, o
     if not long_enough or n < 4:
         return None
     taper = windows.hann(n, sym=False)
-    seen = omega * n * dt >= 2.0 * np.pi * (1.0 - 1e-9)
+    seen = omega * n * dt >= 2.0 * np.pi * periods * (1.0 - 1e-9)
     kernel = _kernel(omega[seen], taper, dt)
     step = max(1, round((1.0 - overlap) * n))
     total = np.zeros((int(seen.sum()), channels, channels), dtype=np.complex128)

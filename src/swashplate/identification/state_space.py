@@ -169,7 +169,7 @@ class StateSpaceModel:
                 "the left side is singular: some state's derivative stands in no equation.", where=self.name
             )
         a, b = np.linalg.solve(m["M"], m["F"]), np.linalg.solve(m["M"], m["G"])
-        return a, b, m["H0"] + m["H1"] @ a, m["D"] + m["H1"] @ b
+        return np.asarray(a), np.asarray(b), m["H0"] + m["H1"] @ a, m["D"] + m["H1"] @ b
 
     def delay(self, output: str, input: str) -> float:
         """Delay of one response [s]."""
@@ -206,9 +206,9 @@ class StateSpaceModel:
             found[name] = frozenset().union(*(found[used] for used in self._tie(name).names))
         return found
 
-    def sensitivities(self, free: tuple[str, ...], numbers: Array, pairs: list[tuple[int, int, Array]]) -> tuple[
-        list[Complex], list[Complex]
-    ]:
+    def sensitivities(
+        self, free: tuple[str, ...], numbers: Array, pairs: list[tuple[int, int, Array]]
+    ) -> tuple[list[Complex], list[Complex]]:
         """Responses of some pairs at their own frequencies, and their derivatives.
 
         Args:
@@ -239,7 +239,8 @@ class StateSpaceModel:
         for o, i, omega in pairs:
             at = where[done : done + omega.size]
             done += omega.size
-            xi, lo, hi, jw = x[at, :, i], left[at, o, :], h[at, o, i], 1j * omega
+            xi, lo, hi = x[at, :, i], left[at, o, :], h[at, o, i]
+            jw: Complex = np.asarray(1j * omega, dtype=np.complex128)
             total = np.zeros((omega.size, len(free)), dtype=np.complex128)
             for e, slope in slopes_of:
                 change = _change(e, o, i, xi, lo, jw)

@@ -1,32 +1,32 @@
 """State-space model files: readable TOML, matrices as named equations, expressions parsed and never evaluated as code.
 
-    kind = "state-space"
-    name = "heave"
-    title = "Vertical speed of a helicopter in hover"
-    trust = "..."
+kind = "state-space"
+name = "heave"
+title = "Vertical speed of a helicopter in hover"
+trust = "..."
 
-    [states]
-    w = "m/s"
-    [inputs]
-    collective = "1"
+[states]
+w = "m/s"
+[inputs]
+collective = "1"
 
-    [equations]                                  # the right side, by state: coefficients of states and inputs
-    w = {w = "Zw", collective = "Zcol"}
-    [left]                                       # the left side, where it is not the plain derivative
-    # a = {a = "tau_f"}
-    [outputs.az]
-    unit = "m/s^2"
-    of = {}                                      # coefficients of states and inputs
-    rates = {w = "1"}                            # coefficients of the states' derivatives
-    # specific_force = "z", at = ["x_s", "y_s", "z_s"]   an accelerometer at a place from the centre of gravity
-    [delays]
-    collective = "tau"                           # by input, or by "output/input"
+[equations]                                  # the right side, by state: coefficients of states and inputs
+w = {w = "Zw", collective = "Zcol"}
+[left]                                       # the left side, where it is not the plain derivative
+# a = {a = "tau_f"}
+[outputs.az]
+unit = "m/s^2"
+of = {}                                      # coefficients of states and inputs
+rates = {w = "1"}                            # coefficients of the states' derivatives
+# specific_force = "z", at = ["x_s", "y_s", "z_s"]   an accelerometer at a place from the centre of gravity
+[delays]
+collective = "tau"                           # by input, or by "output/input"
 
-    [parameters]
-    Zw = {value = -0.6, unit = "1/s", upper = 0.0}
-    Zcol = {value = -14.0, unit = "m/s^2"}
-    tau = {value = 0.02, unit = "s", lower = 0.0}
-    # also: fixed = true, tie = "2 * Mu", dropped = 0.0, note = "..."
+[parameters]
+Zw = {value = -0.6, unit = "1/s", upper = 0.0}
+Zcol = {value = -14.0, unit = "m/s^2"}
+tau = {value = 0.02, unit = "s", lower = 0.0}
+# also: fixed = true, tie = "2 * Mu", dropped = 0.0, note = "..."
 """
 
 from __future__ import annotations
@@ -262,9 +262,11 @@ class _Reader:
         for name, table in self._table("left").items():
             row = self._state(name, f"left.{name}")
             self._row(table, row, f"left.{name}", of_states="M", of_inputs=None)
-        for row, name in enumerate(self.states):
+        for name in self.states:
             if name not in self._table("equations"):
-                raise CardError("has no equation.", where=self.path, channel=name, hint=f"Add it to [equations]: {name} = ...")
+                raise CardError(
+                    "has no equation.", where=self.path, channel=name, hint=f"Add it to [equations]: {name} = ..."
+                )
         for name, table in self._table("equations").items():
             row = self._state(name, f"equations.{name}")
             self._row(table, row, f"equations.{name}", of_states="F", of_inputs="G")
@@ -282,13 +284,18 @@ class _Reader:
         for name, text in self._table("delays").items():
             parts = name.split("/")
             if parts[-1] not in self.inputs or (len(parts) == 2 and parts[0] not in self.outputs) or len(parts) > 2:
-                raise CardError("is no input and no 'output/input' of this model.", where=self.path, channel=f"delays.{name}")
+                raise CardError(
+                    "is no input and no 'output/input' of this model.", where=self.path, channel=f"delays.{name}"
+                )
             delays[name] = self._expression(text, f"delays.{name}")
             self.used |= delays[name].names
         idle = sorted(set(self.parameters) - self.used)
         if idle:
             raise CardError(
-                "stands in no equation, output, delay or tie.", where=self.path, channel=", ".join(idle), hint="Is it misspelt?"
+                "stands in no equation, output, delay or tie.",
+                where=self.path,
+                channel=", ".join(idle),
+                hint="Is it misspelt?",
             )
         model = StateSpaceModel(
             name=str(self.document["name"]),
