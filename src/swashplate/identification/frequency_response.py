@@ -151,6 +151,36 @@ class FrequencyResponse:
 
         return load(Path(path))
 
+    def as_dict(self) -> dict[str, Any]:
+        """Summary and numbers as JSON types."""
+        pairs = []
+        for output in self.outputs:
+            for name in self.inputs:
+                h, coherence, error = self.pair(output, name)
+                band = self.band(output, name)
+                pairs.append(
+                    {
+                        "output": output,
+                        "input": name,
+                        "band_hz": None if band is None else [band[0] / TWO_PI, band[1] / TWO_PI],
+                        "magnitude_db": np.asarray(decibel(h)).tolist(),
+                        "phase_deg": unwrapped_degrees(h).tolist(),
+                        "coherence": coherence.tolist(),
+                        "error": error.tolist(),
+                    }
+                )
+        return {
+            "kind": "frequency-responses",
+            "method": self.method,
+            "frequency_hz": (self.omega / TWO_PI).tolist(),
+            "responses": pairs,
+            "windows": list(self.windows),
+            "sources": list(self.sources),
+            "warnings": list(self.warnings),
+            "problems": list(self.problems),
+            "settings": dict(self.settings),
+        }
+
     # ---- looking -----------------------------------------------------------------------------------------------
     def rows(self, output: str, input: str, *, lines: int = 12) -> list[tuple[float, float, float, float, float]]:
         """Frequency [Hz], magnitude [dB], phase [deg], coherence and error [dB] at lines spread over the pair."""

@@ -6,35 +6,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
 from swashplate.flights.schema import QUATERNION, channel
+from swashplate.identification import response_warnings
 from swashplate.identification.composite import composite
 from swashplate.identification.conditioning import (
-    SINGULAR,
     Conditioned,
     condition_spectra,
     project_on_references,
     random_error,
 )
-from swashplate.identification.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
 
 LINES_PER_DECADE = 50
 WINDOWS = 5
 OVERLAP = 0.75
 """Hann windows that overlap so weigh every sample alike; less loses data, more only repeats."""
-SURE = 0.2
-"""Random error below which two estimates are compared."""
 INJECTED = ("sweep", "sid", "reference", "excitation")
 """Names of signals that a program adds to a command: they are part of an input, not another one."""
+SHORTEST = 0.2
+"""Pieces shorter than this share of the longest are left out: they would shorten all windows."""
 PERIODS = 4.0
 """Periods that a window must hold for it to count beside longer ones. The book trusts it from one period on; measured
 on an R-50 in hover, it is off by 3 dB at two periods and by 0.1 dB at four. Only the longest goes down to one."""
-MIXED = 0.5
-"""Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +106,15 @@ def respond(
         )
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
+    owner = [number for number, flight in enumerate(flights) for _ in flight.split()]
+    longest = max(piece.duration for piece in pieces)
+    kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
+    scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
+    pieces, owner = [pieces[k] for k in kept], [owner[k] for k in kept]
     n = len(inputs) + len(outputs)
     own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
     if references:
-        columns = _reference_columns(flights, pieces, n, len(references), inputs)
+        columns = _reference_columns(owner, pieces, n, len(references), inputs)
         own = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
             for piece, c in zip(own, columns, strict=True)
@@ -134,15 +136,20 @@ def respond(
     question = _Question(inputs, outputs, own[0].values.shape[1] - n)
     matrices, notes = _matrices(own, omega, chosen.lengths, overlap)
     made = _composed(matrices, omega, question)
-    warnings, problems = [*chosen.warnings, *notes], list(_dead(flights, inputs, outputs))
+    if scraps:
+        notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
+    warnings, problems = [*chosen.warnings, *notes], list(response_warnings.dead(flights, inputs, outputs))
     if question.references:
         direct = _composed(matrices, omega, replace(question, references=0))
-        warnings += _bias_words(made, direct)
-    warnings += _few_averages(matrices)
-    warnings += _mixing_words(made)
-    problems += _correlated(made, dead=_still(flights, inputs))
-    problems += _incoherent(made)
-    warnings += _bystander_words(pieces, omega, question, others, n + len(references), chosen.lengths, overlap)
+        warnings += response_warnings.bias_words(made, direct)
+    warnings += response_warnings.few_averages(matrices)
+    warnings += response_warnings.mixing_words(made)
+    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
+    problems += response_warnings.incoherent(made)
+    if others and not references:
+        warnings += response_warnings.bystander_words(
+            pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
+        )
     return replace(
         made,
         input_units=tuple(_unit(flights[0], name) for name in inputs),
@@ -189,13 +196,13 @@ def _unit(flight: Flight, name: str) -> str:
 
 
 def _reference_columns(
-    flights: Sequence[Flight], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
+    owner: Sequence[int], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
 ) -> list[Array]:
     """The references of each piece; a single one is split by flight where that gives one per input."""
     columns = [piece.values[:, first : first + count] for piece in pieces]
-    owner = [number for number, flight in enumerate(flights) for _ in flight.split()]
-    if count == 1 and len(inputs) > 1 and len(flights) >= len(inputs):
-        columns = [column * (np.arange(len(flights)) == flight) for column, flight in zip(columns, owner, strict=True)]
+    flown = sorted(set(owner))
+    if count == 1 and len(inputs) > 1 and len(flown) >= len(inputs):
+        columns = [column * (np.array(flown) == flight) for column, flight in zip(columns, owner, strict=True)]
     if columns[0].shape[1] < len(inputs):
         raise FlightError(
             f"{columns[0].shape[1]} reference(s) cannot tell {len(inputs)} inputs apart.",
@@ -290,137 +297,3 @@ def _mean(weight: Array, values: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         total = np.sum(np.where(shaped > 0.0, shaped * np.nan_to_num(values), 0.0), axis=0)
         return np.asarray(total / shaped.sum(axis=0))
-
-
-# ---- what a reader must know ------------------------------------------------------------------------------------
-
-
-def _hertz(omega: Array, where: NDArray[np.bool_]) -> str:
-    inside = omega[where] / TWO_PI
-    return f"{inside.min():.3g}-{inside.max():.3g} Hz"
-
-
-def _still(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in names if all(np.ptp(flight.values(name)) == 0.0 for flight in flights))
-
-
-def _dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str]) -> list[str]:
-    return [
-        f"{role} '{name}' never moves; there is no response for it."
-        for role, names in (("input", inputs), ("output", outputs))
-        for name in _still(flights, names)
-    ]
-
-
-def _correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
-    """Inputs that no frequency, or hardly one, tells apart."""
-    words = []
-    for i, name in enumerate(found.inputs):
-        lost = np.isnan(found.response[:, :, i]).all(axis=1) & np.isfinite(found.input_power[:, i])
-        if name in dead or not lost.any():
-            continue
-        mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
-        mean[i] = -1.0
-        partner = found.inputs[int(np.argmax(mean))] if len(found.inputs) > 1 else "itself"
-        words.append(
-            f"input '{name}' cannot be told from '{partner}' at {_hertz(found.omega, lost)}: less than "
-            f"{100 * SINGULAR:g} % of its power is its own. No number is given there; move the inputs independently."
-        )
-    return words
-
-
-def _incoherent(found: FrequencyResponse) -> list[str]:
-    words = []
-    for output in found.outputs:
-        o = found.outputs.index(output)
-        if not np.isfinite(found.response[:, o, :]).any():
-            continue
-        if all(found.band(output, name) is None for name in found.inputs):
-            best = float(np.nanmax(found.coherence[:, o, :]))
-            words.append(
-                f"no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a quarter of an "
-                f"octave (largest single value {best:.2f}): do not use its responses."
-            )
-    return words
-
-
-def _few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
-    fewest = min(matrix.averages for matrix in matrices)
-    if fewest >= 4.95:
-        return []
-    return [f"the longest window fits {fewest:.1f} times into the records, expected at least 5: errors are large."]
-
-
-def _mixing_words(found: FrequencyResponse) -> list[str]:
-    words = []
-    for i, one in enumerate(found.inputs):
-        for j, other in enumerate(found.inputs[:i]):
-            mixed = found.input_coherence[:, i, j]
-            if np.isfinite(mixed).any() and np.nanmean(mixed) > MIXED:
-                words.append(
-                    f"'{other}' and '{one}' moved together (mean coherence {np.nanmean(mixed):.2f}, over {MIXED:g}): "
-                    "conditioning tells them apart, with larger errors."
-                )
-    return words
-
-
-def _bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]:
-    """Where the loop makes the direct estimate another one than the joint."""
-    words = []
-    for o, output in enumerate(joint.outputs):
-        for i, name in enumerate(joint.inputs):
-            h, d = joint.response[:, o, i], direct.response[:, o, i]
-            sure = joint.error[:, o, i] < SURE
-            with np.errstate(divide="ignore", invalid="ignore"):
-                apart = np.abs(np.log(d / h))
-            bound = np.maximum(3.0 * np.hypot(joint.error[:, o, i], direct.error[:, o, i]), np.log(10.0) / 20.0)
-            biased = sure & (apart > bound)
-            if biased.sum() > 0.1 * max(sure.sum(), 1):
-                words.append(
-                    f"{output} / {name}: feedback biases the direct estimate by up to "
-                    f"{20 * np.log10(np.e) * np.nanmax(apart[biased]):.1f} dB at {_hertz(joint.omega, biased)}; "
-                    "the joint estimate is given."
-                )
-    return words
-
-
-def _bystander_words(
-    pieces: Sequence[Signals],
-    omega: Array,
-    question: _Question,
-    others: Sequence[str],
-    first: int,
-    lengths: Sequence[float],
-    overlap: float,
-) -> list[str]:
-    """Commands left out that change the answer: compared in one window, with and without them."""
-    if not others or question.references:
-        return []
-    n_in, n_out = len(question.inputs), len(question.outputs)
-    words: list[str] = []
-    # A middle window: enough averages to be sure of a difference, long enough to see the low end.
-    matrix = spectral_matrix(pieces, omega, window=lengths[len(lengths) // 2], overlap=overlap)
-    if matrix is None:
-        return []
-    outputs = list(range(n_in, n_in + n_out))
-    alone = condition_spectra(matrix.values[:, : n_in + n_out, : n_in + n_out], n_in, averages=matrix.averages)
-    for k, name in enumerate(others):
-        order = [*range(n_in), first + k, *outputs]
-        both = condition_spectra(
-            matrix.values[np.ix_(range(omega.size), order, order)], n_in + 1, averages=matrix.averages
-        )
-        for o, output in enumerate(question.outputs):
-            for i, mover in enumerate(question.inputs):
-                h, b = alone.response[:, o, i], both.response[:, o, i]
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    apart = np.abs(np.log(h / b))
-                bound = np.maximum(3.0 * both.error[:, o, i], np.log(10.0) / 20.0 * 0.5)
-                sure = both.error[:, o, i] < SURE
-                off = sure & (apart > bound)
-                if off.sum() > max(2, 0.05 * sure.sum()):
-                    words.append(
-                        f"{output} / {mover}: '{name}' moved along and this single response is off by "
-                        f"{20 * np.log10(np.e) * np.nanmedian(apart[off]):.1f} dB (median) at {_hertz(omega, off)}; "
-                        f"add '{name}' to the inputs."
-                    )
-    return words

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
+from swashplate.flights.schema import channel
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.response_cost import (
     ParameterAccuracy,
@@ -22,6 +24,8 @@ from swashplate.identification.response_cost import (
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.spectra import Complex
+from swashplate.identification.state_space import StateSpaceModel
+from swashplate.identification.state_space_file import parse
 from swashplate.identification.transfer_function import USUAL, Form, TransferFunction
 
 STARTS = 12
@@ -322,3 +326,44 @@ def _starts(
                 values[own["tau"]] = tau
         made.append(values)
     return made
+
+
+def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function") -> StateSpaceModel:
+    """The fitted transfer functions as one model (controllable canonical form), to be saved, flown and verified.
+
+    Raises:
+        IdentificationError: more zeros than poles: such a model has no states that could be flown.
+    """
+    poles = np.real(np.atleast_1d(np.poly(fit.models[0].poles)))
+    order = poles.size - 1
+    source = fit.models[0].input
+    states = {f"x{k + 1}": "" for k in range(order)}
+    equations: dict[str, dict[str, str]] = {f"x{k + 1}": {f"x{k + 2}": "1"} for k in range(order - 1)}
+    if order:
+        last = {f"x{k + 1}": repr(-float(poles[order - k])) for k in range(order)}
+        equations[f"x{order}"] = {**last, source: "1"}
+    outputs, delays = {}, {}
+    for model, wanted in zip(fit.models, fit.targets, strict=True):
+        top = model.coefficients[0]
+        if top.size > order + 1:
+            raise IdentificationError(
+                f"{model.output} / {model.input} has {top.size - 1} zeros over {order} poles: it cannot be flown."
+            )
+        top = np.concatenate([np.zeros(order + 1 - top.size), top])
+        through = float(top[0])
+        row = {f"x{k + 1}": repr(float(top[order - k] - through * poles[order - k])) for k in range(order)}
+        outputs[wanted.output] = {"unit": channel(wanted.output).unit, "of": {**row, source: repr(through)}}
+        delays[f"{model.output}/{model.input}"] = repr(float(model.values.get("tau", 0.0)))
+    document = {
+        "kind": "state-space",
+        "name": name,
+        "title": "; ".join(map(repr, fit.models)),
+        "trust": "Within the band of the fit; a transfer function knows one input.",
+        "states": states,
+        "inputs": {source: channel(source).unit},
+        "equations": equations,
+        "outputs": outputs,
+        "delays": delays,
+        "parameters": {},
+    }
+    return parse(tomli_w.dumps(document), path=name)

@@ -1,0 +1,85 @@
+"""What the verbs on frequency responses share: reading logs for them, finding responses, saying what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli.guard import Exit
+from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.cli.reading import Reading
+    from swashplate.flights.flight import Flight
+    from swashplate.identification.frequency_response import FrequencyResponse
+
+RESPONSES = "responses.nc"
+
+BandOption = Annotated[str | None, typer.Option("--band", metavar="LOW-HIGH", help="Limits in Hz, for example 0.1-10.")]
+Responses = Annotated[
+    Path, typer.Argument(metavar="RESPONSES", help="What `swash respond` wrote: the file responses.nc or its folder.")
+]
+Coherence = Annotated[float, typer.Option("--coherence", help="Least coherence that counts.", min=0.0, max=1.0)]
+
+
+def band(text: str | None, *, option: str = "--band") -> tuple[float, float] | None:
+    """`0.1-10` (also with Hz) as two rising numbers."""
+    if text is None:
+        return None
+    try:
+        low, high = (float(part) for part in text.lower().removesuffix("hz").split("-"))
+    except ValueError:
+        low = high = float("nan")
+    if not 0.0 < low < high < float("inf"):
+        raise SwashError(f"'{text}' is not LOW-HIGH in Hz.", channel=option, hint=f"Example: {option} 0.1-10")
+    return low, high
+
+
+def names(text: str | None) -> tuple[str, ...]:
+    """Names separated by commas."""
+    return tuple(part.strip() for part in (text or "").split(",") if part.strip())
+
+
+def flown(
+    texts: Sequence[str],
+    channels: Sequence[str],
+    *,
+    rate: float,
+    cutoff: float,
+    how: Reading,
+    also: Sequence[str] = (),
+) -> list[Flight]:
+    """Flights at one rate, with the streams that hold the channels (and those in `also` that are there) only.
+
+    Nothing is cut at take-off and landing and no outlier is removed: sweeps are long, and what looks like an outlier to
+    motion capture's rules is often a doublet. Channels that the log lacks are derived where attitude and place allow.
+    """
+    from swashplate.cli.reading import read
+
+    made = []
+    for text in texts:
+        flight = read(text, how=how)
+        whole = all(name in flight for name in channels)
+        if whole:
+            homes = {flight.stream_of(name) for name in (*channels, *also) if name in flight}
+            flight = flight.with_streams({name: data for name, data in flight.streams.items() if name in homes})
+        made.append(flight.condition(rate=rate, cutoff=cutoff, outliers=False, trim_ground=False, derive=not whole))
+    return made
+
+
+def load_responses(path: Path) -> FrequencyResponse:
+    """The responses in a file, or in a folder that `swash respond` wrote."""
+    from swashplate.identification.frequency_response import FrequencyResponse
+
+    return FrequencyResponse.load(path / RESPONSES if path.is_dir() else path)
+
+
+def end_with(problems: Sequence[str]) -> None:
+    """Exit code 2 with one line where something could not be computed; the rest has been written and marked."""
+    if problems:
+        typer.secho("Error: ", fg="red", bold=True, err=True, nl=False)
+        typer.echo(" ".join(" ".join(problems).split()), err=True)
+        raise typer.Exit(Exit.INPUT)
