@@ -97,7 +97,7 @@ def fit_ss(
             line.say("flying the model along what the fit has not seen")
             channels = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
             flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
-            verification = verify(fit.model, flights)
+            verification = flying.seen_before(verify(fit.model, flights), found.sources)
         suggested = suggest_gains(fit.model) if gains else ()
         if folder is not None:
             line.say("writing the report")

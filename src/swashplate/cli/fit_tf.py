@@ -80,7 +80,8 @@ def fit_tf(
         if hold_out and model is not None:
             line.say("flying the model along what the fit has not seen")
             channels = (*model.inputs, *model.outputs)
-            verification = verify(model, flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how))
+            flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
+            verification = flying.seen_before(verify(model, flights), found.sources)
         if folder is not None:
             pairs = tuple(m.output for m in fit.models)
             material = ResponseMaterial(found.select(pairs, (input,)), (fit,), trials, verification=verification)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
     from swashplate.cli.reading import Reading
     from swashplate.flights.flight import Flight
     from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.verification import Verification
 
 RESPONSES = "responses.nc"
 
@@ -75,6 +78,27 @@ def load_responses(path: Path) -> FrequencyResponse:
     from swashplate.identification.frequency_response import FrequencyResponse
 
     return FrequencyResponse.load(path / RESPONSES if path.is_dir() else path)
+
+
+_PIECE = re.compile(r"(?P<source>.+) (?P<start>-?[\d.]+)-(?P<stop>-?[\d.]+) s")
+
+
+def seen_before(verification: Verification, sources: Sequence[str]) -> Verification:
+    """The verification, with a warning where a stretch lies in what the responses were made from."""
+    fitted = [m for m in map(_PIECE.fullmatch, sources) if m]
+    used = [
+        trace.source
+        for trace in verification.traces
+        if (t := _PIECE.fullmatch(trace.source))
+        and any(
+            f["source"] == t["source"] and float(f["start"]) < float(t["stop"]) and float(t["start"]) < float(f["stop"])
+            for f in fitted
+        )
+    ]
+    if not used:
+        return verification
+    words = f"NOT A HOLD-OUT: the fit has seen {', '.join(used)}."
+    return replace(verification, warnings=(words, *verification.warnings))
 
 
 def end_with(problems: Sequence[str]) -> None:

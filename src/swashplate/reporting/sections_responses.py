@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -111,7 +111,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if len(fit.free) > 1:
         blocks.append(correlation_matrix(fit.free, fit.correlation))
     if len(fit.history) > 1:
-        blocks.append(cost_history(fit.history))
+        words = "Half the sum of J over all responses, after each iteration."
+        blocks.append(replace(cost_history(fit.history), caption=words))
     return Section("parameters", "Parameters", tuple(blocks))
 
 
