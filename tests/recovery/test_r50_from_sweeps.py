@@ -142,7 +142,7 @@ def test_twenty_seeds(truth: StateSpaceModel) -> None:
             f"max(7 deg, 3 error) where the partial coherence is 0.6 or more: {100 * np.mean(shares):.1f} % of the "
             f"points (worst seed {100 * min(shares):.1f} %); the single-input responses of the same records miss by "
             f"{np.median(single):.1f} dB (median). Modes above 1.5 rad/s within {100 * max(worst):.1f} % in the worst "
-            f"seed. The scatter of a parameter over the seeds is {factor:.2f} times its reported Cramér-Rao bound (median).",
+            f"seed. A parameter scatters over the seeds {factor:.2f} times its reported Cramér-Rao bound (median).",
             "columns": ["parameter", "truth", "mean", "scatter / CR", "bias / CR"],
             "rows": [
                 [n, float(t), float(t + b), float(s / c), float(b / c)]

@@ -144,6 +144,7 @@ def respond(
         warnings += response_warnings.bias_words(made, direct)
     warnings += response_warnings.few_averages(matrices)
     warnings += response_warnings.mixing_words(made)
+    warnings += response_warnings.lead_words(made)
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
     problems += response_warnings.incoherent(made)
     if others and not references:

@@ -156,3 +156,48 @@ def bystander_words(
                         f"this single response is wrong there. Add '{name}' to the inputs, and logs that move each."
                     )
     return words
+
+
+RISING = 15.0
+"""Degrees by which a phase may rise over the coherent band, while the gain does not, before it is said."""
+
+
+def lead_words(found: FrequencyResponse) -> list[str]:
+    """Outputs that run ahead of their input: phase that rises where the gain does not.
+
+    A stable system's phase rises only with its gain (Bode 1945: 90 degrees for 20 dB per decade), and delays make it
+    fall. What is left is a controller that answers the motion, a time skew, or an unstable aircraft.
+    """
+    words = []
+    for output in found.outputs:
+        for name in found.inputs:
+            h, _, error = found.pair(output, name)
+            band = found.band(output, name)
+            if band is None:
+                continue
+            inside = (found.omega >= band[0]) & (found.omega <= band[1]) & np.isfinite(h)
+            decades = np.log10(found.omega[inside])
+            if decades.size < 8 or decades[-1] - decades[0] < 0.5:
+                continue
+            weight = 1.0 / np.maximum(np.degrees(error[inside]), 1.0)
+            phase, sigma = _weighted_slope(decades, np.degrees(np.unwrap(np.angle(h[inside]))), weight)
+            gain, _ = _weighted_slope(decades, 20.0 * np.log10(np.abs(h[inside])), weight)
+            ahead = phase * (decades[-1] - decades[0])
+            if ahead > RISING and phase > 3.0 * sigma and gain < 1.0:
+                words.append(
+                    f"{output} / {name}: the phase rises by {ahead:.0f} degrees over "
+                    f"{_hertz(found.omega, inside)} while the gain does not: the output runs ahead of the input. A "
+                    "controller that answers the motion looks like this, and so do channels skewed in time or an "
+                    "unstable aircraft; do not take it for the aircraft unless an injected sweep (--references) agrees."
+                )
+    return words
+
+
+def _weighted_slope(x: Array, y: Array, weight: Array) -> tuple[float, float]:
+    """Slope of a weighted straight line and its standard deviation from the scatter about it."""
+    middle = float(np.average(x, weights=weight**2))
+    level = float(np.average(y, weights=weight**2))
+    spread = float(weight**2 @ (x - middle) ** 2)
+    slope = float(weight**2 @ ((x - middle) * (y - level))) / spread
+    scatter = weight * (y - level - slope * (x - middle))
+    return slope, float(np.sqrt(scatter @ scatter / max(x.size - 2, 1) / spread))
