@@ -13,7 +13,7 @@ from swashplate.flights.maneuvers import Maneuver
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import structure
 
-RATE = 50.0
+RATE = 100.0
 NOISE = {"p": 0.005, "q": 0.005, "r": 0.005, "ax": 0.05, "ay": 0.05, "az": 0.05, "u": 0.03, "v": 0.03, "w": 0.03}
 """Standard deviation of each sensor [rad/s, m/s^2, m/s]."""
 AMPLITUDE = {"lateral": 0.3, "longitudinal": 0.4, "pedal": 0.2, "collective": 0.25}

@@ -127,7 +127,10 @@ def spectral_matrix(
 
 def _kernel(omega: Array, taper: Array, dt: float) -> Array:
     """Columns of cosines and minus sines under the taper, blind to a constant, shape (n, 2 n_frequencies)."""
-    angle = np.outer(np.arange(taper.size) * dt, omega)
-    kernel = np.concatenate([np.cos(angle), -np.sin(angle)], axis=1) * taper[:, None]
+    # e^(-j omega dt n) with n = 64 b + a as a product of two small tables: sines are dear, products are not.
+    fine = np.exp(-1j * dt * np.outer(np.arange(64), omega))
+    coarse = np.exp(-64j * dt * np.outer(np.arange(-(-taper.size // 64)), omega))
+    wave = (coarse[:, None, :] * fine).reshape(-1, omega.size)[: taper.size]
+    kernel = np.concatenate([wave.real, wave.imag], axis=1) * taper[:, None]
     # The tapered mean is taken out of every window: at the lowest line it would leak in from frequency zero.
     return np.asarray(kernel - np.outer(taper / taper.sum(), kernel.sum(axis=0)))
