@@ -8,11 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from swashplate.errors import IdentificationError
 from swashplate.identification.response_cost import ParameterAccuracy
 from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET, StateSpaceFit, Step, fit_targets
 
 GROWTH, LEAST_GROWTH = 0.05, 0.5
 """J_ave may grow by this share, or by this much, for a drop to stand."""
+
+HOPELESS = 100.0
+"""Percent of Cramér-Rao bound above which a parameter that cannot be dropped is held at its start, if that does."""
 
 
 def reduce(fit: StateSpaceFit, *, progress: Callable[[int, float], None] | None = None) -> StateSpaceFit:
@@ -21,7 +25,8 @@ def reduce(fit: StateSpaceFit, *, progress: Callable[[int, float], None] | None 
     The most insensitive parameter above 10 % first, then the one with the largest Cramér-Rao bound above 20 %; refit;
     a drop stands if J_ave hardly grows, otherwise the parameter is put back and not tried again.
 
-    A dropped parameter takes the value `dropped` of the model file (zero where nothing is said).
+    A dropped parameter takes the value `dropped` of the model file (zero where nothing is said). One that cannot be
+    dropped, but whose bound is above 100 %, stands for a product that alone is seen: it is held at its start value.
     """
     began = time.perf_counter()
     history: list[Step] = list(fit.reduction)
@@ -33,20 +38,20 @@ def reduce(fit: StateSpaceFit, *, progress: Callable[[int, float], None] | None 
             break
         name, reason = choice
         tried.add(name)
-        without = present.model.with_values({name: present.model.parameters[name].dropped}, free=False)
-        if not without.free:
-            break
-        try:
-            new = fit_targets(without, present.targets, left_out=present.left_out, starts=1, settings=present.settings)
-        except (np.linalg.LinAlgError, ArithmeticError):
-            continue
-        allowed = present.cost + max(LEAST_GROWTH, GROWTH * present.cost)
-        kept = bool(np.isfinite(new.cost) and new.cost <= allowed)
-        history.append(Step(name, reason, present.cost, new.cost, kept))
-        if progress is not None:
-            progress(len(history), new.cost)
-        if kept:
-            present = new
+        ways = [("", present.model.parameters[name].dropped)]
+        if present[name].cramer_rao_percent > HOPELESS:
+            ways.append((", held at its start", fit[name].start))
+        for remark, value in ways:
+            new = _without(present, name, value)
+            allowed = present.cost + max(LEAST_GROWTH, GROWTH * present.cost)
+            after = float("inf") if new is None else new.cost
+            kept = new is not None and after <= allowed
+            history.append(Step(name, reason + remark, present.cost, after, kept))
+            if progress is not None:
+                progress(len(history), after)
+            if new is not None and kept:
+                present = new
+                break
     parameters = tuple(replace(p, start=fit[p.name].start) for p in present.parameters)
     return replace(
         present,
@@ -56,6 +61,17 @@ def reduce(fit: StateSpaceFit, *, progress: Callable[[int, float], None] | None 
         problems=fit.problems,
         seconds=fit.seconds + time.perf_counter() - began,
     )
+
+
+def _without(fit: StateSpaceFit, name: str, value: float) -> StateSpaceFit | None:
+    """The fit again with one parameter held at a value; None where nothing answers then."""
+    model = fit.model.with_values({name: value}, free=False)
+    if not model.free:
+        return None
+    try:
+        return fit_targets(model, fit.targets, left_out=fit.left_out, starts=1, settings=fit.settings)
+    except (IdentificationError, np.linalg.LinAlgError):
+        return None
 
 
 def _candidate(fit: StateSpaceFit, tried: set[str]) -> tuple[str, str] | None:

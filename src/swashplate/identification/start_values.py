@@ -47,7 +47,12 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
         column = (model.states if e.matrix == "F" else model.inputs)[e.column]
         text = e.expression.text.replace(" ", "")
         name, sign = text.lstrip("-"), -1.0 if text.startswith("-") else 1.0
-        if name not in model.free or column not in names or name in found:
+        if (
+            name not in model.parameters
+            or model.parameters[name].tie is not None
+            or column not in names
+            or name in found
+        ):
             continue
         row = states.index(model.states[e.row])
         number = a[row, states.index(column)] if e.matrix == "F" else b[row, linear.inputs.index(column)]

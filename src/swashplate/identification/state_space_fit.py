@@ -36,6 +36,9 @@ SPREAD = 0.3
 
 SCREENED, STARTED = 48, 4
 
+_UNSEEN = 1e3
+"""A parameter that starts at zero and would need more than this to answer alone is scaled by one."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -318,7 +321,8 @@ def _scale(model: StateSpaceModel, targets: Sequence[Target]) -> Array:
             np.median(np.abs(t.measured)[:, None] / np.abs(s), axis=0) for t, s in zip(targets, slopes, strict=True)
         ]
     alone = np.min(needed, axis=0)
-    return np.where(values != 0.0, np.abs(values), np.where(np.isfinite(alone), alone, 1.0))
+    # What hardly shows must not run away on a scale of its own making.
+    return np.where(values != 0.0, np.abs(values), np.where(alone < _UNSEEN, alone, 1.0))
 
 
 def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, ...]:
