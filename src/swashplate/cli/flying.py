@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -44,6 +44,35 @@ def band(text: str | None, *, option: str = "--band") -> tuple[float, float] | N
 def names(text: str | None) -> tuple[str, ...]:
     """Names separated by commas."""
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
+
+
+def renamed(text: str, *, option: str) -> dict[str, str]:
+    """`p,az=az_sid` as names of the result and the log's channels behind them."""
+    pairs = {}
+    for part in names(text):
+        name, _, source = part.partition("=")
+        name, source = name.strip(), source.strip() or name.strip()
+        if not name or not source or name in pairs:
+            raise SwashError(f"'{part}' is no new CHANNEL or NAME=CHANNEL.", channel=option)
+        pairs[name] = source
+    return pairs
+
+
+def with_names(flights: Sequence[Flight], wanted: Mapping[str, str]) -> list[Flight]:
+    """The flights with channels under new names; a channel that had such a name makes way."""
+    changed = {source: name for name, source in wanted.items() if name != source}
+    if not changed:
+        return list(flights)
+    made = []
+    for flight in flights:
+        streams = {
+            home: data.drop_vars([n for n in changed.values() if n in data.data_vars]).rename(
+                {source: name for source, name in changed.items() if source in data.data_vars}
+            )
+            for home, data in flight.streams.items()
+        }
+        made.append(flight.with_streams(streams).done("rename", **changed))
+    return made
 
 
 def flown(

@@ -17,7 +17,9 @@ def respond(
         list[str], typer.Argument(metavar="LOG...", help="Logs of sweeps; FILE@5-30 takes seconds 5 to 30.")
     ],
     inputs: Annotated[str, typer.Option("--inputs", help="Input channels, separated by commas: all that moved.")],
-    outputs: Annotated[str, typer.Option("--outputs", help="Output channels, separated by commas.")],
+    outputs: Annotated[
+        str, typer.Option("--outputs", help="Output channels, separated by commas; NAME=CHANNEL renames, as az=az_sid.")
+    ],
     out: options.OutFolder = None,
     references: Annotated[
         str,
@@ -49,16 +51,21 @@ def respond(
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
-    ins, outs, refs = flying.names(inputs), flying.names(outputs), flying.names(references)
+    ins, outs = flying.renamed(inputs, option="--inputs"), flying.renamed(outputs, option="--outputs")
+    refs = flying.names(references)
     limits = flying.band(band)
     lengths = None if windows is None else options.numbers(windows, option="--windows")
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
-        flights = flying.flown(log, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, how=how)
+        channels = (*ins.values(), *outs.values(), *refs)
+        flights = flying.flown(log, channels, rate=rate, cutoff=cutoff, how=how)
+        flights = flying.with_names(flights, ins | outs)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
-            found = answer(flights, inputs=ins, outputs=outs, references=refs, band=limits, windows=lengths)
+            found = answer(
+                flights, inputs=tuple(ins), outputs=tuple(outs), references=refs, band=limits, windows=lengths
+            )
             if folder is not None:
                 line.say("writing the report")
                 found.save(folder / flying.RESPONSES)
