@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Flight, stream
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.handling import attitude_of, handling_qualities, margins
 from swashplate.identification.mismatch import envelopes, mismatch
 from swashplate.identification.response_cost import ResponseCost, cost_of, target
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.transfer_function import Form, TransferFunction
-from swashplate.identification.transfer_function_fit import fit_transfer_function, suggest
+from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
+from swashplate.identification.verification import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 10.0, 90)
 
@@ -119,6 +121,20 @@ def test_gain_and_delay_of_the_paper() -> None:
     fit = fit_transfer_function(exact(true), "0/0", input="stick")
     assert fit.models[0].values["K"] == pytest.approx(17.0, rel=1e-6)
     assert fit.models[0].values["tau"] == pytest.approx(0.002, rel=1e-3)
+
+
+def test_bias_of_the_gain_and_delay_is_solved_for_in_time() -> None:
+    """The third number of Bhandari et al.'s Tables 3 and 4: what the gain and delay leave over is a constant."""
+    fit = fit_transfer_function(
+        exact(TransferFunction(Form(0, 0), {"K": 17.0, "tau": 0.02}, "rate", "stick")), "0/0", input="stick"
+    )
+    stick = 0.01 * np.cumsum(np.random.default_rng(0).standard_normal(500))
+    rate = 17.0 * np.concatenate([stick[:1], stick[:1], stick[:-2]]) + 0.5
+    columns = {"stick": stick, "rate": rate}
+    found = verify(as_state_space(fit), Flight({"uniform": stream(np.arange(500) * 0.01, columns)}))
+    assert found["rate"].fit > 99.0
+    # The model moves with the stick's deviations from its mean.
+    assert found.traces[0].biases["rate"] == pytest.approx(0.5 + 17.0 * stick.mean(), abs=0.02)
 
 
 def test_cost_is_the_one_the_optimizer_minimises() -> None:

@@ -164,7 +164,7 @@ class StateSpaceModel:
             CardError: where the left side M cannot be solved for the states' derivatives.
         """
         m = self.matrices()
-        if np.linalg.cond(m["M"]) > 1e12:
+        if self.states and np.linalg.cond(m["M"]) > 1e12:
             raise CardError(
                 "the left side is singular: some state's derivative stands in no equation.", where=self.name
             )

@@ -130,7 +130,7 @@ def verify(
             where=flights[0].provenance.source or None,
             hint="Map the flight's columns to these names.",
         )
-    growth = float(max(0.0, np.max(model.eigenvalues().real)))
+    growth = float(max(0.0, *model.eigenvalues().real, 0.0))
     warnings = []
     traces = []
     for flight in flights:

@@ -44,6 +44,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         sections_responses.transfer_functions_section(m) if m.transfer_functions else None,
         sections_responses.bodes_section(m) if m.responses else None,
         sections_responses.excitation_section(m.responses) if m.responses else None,
+        sections_responses.handling_section(m),
         sections_responses.gains_section(m.gains) if m.gains else None,
         sections_responses.made_section(),
     ]

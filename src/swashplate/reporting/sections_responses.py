@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from swashplate.control.ardupilot_gains import Suggestion
+from swashplate.errors import IdentificationError
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.handling import Handling, attitude_of, handling_qualities
 from swashplate.identification.mismatch import mismatch
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
@@ -290,3 +292,62 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
 def made_section() -> Section:
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     return Section("versions", "Versions", (Table("Versions", ("package", "version"), rows),), folded=True)
+
+
+def handling_section(m: ResponseMaterial) -> Section | None:
+    """Bandwidth and phase delay of every rate response that is strong enough, from the flight and from the model."""
+    r = m.responses
+    if r is None:
+        return None
+    rows = []
+    for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
+        if rate not in r.outputs:
+            continue
+        # The input that moves this axis most is its own.
+        o = r.outputs.index(rate)
+        name = max(r.inputs, key=lambda n: np.nan_to_num(np.nanmedian(r.coherence[:, o, r.inputs.index(n)])))
+        found = [("flight", _handling(r, rate, name))]
+        if m.fit and rate in m.fit.model.outputs and name in m.fit.model.inputs:
+            found.append(("model", _model_handling(m.fit, rate, name)))
+        for source, read in found:
+            if isinstance(read, str):
+                rows.append((Cell(f"{angle} / {name}"), Cell(source), Cell(read), *[Cell("–", number=True)] * 3))
+                continue
+            cells = (read.bandwidth, read.omega_180, read.phase_delay_line)
+            rows.append(
+                (Cell(f"{angle} / {name}"), Cell(source), Cell(""), *(Cell(repr(c), number=True) for c in cells))
+            )
+    if not rows:
+        return None
+    table = Table(
+        "Attitude responses (rates over jω)",
+        ("response", "from", "remark", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]"),
+        tuple(rows),
+        note="ADS-33E-PRF, rate command: the lower of the frequencies of 45° phase margin and 6 dB gain margin; phase "
+        "delay by a coherence-weighted line from ω180 to twice of it. Its boundaries are for manned helicopters: for a "
+        "small one scale frequencies with the square root of the size (Froude).",
+    )
+    return Section("handling", "Handling qualities", (table,), folded=True)
+
+
+def _handling(r: FrequencyResponse, rate: str, name: str) -> Handling | str:
+    try:
+        omega, attitude, error, coherence = attitude_of(r, rate, name)
+        return handling_qualities(omega, _pilots(attitude), error=error, coherence=coherence)
+    except IdentificationError as problem:
+        return problem.problem
+
+
+def _model_handling(fit: StateSpaceFit, rate: str, name: str) -> Handling | str:
+    omega = np.geomspace(0.3, 300.0, 800)
+    o, i = fit.model.outputs.index(rate), fit.model.inputs.index(name)
+    try:
+        return handling_qualities(omega, _pilots(fit.model.response(omega)[:, o, i] / (1j * omega)))
+    except IdentificationError as problem:
+        return problem.problem
+
+
+def _pilots(attitude: Complex) -> Complex:
+    """The response with the sign that a pilot expects: a positive command turns the aircraft positively."""
+    middle = attitude[len(attitude) // 4]
+    return -attitude if (1j * middle).real < 0.0 else attitude
