@@ -18,7 +18,10 @@ def validate(
     flight: options.Flights,
     out: options.OutFolder = None,
     published: Annotated[
-        str | None, typer.Option("--published", help="The card to compare with; by default the vehicle's own.")
+        str | None,
+        typer.Option(
+            "--published", help="The card (or state-space model) to compare with; by default the vehicle's own."
+        ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
     every: Annotated[float, typer.Option("--every", help="Seconds between start points.", min=0.01)] = 0.1,
@@ -48,7 +51,7 @@ def validate(
 
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     if is_state_space(model):
-        _verify(model, flight, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet)
+        _verify(model, published, flight, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet)
         return
     ahead = tuple(options.numbers(horizons, option="--horizons"))
     if min(ahead) <= 0.0:
@@ -90,6 +93,7 @@ def validate(
 
 def _verify(
     model: str,
+    other: str | None,
     flights: list[str],
     *,
     out: Path | None,
@@ -108,17 +112,25 @@ def _verify(
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
-    identified = structure(model)
+    identified, compared = structure(model), None if other is None else structure(other)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("flying the model along the inputs")
         inputs, outputs = identified.inputs, identified.outputs
         found = verify(identified, flying.flown(flights, inputs, rate=rate, cutoff=cutoff, how=how, also=outputs))
+        rival = None
+        if compared is not None:
+            channels = (compared.inputs, compared.outputs)
+            rival = verify(
+                compared, flying.flown(flights, channels[0], rate=rate, cutoff=cutoff, how=how, also=channels[1])
+            )
         if folder is not None:
-            response_report(ResponseMaterial(verification=found), path=folder / "report.html")
+            response_report(ResponseMaterial(verification=found, rival=rival), path=folder / "report.html")
             write_text(folder / "verification.json", as_json(found.as_dict()) + "\n")
     if json:
         typer.echo(as_json(found.as_dict()))
     elif not quiet:
         typer.echo(repr(found))
+        if rival is not None:
+            typer.echo(f"\n{rival!r}")
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

@@ -24,6 +24,7 @@ from swashplate.reporting.theme import (
     INPUT_COLORS,
     MODEL,
     ORANGE,
+    PUBLISHED,
     PURPLE,
     SKY,
     VERMILION,
@@ -179,8 +180,21 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
     )
 
 
-def verification_figure(trace: Trace, outputs: Sequence[str], inputs: Sequence[str], *, number: int) -> Figure:
-    """Inputs, then flight and model of every output over time, as in Figs 6 to 9 of Bhandari et al. (2005)."""
+def verification_figure(
+    trace: Trace,
+    outputs: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    number: int,
+    rival: tuple[str, Trace, Sequence[str]] | None = None,
+) -> Figure:
+    """Inputs, then flight and model of every output over time, as in Figs 6 to 9 of Bhandari et al. (2005).
+
+    Args:
+        trace: flight and model. outputs, inputs: their columns.
+        number: of the figure.
+        rival: another model's name, its trace of the same stretch and its outputs.
+    """
     titles = ["inputs", *(axis_title(name) for name in outputs)]
     layout = stacked(titles, height=104)
     places = kept(trace.flight[:, 0])
@@ -195,6 +209,11 @@ def verification_figure(trace: Trace, outputs: Sequence[str], inputs: Sequence[s
         traces.append(line(time, shown(name, trace.flight[places, k]), name="flight", color=FLIGHT, axis=axis))
         model = shown(name, trace.model[places, k])
         traces.append(line(time, model, name="model", color=MODEL, dash="dash", axis=axis))
+        if rival is not None and name in rival[2]:
+            other = shown(name, rival[1].model[places, rival[2].index(name)])
+            traces.append(line(time, other, name=rival[0], color=PUBLISHED, dash="dot", axis=axis))
+    if rival is not None:
+        keys.append(Key(rival[0], PUBLISHED, "dot"))
     return Figure(
         identifier=f"verification-{number}",
         spec={"data": traces, "layout": layout},

@@ -38,7 +38,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
     if not (m.responses or m.transfer_functions or m.fit or m.verification):
         raise SwashError("there is nothing to report.")
     parts = [
-        sections_responses.verification_section(m.verification) if m.verification else None,
+        sections_responses.verification_section(m.verification, m.rival) if m.verification else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
         sections_responses.fit_costs_section(m.fit) if m.fit else None,
         sections_responses.transfer_functions_section(m) if m.transfer_functions else None,

@@ -35,7 +35,8 @@ class ResponseMaterial:
 
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
-        fit: a state-space fit. verification: in time. gains: suggested for the autopilot.
+        fit: a state-space fit. verification: in time. rival: another model on the same records.
+        gains: suggested for the autopilot.
     """
 
     responses: FrequencyResponse | None = None
@@ -43,6 +44,7 @@ class ResponseMaterial:
     trials: tuple[Trial, ...] = ()
     fit: StateSpaceFit | None = None
     verification: Verification | None = None
+    rival: Verification | None = None
     gains: tuple[Suggestion, ...] = field(default=())
 
 
@@ -228,7 +230,7 @@ def excitation_section(r: FrequencyResponse) -> Section:
     return Section("excitation", "What was excited", (excitation(r),), folded=True)
 
 
-def verification_section(v: Verification) -> Section:
+def verification_section(v: Verification, rival: Verification | None = None) -> Section:
     rows = tuple(
         (
             Cell(o.output),
@@ -254,9 +256,17 @@ def verification_section(v: Verification) -> Section:
             note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
         )
     )
+    if rival is not None:
+        theirs = tuple(
+            (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
+            for o in rival.outputs
+        )
+        blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
     outputs = tuple(o.output for o in v.outputs)
-    chosen = v.traces[:_TRACES]
-    blocks += [verification_figure(t, outputs, v.model.inputs, number=k) for k, t in enumerate(chosen)]
+    for k, trace in enumerate(v.traces[:_TRACES]):
+        twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
+        other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
+        blocks.append(verification_figure(trace, outputs, v.model.inputs, number=k, rival=other))
     return Section("verification", "Verification in time", tuple(blocks))
 
 
@@ -303,9 +313,9 @@ def handling_section(m: ResponseMaterial) -> Section | None:
     for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
         if rate not in r.outputs:
             continue
-        # The input that moves this axis most is its own.
-        o = r.outputs.index(rate)
-        name = max(r.inputs, key=lambda n: np.nan_to_num(np.nanmedian(r.coherence[:, o, r.inputs.index(n)])))
+        # The input that moves this axis best is its own.
+        coherent = {n: float(np.nansum(r.coherence[:, r.outputs.index(rate), i])) for i, n in enumerate(r.inputs)}
+        name = max(coherent, key=lambda n: coherent[n])
         found = [("flight", _handling(r, rate, name))]
         if m.fit and rate in m.fit.model.outputs and name in m.fit.model.inputs:
             found.append(("model", _model_handling(m.fit, rate, name)))
