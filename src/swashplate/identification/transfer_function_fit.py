@@ -27,9 +27,10 @@ from swashplate.identification.spectra import Complex
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import parse
 from swashplate.identification.transfer_function import USUAL, Form, TransferFunction
+from swashplate.identification.transfer_function_starts import starts
 
-STARTS = 12
-"""Starting points of a fit; poles at several places of the band, seeded."""
+_ROUGH, _FOLLOWED = 12, 3
+"""Iterations of every start, and how many of them are followed to the end."""
 
 _LONGEST_DELAY = 0.5
 """s: a longer one is no delay of a flying thing."""
@@ -223,19 +224,18 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
             slopes.append(np.stack([column.get(name, zero) for name in free], axis=1))
         return answers, slopes
 
-    best: tuple[Optimum, ResponseCost] | None = None
-    for start in _starts(targets, form, owner, seed):
+    rough: list[tuple[Optimum, ResponseCost]] = []
+    for start in starts(targets, form, owner, seed=seed, longest_delay=_LONGEST_DELAY):
         numbers = {**start, **spread}
-        row = Row(tuple(_entry(name, numbers[name], start, targets) for name in free))
+        row = Row(tuple(_entry(name, numbers[name], targets) for name in free))
         cost = ResponseCost(row, targets, evaluate)
-        if not np.isfinite(cost.cost(row.starts())):
-            continue
-        optimum = minimise(cost, tolerance=1e-5, iterations=80)
-        if best is None or optimum.cost < best[0].cost * (1.0 - 1e-6):
-            best = optimum, cost
-    if best is None:
+        if np.isfinite(cost.cost(row.starts())):
+            rough.append((minimise(cost, tolerance=1e-2, iterations=_ROUGH), cost))
+    if not rough:
         raise IdentificationError("no starting point of the transfer function gives finite responses.")
-    optimum, cost = best
+    rough.sort(key=lambda end: end[0].cost)
+    ends = [(minimise(c, start=o.row, tolerance=1e-5, iterations=80), c) for o, c in rough[:_FOLLOWED]]
+    optimum, cost = min(ends, key=lambda end: end[0].cost)
     found = dict(zip(free, optimum.row * cost.row.scale, strict=True))
     values = spread | found
     _, slopes = cost.residuals(optimum.row)
@@ -283,7 +283,7 @@ def _unit(name: str) -> str:
     return {"tau": "s", "zero": "1/s", "pole": "1/s", "omega": "rad/s", "zeta": "1"}.get(kind, "")
 
 
-def _entry(name: str, value: float, start: Mapping[str, float], targets: Sequence[Target]) -> Entry:
+def _entry(name: str, value: float, targets: Sequence[Target]) -> Entry:
     low, high = min(t.omega[0] for t in targets), max(t.omega[-1] for t in targets)
     kind = name.split(" ")[0].split("_")[0]
     if kind == "tau":
@@ -295,37 +295,6 @@ def _entry(name: str, value: float, start: Mapping[str, float], targets: Sequenc
     if kind in ("zero", "pole"):
         return Entry(name, "parameter", value, max(abs(value), low) / 2.0, -high * 30.0, high * 30.0)
     return Entry(name, "parameter", value, abs(value) / 2.0)
-
-
-def _starts(
-    targets: Sequence[Target], form: Form, owner: Sequence[Mapping[str, str]], seed: int
-) -> list[dict[str, float]]:
-    """Roots spread over the band; gain (with its sign) and delay by least squares on what the roots leave."""
-    random = np.random.default_rng(seed)
-    low, high = min(t.omega[0] for t in targets), max(t.omega[-1] for t in targets)
-    made = []
-    number = 1 if not form.pole_names and not form.zero_names else STARTS
-    for k in range(number):
-        values: dict[str, float] = {}
-        for name in (*form.pole_names, *form.zero_names):
-            at = np.exp(random.uniform(np.log(low), np.log(high)))
-            values[name] = float(random.uniform(0.1, 1.0) if name.startswith("zeta") else at)
-            if name.startswith("zero") and k % 3 == 2:
-                values[name] = -values[name]
-        for t, own in zip(targets, owner, strict=True):
-            shape = TransferFunction(form, {**values, "K": 1.0, "tau": 0.0})
-            left = t.measured / shape.response(t.omega)
-            phase = np.unwrap(np.angle(left))
-            slope = float(np.polyfit(t.omega, phase, 1)[0]) if form.delay else 0.0
-            tau = float(np.clip(-slope, 0.0, 0.8 * _LONGEST_DELAY))
-            turned = left * np.exp(1j * tau * t.omega)
-            sign = np.sign(np.sum(turned.real / np.abs(turned))) or 1.0
-            gain = float(sign * np.exp(np.mean(np.log(np.abs(left)))))
-            values |= {own[n]: values[n] for n in form.zero_names} | {own["K"]: gain}
-            if form.delay:
-                values[own["tau"]] = tau
-        made.append(values)
-    return made
 
 
 def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function") -> StateSpaceModel:
