@@ -14,7 +14,8 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.respond import respond
 from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_fit import StateSpaceFit, fit_state_space
+from swashplate.identification.state_space_fit import fit_state_space
+from swashplate.identification.state_space_result import StateSpaceFit
 from swashplate.identification.verification import verify
 
 BAND = (0.05, 6.0)

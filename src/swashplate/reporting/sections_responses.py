@@ -14,7 +14,8 @@ from swashplate.identification.handling import Handling, attitude_of, handling_q
 from swashplate.identification.mismatch import mismatch
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
-from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET, StateSpaceFit
+from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
+from swashplate.identification.state_space_result import StateSpaceFit
 from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
 from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
