@@ -93,7 +93,7 @@ class StateSpaceFit:
         }
 
     def __repr__(self) -> str:
-        lines = [f"{self.model.name}: J_ave = {self.cost:.1f} over {len(self.targets)} responses, {self.seconds:.1f} s"]
+        lines = [f"{self.model.name}: J_ave = {self.cost:.1f} over {len(self.targets)} responses"]
         lines += [f"  J = {cost:7.1f}  {t.name}" for t, cost in zip(self.targets, self.costs, strict=True)]
         lines.append(f"  {'parameter':<14}{'start':>12}{'value':>12}{'CR %':>8}{'I %':>8}  unit")
         for p in self.parameters:
