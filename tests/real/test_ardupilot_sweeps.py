@@ -13,7 +13,6 @@ import pytest
 
 import swashplate as sp
 from swashplate.control.ardupilot_gains import suggest_gains
-from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.respond import respond
@@ -29,12 +28,7 @@ INPUTS, OUTPUTS = ("mixer_roll", "mixer_pitch"), ("p", "q")
 
 def flight(folder: Path, name: str, *channels: str) -> Flight:
     """The streams that hold some channels of a log, at 100 Hz."""
-    try:
-        log = sp.read(folder / "ardupilot_sitl" / name)
-    except FlightError as error:
-        if not any(words in str(error) for words in ("no flight log that is known", "swashplate[logs]")):
-            raise
-        pytest.skip(f"this swashplate reads no DataFlash logs: {error}")
+    log = sp.read(folder / "ardupilot_sitl" / name)
     homes = {log.stream_of(channel) for channel in channels}
     log = log.with_streams({key: data for key, data in log.streams.items() if key in homes})
     return log.condition(rate=100, cutoff=0, outliers=False, trim_ground=False, derive=False)

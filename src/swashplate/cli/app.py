@@ -8,7 +8,19 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from swashplate.cli import data, demo, fit_ss, fit_tf, identify, inspect, maneuver, respond, simulate, validate, vehicles
+from swashplate.cli import (
+    data,
+    demo,
+    fit_ss,
+    fit_tf,
+    identify,
+    inspect,
+    maneuver,
+    respond,
+    simulate,
+    validate,
+    vehicles,
+)
 from swashplate.cli.guard import Guarded
 
 app = typer.Typer(
