@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import identifying, many, peers, single
+from benchmarks import frequency, identifying, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -76,7 +76,12 @@ def main() -> None:
         verdict = "" if result.target is None else ("met" if result.met else "MISSED")
         table.add_row(result.name, f"{result.rate:,.0f}", promised, verdict, result.note)
     Console().print(table)
-    spans = identifying.measure(short=options.short)
+    repeats = 2 if options.short else 5
+    spans = [
+        *identifying.measure(short=options.short),
+        frequency.responses(repeats=repeats),
+        frequency.fit(repeats=1),
+    ]
     table = Table(title="Seconds of an identification")
     for heading in ("what", "seconds", "promised", "", "note"):
         table.add_column(heading, justify="right" if heading in ("seconds", "promised") else "left")

@@ -25,8 +25,14 @@ if TYPE_CHECKING:
     from swashplate.flights.inspect import inspect
     from swashplate.flights.maneuvers import parse as maneuver
     from swashplate.identification.fit import Fit
+    from swashplate.identification.frequency_response import FrequencyResponse
     from swashplate.identification.identify import identify
     from swashplate.identification.parameters import CHOICES
+    from swashplate.identification.respond import respond
+    from swashplate.identification.state_space_file import structure
+    from swashplate.identification.state_space_fit import fit_state_space
+    from swashplate.identification.transfer_function_fit import fit_transfer_function
+    from swashplate.identification.verification import verify
     from swashplate.reporting.report import report
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
     from swashplate.simulation.integrate import simulate
@@ -44,11 +50,14 @@ __all__ = [
     "CHOICES",
     "Fit",
     "Flight",
+    "FrequencyResponse",
     "Sensors",
     "SwashError",
     "Validation",
     "Vehicle",
     "__version__",
+    "fit_state_space",
+    "fit_transfer_function",
     "hover_hold",
     "identify",
     "inspect",
@@ -57,16 +66,25 @@ __all__ = [
     "observe",
     "read",
     "report",
+    "respond",
     "simulate",
     "simulate_closed_loop",
     "simulate_maneuver",
+    "structure",
     "trim",
     "validate",
     "vehicle",
+    "verify",
 ]
 
 _LIGHT: Mapping[str, tuple[str, str]] = {
     "Fit": ("swashplate.identification.fit", "Fit"),
+    "FrequencyResponse": ("swashplate.identification.frequency_response", "FrequencyResponse"),
+    "fit_state_space": ("swashplate.identification.state_space_fit", "fit_state_space"),
+    "fit_transfer_function": ("swashplate.identification.transfer_function_fit", "fit_transfer_function"),
+    "respond": ("swashplate.identification.respond", "respond"),
+    "structure": ("swashplate.identification.state_space_file", "structure"),
+    "verify": ("swashplate.identification.verification", "verify"),
     "Flight": ("swashplate.flights.flight", "Flight"),
     "SwashError": ("swashplate.errors", "SwashError"),
     "Validation": ("swashplate.validation.validation", "Validation"),

@@ -8,7 +8,19 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from swashplate.cli import data, demo, identify, inspect, maneuver, simulate, validate, vehicles
+from swashplate.cli import (
+    data,
+    demo,
+    fit_ss,
+    fit_tf,
+    identify,
+    inspect,
+    maneuver,
+    respond,
+    simulate,
+    validate,
+    vehicles,
+)
 from swashplate.cli.guard import Guarded
 
 app = typer.Typer(
@@ -47,6 +59,9 @@ def root(
 
 app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)
 app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
+app.command("respond", short_help="Frequency responses from logs of sweeps.")(respond.respond)
+app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
+app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)

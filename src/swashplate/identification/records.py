@@ -84,13 +84,22 @@ def logs(pieces: Sequence[Record]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     return names, np.array([names.index(piece.log) for piece in pieces], dtype=np.intp)
 
 
-def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:
+def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[Array, Array]:
+    """Time (n,) and channels (n, len(wanted)) of an unbroken flight on a uniform grid.
+
+    Args:
+        flight: one unbroken piece.
+        wanted: channels, in order.
+        who: what needs them, for the message.
+
+    Raises:
+        FlightError: where a channel is missing, on another time base, not finite, or the grid is not uniform.
+    """
     source = flight.provenance.source or "flight"
-    wanted = (*vehicle.input_names, *outputs)
     missing = [name for name in wanted if name not in flight]
     if missing:
         raise FlightError(
-            f"lacks what '{vehicle.name}' needs; it has {', '.join(flight.channels) or 'nothing'}.",
+            f"lacks what {who} needs; it has {', '.join(flight.channels) or 'nothing'}.",
             where=source,
             channel=", ".join(missing),
             hint="Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
@@ -109,6 +118,13 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     for column, name in enumerate(wanted):
         if not np.all(np.isfinite(table[:, column])):
             raise FlightError("holds values that are not finite.", where=source, channel=name)
+    return time, table
+
+
+def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:
+    wanted = (*vehicle.input_names, *outputs)
+    time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
+    source = flight.provenance.source or "flight"
     nominal = vehicle.card.values()["voltage_nominal"]
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
@@ -117,7 +133,9 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
         time=time,
         inputs=table[:, :n_inputs],
         outputs=table[:, n_inputs:],
-        voltage=_slow(flight.values("voltage"), float(np.mean(steps))) if known else np.full(time.size, nominal),
+        voltage=_slow(flight.values("voltage"), float(np.mean(np.diff(time))))
+        if known
+        else np.full(time.size, nominal),
         output_names=outputs,
         voltage_known=known,
         log=log,
