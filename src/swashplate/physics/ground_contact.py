@@ -26,16 +26,18 @@ _CREEP = 0.05
 
 def skid_loads(body: RigidBody, skids: Skids, xp: Backend) -> tuple[Vector, Vector]:
     """Force [N] and moment [N m] in body axes of ground at z = 0."""
-    force, moment = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
-    for ahead in (1.0, -1.0):
-        for right in (1.0, -1.0):
-            arm = Vector(ahead * skids.half_length, right * skids.half_width, skids.depth)
-            sunk = body.z + body_to_local(arm, body.attitude, xp).z
-            moving = body_to_local(body.velocity + body.rates.cross(arm), body.attitude, xp)
-            pushing = xp.maximum(0.0, skids.stiffness * sunk + skids.damping * moving.z)
-            pushing = xp.where(sunk > 0.0, pushing, 0.0)
-            sliding = xp.sqrt(moving.x * moving.x + moving.y * moving.y + _CREEP * _CREEP)
-            grip = -skids.friction * pushing / sliding
-            here = local_to_body(Vector(grip * moving.x, grip * moving.y, -pushing), body.attitude, xp)
-            force, moment = force + here, moment + arm.cross(here)
-    return force, moment
+
+    def end(ahead: float, right: float) -> tuple[Vector, Vector]:
+        arm = Vector(ahead * skids.half_length, right * skids.half_width, skids.depth)
+        sunk = body.z + body_to_local(arm, body.attitude, xp).z
+        moving = body_to_local(body.velocity + body.rates.cross(arm), body.attitude, xp)
+        pushing = xp.maximum(0.0, skids.stiffness * sunk + skids.damping * moving.z)
+        pushing = xp.where(sunk > 0.0, pushing, 0.0)
+        sliding = xp.sqrt(moving.x * moving.x + moving.y * moving.y + _CREEP * _CREEP)
+        grip = -skids.friction * pushing / sliding
+        force = local_to_body(Vector(grip * moving.x, grip * moving.y, -pushing), body.attitude, xp)
+        return force, arm.cross(force)
+
+    # Left and right first, so that a mirror image gives the same bits.
+    (fr, mr), (fl, ml), (ar, nr), (al, nl) = end(1.0, 1.0), end(1.0, -1.0), end(-1.0, 1.0), end(-1.0, -1.0)
+    return (fr + fl) + (ar + al), (mr + ml) + (nr + nl)

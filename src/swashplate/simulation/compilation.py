@@ -8,7 +8,6 @@ from pathlib import Path
 import jax
 import platformdirs
 
-
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
 
