@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from swashplate.physics.backend import Backend, Scalar
 
+ROUNDED = 0.05
+"""m/s."""
+
 
 def wake_on_tailplane(
     u: Scalar, w: Scalar, induced: Scalar, *, near: Scalar, far: Scalar, drop: Scalar, xp: Backend
@@ -24,8 +27,10 @@ def lifting_force(
 ) -> Scalar:
     """Force [N] against the speed `across` a flat surface that moves `along` through the air, stalled as drag.
 
-    -rho/2 S (C_La |along| + |across|) across, and never more than the dynamic pressure times the area.
+    -rho/2 S (C_La |along| + |across|) across, and never more than the dynamic pressure times the area. |along| is
+    rounded off below `ROUNDED`, so that a hover, where it would have a kink, has derivatives.
     """
-    linear = (lift_slope * xp.abs(along) + xp.abs(across)) * across
-    most = along * along + across * across
+    ahead = xp.sqrt(along * along + ROUNDED * ROUNDED)
+    linear = (lift_slope * ahead + xp.abs(across)) * across
+    most = ahead * ahead + across * across
     return -0.5 * density * area * xp.maximum(-most, xp.minimum(most, linear))
