@@ -74,7 +74,9 @@ class Trim:
     def __repr__(self) -> str:
         head = f"Trim at {self.speed:g} m/s ahead, {self.lateral:g} m/s right, {self.climb:g} m/s up, "
         head += f"turning {np.degrees(self.turn):g} deg/s, " if self.turn else ""
-        head += f"{float(self.environment.voltage):g} V (residual {self.residual:.1e})"
+        if any(name.startswith("motor") for name in self.input_names):
+            head += f"{float(self.environment.voltage):g} V "
+        head = head.rstrip(", ") + f" (residual {self.residual:.1e})"
         lines = [
             f"  {name:<14}{round(value, 5) + 0.0: .5f}" for name, value in {**self.commands(), **self.states()}.items()
         ]
@@ -135,7 +137,10 @@ def trim(
     z, value = _newton(z, residual)
     state, inputs = (np.asarray(part) for part in _assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
-    where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up at {float(surroundings.voltage):g} V"
+    where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
+    battery = "voltage_nominal" in vehicle.parameter_names
+    if battery:
+        where += f" at {float(surroundings.voltage):g} V"
     if turn:
         where += f", turning {np.degrees(turn):g} deg/s"
     if not largest < _TOLERANCE:
@@ -230,6 +235,7 @@ def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
 
 
 def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
+    battery = "voltage_nominal" in vehicle.parameter_names
     for name, value, (low, high) in zip(vehicle.input_names, inputs, vehicle.input_limits, strict=True):
         if not low <= value <= high:
             limit = high if value > high else low
@@ -237,7 +243,9 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
                 f"{where} needs {name} = {value:.3f}, but its limit is {limit:g}.",
                 where=vehicle.name,
                 channel=name,
-                hint="Ask for a slower flight, less payload or a fuller battery.",
+                hint="Ask for a slower flight, less payload or a fuller battery."
+                if battery
+                else "Ask for a slower flight or less weight.",
             )
 
 

@@ -38,7 +38,7 @@ class DerivativeTable:
     @property
     def total(self) -> Array:
         """The sum over the contributors, shape (6, 10)."""
-        return np.sum(list(self.parts.values()), axis=0)
+        return np.asarray(np.sum(list(self.parts.values()), axis=0))
 
     def __getitem__(self, name: str) -> float:
         """One derivative by its name, e.g. "Xu", "Mq", "Ltheta0T"."""
