@@ -13,7 +13,7 @@ from swashplate.physics.blade_element import FlapMoments
 
 RING = 0.125
 """Weight of the recirculation term: the least that leaves one induced velocity for every thrust and descent."""
-NEWTON_STEPS = 8
+NEWTON_STEPS = 9
 _TINY = 1e-16
 
 
@@ -46,7 +46,7 @@ def mass_flow(lam0: Scalar, mu_z: Scalar, mu2: Scalar, xp: Backend) -> tuple[Sca
 def momentum_inflow(free: Scalar, loss: Scalar, mu_z: Scalar, mu2: Scalar, xp: Backend) -> Scalar:
     """lam0 with which 2 V lam0 equals the thrust C_T = free - loss lam0.
 
-    Newton's method from the answer in still air; eight steps reach rounding for |mu_z| up to 0.2, any advance ratio and
+    Newton's method from the answer in still air; seven steps reach rounding for |mu_z| up to 0.2, any advance ratio and
     either sign of thrust (tested), because the equation rises everywhere.
     """
     size = xp.abs(free)
@@ -57,7 +57,7 @@ def momentum_inflow(free: Scalar, loss: Scalar, mu_z: Scalar, mu2: Scalar, xp: B
         v, _, slope = mass_flow(lam0, mu_z, mu2, xp)
         return 2.0 * lam0 * v + loss * lam0 - free, 2.0 * v + lam0 * slope / v + loss
 
-    return newton(residual, start, steps=NEWTON_STEPS)
+    return newton(residual, start, steps=NEWTON_STEPS, xp=xp)
 
 
 def wake_skew(lam0: Scalar, mu_x: Scalar, mu_y: Scalar, mu_z: Scalar, xp: Backend) -> tuple[Scalar, Scalar]:
