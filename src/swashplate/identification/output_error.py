@@ -57,6 +57,8 @@ _INITIAL = {
     **dict.fromkeys(("alpha_lower", "beta_lower", "eta_bar", "zeta_bar"), (0.02, 0.1)),
     **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
 }
+_HIDDEN = (0.02, 0.1)
+"""The same for inner states that have no entry: flapping, stabilizer bar."""
 
 
 class OutputError:
@@ -94,6 +96,8 @@ class OutputError:
                 hint="Choose a shorter window.",
             )
         states = table.vehicle.state_names
+        coaxial = "motor_upper" in table.vehicle.input_names
+        self.nuisances = tuple(name for name in self.nuisances if coaxial or not name.startswith("trim_"))
         entries = parameter_entries(table)
         for number in range(len(pieces)):
             for name in self.nuisances:
@@ -103,7 +107,7 @@ class OutputError:
         self._shared = len(entries)
         for place in range(len(self._places)):
             for name in states:
-                scale, sigma = _INITIAL[name]
+                scale, sigma = _INITIAL.get(name, _HIDDEN)
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
         self.row = Row(tuple(entries))
         self._plan = _Plan(self.model, table.layout, len(pieces), self.nuisances, self.length, self._shared)
@@ -129,7 +133,7 @@ class OutputError:
             "voltage": jnp.asarray(stacked["voltage"]),
             "card": jnp.asarray(self.table.card_row),
             "scale": jnp.asarray(self.row.scale[: self._shared]),
-            "initial_scale": jnp.asarray([_INITIAL[name][0] for name in self.table.vehicle.state_names]),
+            "initial_scale": jnp.asarray([_INITIAL.get(name, _HIDDEN)[0] for name in self.table.vehicle.state_names]),
         }
 
     def unpack(self, shared: Any) -> tuple[Any, Nuisance]:

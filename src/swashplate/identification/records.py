@@ -11,6 +11,7 @@ from scipy.signal import savgol_filter
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.physics.environment import Environment
 from swashplate.vehicles.vehicle import Vehicle
 
 POSE = (*POSITION, *ATTITUDE)
@@ -90,7 +91,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
     for column, name in enumerate(wanted):
         if not np.all(np.isfinite(table[:, column])):
             raise FlightError("holds values that are not finite.", where=source, channel=name)
-    nominal = vehicle.card.values()["voltage_nominal"]
+    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
     return Record(

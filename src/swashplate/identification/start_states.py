@@ -103,6 +103,8 @@ def start_state(
         "zeta_bar": theta,
     }
     for side in ("lower", "upper"):
+        if f"motor_{side}" not in vehicle.input_names:
+            continue
         known[f"omega_{side}"] = steady_speed(
             inputs[vehicle.input_names.index(f"motor_{side}")] + getattr(nuisance, f"trim_motor_{side}"),
             voltage,

@@ -12,7 +12,7 @@ QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
 
 _SMALL_LOOP = "xla_cpu_small_while_loop_byte_threshold"
-_SMALL_LOOP_BYTES = 100_000
+_SMALL_LOOP_BYTES = 1_000_000
 
 
 def compile_small_loops_whole() -> None:
@@ -21,6 +21,7 @@ def compile_small_loops_whole() -> None:
     XLA's CPU compiler does this for loops of up to 1,024 bytes; one vehicle's Runge-Kutta stage touches some
     thousands. A launch takes about 60 ns and a stage has 40 to 100 of them (measured: 1,350,000 steps per second
     instead of 150,000 for one CoaX, 440,000 instead of 43,000 for a helicopter with flapping, bar and dynamic inflow).
+    Loops that gather, scatter or multiply matrices stay as they are.
 
     An option of XLA that is read when JAX first compiles: called by the package's entry points, it has no effect where
     JAX has already compiled something, and it leaves a value alone that the user has set.

@@ -145,19 +145,28 @@ def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
 def _printed(equations: Equations, x0: Any, u0: Any, disc0: Any, u: Any, row: Any, p: Any, dt: Any) -> Any:
     vehicle = equations.vehicle
     rates = row_rates(equations, padded=False)
-    places = jnp.array([vehicle.index(name) for name in (*PAPER_STATES, "a1", "b1")])
-    order = [PAPER_INPUTS.index(name) for name in vehicle.input_names]
+    names = vehicle.state_names
+    ten = (*PAPER_STATES, "a1", "b1")
+    order = [10 + PAPER_INPUTS.index(name) for name in vehicle.input_names]
 
     def moving(z: Any) -> Any:
         """Rates of the eight states and the disc, from these ten and the controls."""
-        state = jnp.zeros(len(vehicle.state_names)).at[places].set(z[:10])
-        return rates(state, jnp.concatenate([z[10:14][jnp.array(order)], row]), p)[places]
+        zero = jnp.zeros(())
+        # Stacks and slices only: XLA makes no function of a loop that gathers or scatters.
+        state = jnp.stack([z[ten.index(name)] if name in ten else zero for name in names])
+        found = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
+        return jnp.stack([found[names.index(name)] for name in ten])
 
     def step(carry: tuple[Any, Any], command: Any) -> tuple[Any, Any]:
         x, disc = carry
         z = jnp.concatenate([x, disc, command])
-        value, tangent = jax.linearize(moving, z)
-        J = jax.vmap(tangent, out_axes=1)(jnp.eye(14))
+        # Eight directions at a time in a loop that XLA makes one function of (`compile_small_loops_whole`); the zero
+        # keeps it from moving what all directions share out of that loop, into hundreds of launches (8 times slower).
+        values, slopes = jax.lax.map(
+            lambda along: jax.vmap(lambda e: jax.jvp(moving, (z + 0.0 * along[0],), (e,)))(along),
+            jnp.eye(16)[:, :14].reshape(2, 8, 14),
+        )
+        value, J = values[0, 0], slopes.reshape(16, 10)[:14].T
         # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
         a, b, c, d = J[8, 8], J[8, 9], J[9, 8], J[9, 9]
         inverse = jnp.array([[d, -b], [-c, a]]) / (a * d - b * c)
