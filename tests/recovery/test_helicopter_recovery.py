@@ -26,7 +26,7 @@ def test_hub_spring_and_wake_distortion_come_back_from_a_flight() -> None:
         log.condition(rate=100, cutoff=0),
         free=[Free("hub_stiffness", 20.0), Free("wake_distortion", 1.0)],
         method="output-error",
-        iterations=5,
+        iterations=20,
     )
     found = fit.vehicle.card.values()
     assert found["hub_stiffness"] == pytest.approx(35.0, rel=0.01)

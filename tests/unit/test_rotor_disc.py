@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
 from swashplate.physics import blade_element, flapping, inflow
-from swashplate.physics.backend import FloatBackend
+from swashplate.physics.backend import FloatBackend, JaxBackend
 from swashplate.physics.blade_element import Disc
 from swashplate.physics.flapping import Flapping, Hinge
 
@@ -222,3 +224,19 @@ def test_regressing_flap_mode_against_the_second_order_equation() -> None:
     found = np.linalg.eigvals(matrix)[0]
     exact = complex(-lock / 16.0, 1.0 - math.sqrt(1.0 + excess - (lock / 16.0) ** 2))
     assert abs(complex(found.real, abs(found.imag)) - complex(exact.real, abs(exact.imag))) < 0.04
+
+
+def test_first_and_second_derivatives_through_the_inflow_are_exact() -> None:
+    """Only the last two Newton steps are differentiated; the implicit function theorem says that is enough."""
+    jax.config.update("jax_enable_x64", True)
+    xp = JaxBackend()
+
+    def solved(free: Any) -> Any:
+        return inflow.momentum_inflow(free, 0.07, 0.005, 0.002, xp)
+
+    at, h = 0.004, 1e-5
+    first, second = jax.grad(solved), jax.grad(jax.grad(solved))
+    values = [float(solved(at + k * h)) for k in (-1, 0, 1)]
+    assert float(first(at)) == pytest.approx((values[2] - values[0]) / (2 * h), rel=1e-5)
+    slopes = [float(first(at + k * h)) for k in (-1, 1)]
+    assert float(second(at)) == pytest.approx((slopes[1] - slopes[0]) / (2 * h), rel=1e-4)
