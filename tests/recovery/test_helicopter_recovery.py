@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from swashplate.control.state_hold import state_hold
+from swashplate.errors import IdentificationError
 from swashplate.identification.identify import identify
-from swashplate.identification.parameters import Free
+from swashplate.identification.parameters import Free, parameterize
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.sensors import QUIET, observe
 from swashplate.vehicles.catalogue import vehicle
@@ -33,3 +34,8 @@ def test_hub_spring_and_wake_distortion_come_back_from_a_flight() -> None:
     assert found["wake_distortion"] == pytest.approx(1.0, abs=0.03)
     assert fit.vehicle.card.parameters["hub_stiffness"].status == "identified"
     assert fit.vehicle.card.parameters["mass"].status == "published"
+
+
+def test_a_choice_for_coaxial_helicopters_is_refused() -> None:
+    with pytest.raises(IdentificationError, match="'full' is for another kind of vehicle"):
+        parameterize(vehicle("raptor50"), "full")

@@ -198,6 +198,12 @@ def parameterize(
     """
     if isinstance(free, str) and free in CHOICES:
         choice = CHOICES[free]
+        if not {item.name for item in choice.free} <= set(vehicle.parameter_names):
+            raise IdentificationError(
+                f"the ready choice '{free}' is for another kind of vehicle.",
+                where=vehicle.name,
+                hint="Name the free parameters, e.g. --free hub_stiffness,blade_inertia,wake_distortion.",
+            )
         wanted, texts = list(choice.free), [*choice.ties, *ties]
         vehicle = vehicle.with_values(dict(choice.fixed))
     else:
