@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from swashplate.control.hold import hover_hold
+    from swashplate.control.state_hold import state_hold
     from swashplate.errors import SwashError
     from swashplate.flights.flight import Flight
     from swashplate.flights.inspect import inspect
@@ -70,6 +71,7 @@ __all__ = [
     "simulate",
     "simulate_closed_loop",
     "simulate_maneuver",
+    "state_hold",
     "structure",
     "trim",
     "validate",
@@ -104,6 +106,7 @@ _COMPUTING: Mapping[str, tuple[str, str]] = {
     "simulate": ("swashplate.simulation.integrate", "simulate"),
     "simulate_closed_loop": ("swashplate.simulation.closed_loop", "simulate_closed_loop"),
     "simulate_maneuver": ("swashplate.simulation.closed_loop", "simulate_maneuver"),
+    "state_hold": ("swashplate.control.state_hold", "state_hold"),
     "trim": ("swashplate.simulation.trim", "trim"),
     "validate": ("swashplate.validation.validate", "validate"),
 }

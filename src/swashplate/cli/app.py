@@ -11,6 +11,7 @@ import typer
 from swashplate.cli import (
     data,
     demo,
+    derivatives,
     fit_ss,
     fit_tf,
     identify,
@@ -18,6 +19,7 @@ from swashplate.cli import (
     maneuver,
     respond,
     simulate,
+    trim,
     validate,
     vehicles,
 )
@@ -65,6 +67,9 @@ app.command("fit-ss", short_help="Fit a state-space model to frequency responses
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
+app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
+app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
+app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

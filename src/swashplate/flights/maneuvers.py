@@ -17,13 +17,16 @@ from swashplate.flights import multisine
 
 Array = NDArray[np.float64]
 
-AXES: Mapping[str, Mapping[str, float]] = {
-    "roll": {"servo_roll": 1.0},
-    "pitch": {"servo_pitch": 1.0},
-    "yaw": {"motor_upper": 1.0, "motor_lower": -1.0},
-    "heave": {"motor_upper": 1.0, "motor_lower": 1.0},
+AXES: Mapping[str, tuple[Mapping[str, float], ...]] = {
+    "roll": ({"servo_roll": 1.0}, {"A1": 1.0}),
+    "pitch": ({"servo_pitch": 1.0}, {"B1": 1.0}),
+    "yaw": ({"motor_upper": 1.0, "motor_lower": -1.0}, {"theta0T": 1.0}),
+    "heave": ({"motor_upper": 1.0, "motor_lower": 1.0}, {"theta0": 1.0}),
 }
-"""Which inputs an axis moves, in the sense of the commands (servo_pitch positive is nose down, yaw nose right)."""
+"""Which inputs an axis moves, in the sense of the commands, coaxial or single rotor: the first set that a vehicle has.
+
+servo_pitch and B1 positive are nose down; yaw is nose right, of theta0T with a clockwise rotor.
+"""
 
 DEFAULT_AMPLITUDE: Mapping[str, float] = {"roll": 0.2, "pitch": 0.2, "yaw": 0.005, "heave": 0.03}
 """Largest deflection [of the command's unit 1] where none is given."""
@@ -70,7 +73,9 @@ class Maneuver:
         names = tuple(inputs)
         added = {name: np.zeros(np.shape(time)) for name in names}
         for axis, signal in self.signals(time).items():
-            for name, share in AXES.get(axis, {axis: 1.0}).items():
+            sets = AXES.get(axis, ({axis: 1.0},))
+            moved = next((chosen for chosen in sets if chosen.keys() <= added.keys()), sets[0])
+            for name, share in moved.items():
                 if name not in added:
                     raise ManeuverError(
                         f"axis '{axis}' moves '{name}', which the vehicle does not have.",

@@ -58,6 +58,8 @@ _INITIAL = {
     **dict.fromkeys(("eta_bar", "zeta_bar"), (0.02, 0.5)),
     **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
 }
+_HIDDEN = (0.02, 0.1)
+"""The same for inner states that have no entry: flapping, stabilizer bar."""
 
 _DRIFTING = {"trim_motor_lower": (0.002, 0.002), "trim_motor_upper": (0.002, 0.002)}
 """Scale and prior sigma of what moves slowly between windows: with the battery, by the error of its voltage.
@@ -100,8 +102,11 @@ class OutputError:
                 f"the longest record has {longest:.1f} s, expected more than one window of {window:g} s.",
                 hint="Choose a shorter window.",
             )
-        drifting = tuple(name for name in _DRIFTING if name in nuisances)
-        self._own = {name: {**_INITIAL, **_DRIFTING}[name] for name in (*table.vehicle.state_names, *drifting)}
+        coaxial = "motor_upper" in table.vehicle.input_names
+        self.nuisances = tuple(name for name in self.nuisances if coaxial or not name.startswith("trim_"))
+        drifting = tuple(name for name in _DRIFTING if name in self.nuisances)
+        spread = {**_INITIAL, **_DRIFTING}
+        self._own = {name: spread.get(name, _HIDDEN) for name in (*table.vehicle.state_names, *drifting)}
         self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
         for number in range(len(self.logs)):

@@ -12,6 +12,7 @@ from scipy.signal import savgol_filter
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.physics.environment import Environment
 from swashplate.vehicles.vehicle import Vehicle
 
 POSE = (*POSITION, *ATTITUDE)
@@ -125,7 +126,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     wanted = (*vehicle.input_names, *outputs)
     time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
     source = flight.provenance.source or "flight"
-    nominal = vehicle.card.values()["voltage_nominal"]
+    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
     return Record(

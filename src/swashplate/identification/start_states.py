@@ -106,6 +106,8 @@ def start_state(
         "zeta_bar": attitude.theta,
     }
     for side in ("lower", "upper"):
+        if f"motor_{side}" not in vehicle.input_names:
+            continue
         known[f"omega_{side}"] = steady_speed(
             inputs[vehicle.input_names.index(f"motor_{side}")],
             voltage,

@@ -280,7 +280,9 @@ def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, he
     A smooth curve through the samples; before the first and after the last sample the nearest one holds.
     """
     n = inputs.shape[0]
-    trims = jnp.stack([jnp.asarray(getattr(nuisance, f"trim_{name}"), dtype=float) for name in vehicle.input_names])
+    trims = jnp.stack(
+        [jnp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names]
+    )
     motor = [name.startswith("motor") for name in vehicle.input_names]
     delay = jnp.where(jnp.array(motor), nuisance.delay_motor, nuisance.delay_servo)
     trimmed = inputs + trims
