@@ -37,7 +37,7 @@ def flown() -> Flight:
     return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold)
 
 
-def flown_in_gusts(seed: int, *, sigma: float = 0.3, fade: float = 1.0, rate: float = 100.0) -> Flight:
+def flown_in_gusts(seed: int, *, sigma: float, fade: float = 1.0, rate: float = 100.0) -> Flight:
     """The same in horizontal gusts: Ornstein-Uhlenbeck, standard deviation `sigma` [m/s], fading in `fade` [s]."""
     random = np.random.default_rng(seed)
     keep = np.exp(-1.0 / (rate * fade))

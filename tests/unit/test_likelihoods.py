@@ -95,7 +95,7 @@ _FOUND: dict[int, object] = {}
 
 def _best(likelihood: OutputError | PredictionError):  # type: ignore[no-untyped-def]
     if id(likelihood) not in _FOUND:
-        few = 40 if isinstance(likelihood, OutputError) else 5  # what is left to do is noise that shrinks to nothing
+        few = 40 if isinstance(likelihood, OutputError) else 15  # what is left to do is noise that shrinks to nothing
         _FOUND[id(likelihood)] = minimise(likelihood, iterations=few)
     return _FOUND[id(likelihood)]
 
