@@ -8,7 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from swashplate.cli import data, demo, identify, inspect, simulate, validate, vehicles
+from swashplate.cli import bench, data, demo, identify, inspect, simulate, validate, vehicles
 from swashplate.cli.guard import Guarded
 
 app = typer.Typer(
@@ -49,6 +49,7 @@ app.command("identify", short_help="Identify a vehicle from flights, with a repo
 app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
+app.add_typer(bench.app, name="bench")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

@@ -232,9 +232,7 @@ class _Joint:
 
     def add(self, result: BenchResult) -> list[Check]:
         """Add a result; what is known already is combined by its weights (told if it disagrees)."""
-        told = []
-        for name in set(result.names) & set(self.names):
-            told.append(self._combine(name, result))
+        told = [self._combine(name, result) for name in result.names if name in self.names]
         fresh = [i for i, name in enumerate(result.names) if name not in self.names]
         if fresh:
             lean = np.zeros((len(fresh), len(self.names)))
