@@ -9,6 +9,7 @@ import pytest
 from commands import one_message, swash
 
 import swashplate as sp
+from simulated_flights import FREE, TIE
 from swashplate.identification.bench.evaluate import MEASURED, evaluate
 from swashplate.identification.bench.plan import plan, planned
 from swashplate.reporting.bench import compose_bench
@@ -116,3 +117,22 @@ def test_places_that_cannot_be_written_to_are_found_first(records: Path, tmp_pat
     assert "expected .toml" in one_message(swash("bench", records, "--out", tmp_path / "card.json"))
     assert "the folder does not exist" in one_message(swash("bench", records, "--report", tmp_path / "no" / "r.html"))
     assert "is not a folder" in one_message(swash("bench", tmp_path / "nothing"))
+
+
+def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, tmp_path: Path) -> None:
+    assert swash("bench", records, "--out", tmp_path / "card.toml", "--quiet").code == 0
+    asked = ("--free", ",".join(FREE), "--tie", TIE, "--method", "output-error")
+    done = swash(
+        "identify", "--vehicle", "coax", "--flight", simulated, *asked, "--prior", tmp_path / "card.toml",
+        "--prior", "linkage_lower=0.13,0.05", "--out", tmp_path / "fit",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    fit = json.loads((tmp_path / "fit" / "fit.json").read_text(encoding="utf-8"))
+    assert set(fit["settings"]["held at the prior card"]) == {"tau_drive_upper", "tau_drive_lower", "drag_x", "drag_y"}
+    card = read_card(tmp_path / "fit" / "model.toml")
+    assert card.parameters["tau_drive_upper"].source.startswith("bench: drive_steps")
+    assert "Prior and flight" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+    two = swash("identify", "--vehicle", "coax", "--flight", simulated, "--prior", "coax", "--prior", "card.toml")
+    assert "are two cards" in one_message(two)
+    none = swash("identify", "--vehicle", "coax", "--flight", simulated, "--prior", "coax")
+    assert "no parameter with status measured" in one_message(none)

@@ -32,8 +32,8 @@ def test_the_corrected_bound_is_the_double_sum(n: int) -> None:
     rng = np.random.default_rng(n)
     p, m, lags = 4, 3, 10
     v, S = _first_order(rng, (n, m), 0.7) @ rng.standard_normal((m, m)), rng.standard_normal((p, n, m))
-    prior, plain = rng.uniform(0.0, 1.0, p), 1e-9 * (np.eye(p) + 0.1)
-    middle = np.diag(prior)
+    prior, plain = np.diag(rng.uniform(0.0, 1.0, p)), 1e-9 * (np.eye(p) + 0.1)
+    middle = prior.copy()
     for i in range(n):
         for j in range(max(0, i - lags), min(n, i + lags + 1)):
             lag = abs(j - i)
@@ -49,7 +49,7 @@ def test_records_that_know_nothing_of_each_other_add_up() -> None:
     rng = np.random.default_rng(12)
     v, S = _first_order(rng, (300, 2), 0.8), rng.standard_normal((3, 300, 2))
     S[2] = 0.0
-    plain, prior = 1e-9 * np.eye(3), np.zeros(3)
+    plain, prior = 1e-9 * np.eye(3), np.zeros((3, 3))
     one = accuracy.corrected_covariance(plain, prior, [v], [S], lags=30)
     two = accuracy.corrected_covariance(plain, prior, [v, v], [S, S], lags=30)
     np.testing.assert_allclose(two, 2.0 * one, rtol=1e-6)
@@ -61,7 +61,7 @@ def test_white_residuals_leave_the_bound_alone() -> None:
     n, p, m = 40_000, 3, 2
     S = rng.standard_normal((p, n, m))
     plain = np.linalg.inv(S.reshape(p, -1) @ S.reshape(p, -1).T)
-    found = accuracy.corrected_covariance(plain, np.zeros(p), [rng.standard_normal((n, m))], [S], lags=20)
+    found = accuracy.corrected_covariance(plain, np.zeros((p, p)), [rng.standard_normal((n, m))], [S], lags=20)
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(plain)), rtol=0.05)
 
 
@@ -75,7 +75,7 @@ def test_coloured_residuals_widen_the_bound_of_a_mean_by_their_spectrum(rho: flo
     S = np.ones((1, n, 1))
     plain = np.array([[1.0 / n]])
     residual = _first_order(np.random.default_rng(5), (n, 1), rho)
-    found = accuracy.corrected_covariance(plain, np.zeros(1), [residual], [S], lags=lags)
+    found = accuracy.corrected_covariance(plain, np.zeros((1, 1)), [residual], [S], lags=lags)
     lag = np.arange(1, lags + 1)
     tapered = 1.0 + 2.0 * np.sum((1.0 - lag / (lags + 1.0)) * rho**lag)
     assert found[0, 0] / plain[0, 0] == pytest.approx(tapered, rel=0.05)
@@ -95,7 +95,7 @@ def test_the_corrected_bound_is_the_scatter_of_a_regression() -> None:
         estimate = plain @ flat @ noise.ravel()
         found.append(estimate)
         left = noise - (flat.T @ estimate)[:, None]
-        promised.append(np.diag(accuracy.corrected_covariance(plain, np.zeros(2), [left], [S], lags=50)))
+        promised.append(np.diag(accuracy.corrected_covariance(plain, np.zeros((2, 2)), [left], [S], lags=50)))
     ratio = np.std(found, axis=0) / np.sqrt(np.mean(promised, axis=0))
     assert np.all(np.abs(ratio - 1.0) < 0.2), ratio
     assert np.all(np.std(found, axis=0) > 2.5 * np.sqrt(np.diag(plain)))
@@ -104,8 +104,8 @@ def test_the_corrected_bound_is_the_scatter_of_a_regression() -> None:
 def test_priors_add_to_the_information_and_bad_scales_do_no_harm() -> None:
     scales = np.array([1e-6, 1.0, 1e7])
     information = np.outer(1.0 / scales, 1.0 / scales) * np.array([[2.0, 0.5, 0.1], [0.5, 1.0, 0.2], [0.1, 0.2, 3.0]])
-    prior = 1.0 / scales**2
-    exact = np.linalg.inv((information + np.diag(prior)) * np.outer(scales, scales)) * np.outer(scales, scales)
+    prior = np.diag(1.0 / scales**2)
+    exact = np.linalg.inv((information + prior) * np.outer(scales, scales)) * np.outer(scales, scales)
     found = accuracy.covariance(_row(3), information, prior)
     np.testing.assert_allclose(found / np.outer(scales, scales), exact / np.outer(scales, scales), rtol=1e-10)
 
@@ -113,10 +113,10 @@ def test_priors_add_to_the_information_and_bad_scales_do_no_harm() -> None:
 def test_marginal_information_is_the_inverse_of_the_block_of_the_inverse() -> None:
     rng = np.random.default_rng(3)
     root = rng.standard_normal((6, 9))
-    information, prior = root @ root.T, np.array([0.0, 0.0, 0.0, 0.5, 2.0, 0.0])
+    information, prior = root @ root.T, np.diag([0.0, 0.0, 0.0, 0.5, 2.0, 0.0])
     places = np.array([0, 1, 2])
     found = accuracy.marginal_information(information, prior, places)
-    block = np.linalg.inv(information + np.diag(prior))[:3, :3]
+    block = np.linalg.inv(information + prior)[:3, :3]
     np.testing.assert_allclose(np.linalg.inv(found), block, rtol=1e-9)
     np.testing.assert_allclose(accuracy.marginal_information(information, prior, np.arange(6)), information)
 
@@ -124,7 +124,7 @@ def test_marginal_information_is_the_inverse_of_the_block_of_the_inverse() -> No
 def test_a_nuisance_that_nobody_sees_blinds_nothing_else() -> None:
     information = np.zeros((3, 3))
     information[:2, :2] = [[4.0, 1.0], [1.0, 4.0]]
-    found = accuracy.marginal_information(information, np.zeros(3), np.array([0, 1]))
+    found = accuracy.marginal_information(information, np.zeros((3, 3)), np.array([0, 1]))
     np.testing.assert_allclose(found, information[:2, :2])
 
 

@@ -41,7 +41,7 @@ def refuse_unseen(row: Row, information: Array, *, where: str) -> None:
 
 def covariance(row: Row, information: Array, prior: Array) -> Array:
     """Cramér-Rao bound of the scaled row: the inverse of data and prior information together."""
-    total = information + np.diag(prior)
+    total = information + prior
     d = np.sqrt(np.maximum(np.diag(total), 1e-300))
     return np.asarray(np.linalg.pinv(total / np.outer(d, d), hermitian=True) / np.outer(d, d))
 
@@ -60,7 +60,7 @@ def corrected_covariance(
 
     Args:
         plain: M^-1, scaled, shape (p, p).
-        prior: prior information on the diagonal (p,), which is not coloured.
+        prior: prior information (p, p), which is not coloured.
         whitened: per record, residuals (n, m) divided by their standard deviation.
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
@@ -73,7 +73,7 @@ def corrected_covariance(
     ]
     taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
     correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
-    middle = np.diag(prior).astype(np.float64)
+    middle = prior.copy()
     for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
         middle[np.ix_(own, own)] += _spread(correlation, piece)
     return np.asarray(plain @ middle @ plain)
@@ -120,7 +120,7 @@ def marginal_information(information: Array, prior: Array, places: Array) -> Arr
     if not others.size:
         return np.asarray(within)
     across = information[np.ix_(places, others)]
-    rest = information[np.ix_(others, others)] + np.diag(prior[others])
+    rest = information[np.ix_(others, others)] + prior[np.ix_(others, others)]
     return np.asarray(within - across @ np.linalg.pinv(rest, hermitian=True) @ across.T)
 
 

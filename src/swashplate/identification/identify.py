@@ -21,6 +21,7 @@ from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.stochastic import Noise, Nuisance
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.vehicles.card import Card
 from swashplate.vehicles.vehicle import Vehicle
 
 METHODS = ("prediction-error", "output-error", "nelder-mead")
@@ -40,6 +41,7 @@ def identify(
     ties: Sequence[str] = (),
     fixed: Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    prior_card: Card | None = None,
     outputs: Sequence[str] = POSE,
     iterations: int = 60,
     keep_unexcited: bool = False,
@@ -56,6 +58,7 @@ def identify(
         ties: "name = expression" each.
         fixed: values of parameters that are not to move.
         priors: mean and standard deviation by name.
+        prior_card: a card from the bench or from another flight: see `parameterize`.
         outputs: measured channels.
         iterations: at most this many.
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
@@ -74,7 +77,7 @@ def identify(
     enable_compilation_cache()
     started = time.perf_counter()
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
-    table = parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors)
+    table = parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
     pieces = _long_enough(records(flights, vehicle, outputs=outputs))
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
@@ -121,6 +124,7 @@ def identify(
             "method": method,
             "free": list(table.names),
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
+            "held at the prior card": list(table.held),
             "outputs": list(outputs),
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
@@ -204,6 +208,7 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     corrected = np.sqrt(np.maximum(np.diag(found.scaled(found.corrected)), 0.0))
     estimates, problems = [], []
     for i, free in enumerate(table.free):
+        alone, apart = _against_prior(free, values[free.name], float(sigma[i]), float(corrected[i]))
         estimates.append(
             Estimate(
                 name=free.name,
@@ -216,6 +221,9 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
                 prior_sigma=free.sigma,
                 prior_share=0.0 if free.sigma is None else float(min(1.0, (sigma[i] / free.sigma) ** 2)),
                 at_bound=free.name in found.optimum.at_bound,
+                prior_source=free.source if free.sigma is not None else "",
+                alone=alone,
+                disagreement=apart,
             )
         )
     for name, expression in table.ties:
@@ -243,6 +251,24 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     if not np.isfinite(found.optimum.cost):
         problems.append("the cost is not finite")
     return tuple(estimates), problems
+
+
+_SEEN = 0.99
+"""Share of the prior's information above which the flight says too little to disagree with it."""
+
+
+def _against_prior(free: Free, value: float, sigma: float, corrected: float) -> tuple[float, float]:
+    """What the flight alone says, and how many sigmas that is from the prior (NaN, NaN where it says nothing).
+
+    The prior's information is subtracted again: 1/F = 1/C - 1/P for the variances of flight, both and prior. What
+    coloured residuals add to the bound is added to the flight's.
+    """
+    if free.mean is None or free.sigma is None or not sigma**2 < _SEEN * free.sigma**2:
+        return float("nan"), float("nan")
+    flight = 1.0 / (sigma**-2.0 - free.sigma**-2.0)
+    alone = flight * (value / sigma**2 - free.mean / free.sigma**2)
+    wider = max(1.0, (corrected / sigma) ** 2)
+    return alone, (alone - free.mean) / float(np.sqrt(free.sigma**2 + wider * flight))
 
 
 def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> float:
@@ -304,7 +330,9 @@ def _identified(
     changed = {
         name: parameter.value
         for name, parameter in card.parameters.items()
-        if parameter.status != "identified" and parameter.value != vehicle.card.parameters[name].value
+        if parameter.status != "identified"
+        and name not in found.table.held
+        and parameter.value != vehicle.card.parameters[name].value
     }
     card = card.with_values(changed, status="assumed", source="held during the identification")
     noise, nuisance = _noise(found), _mean_nuisance(found)

@@ -101,7 +101,7 @@ def fit_lag(
     plain = np.linalg.inv(sensitivities[:, :, 0] @ sensitivities[:, :, 0].T)
     corrected = accuracy.corrected_covariance(
         plain,
-        np.zeros(len(scale)),
+        np.zeros_like(plain),
         [residuals[:, None] / spread],
         [sensitivities],
         lags=round(_CORRELATED / dt),
