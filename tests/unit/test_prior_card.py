@@ -155,3 +155,17 @@ def test_a_prior_that_is_wrong_is_told_in_sigmas() -> None:
 def test_a_fit_without_a_card_has_no_section_on_priors() -> None:
     report = compose(report_samples.fit(), modes=report_samples.modes())
     assert all(section.identifier != "prior" for section in report.sections)
+
+
+def test_a_sharp_prior_does_not_hide_that_the_flight_disagrees() -> None:
+    """A prior a hundred times surer than the flight, ten of the flight's sigmas away from it."""
+    flight = _flight_alone()
+    name = "linkage_lower"
+    sigma = flight[name].sigma
+    fit = _fit(_card({name: (flight[name].value + 10.0 * sigma, 0.01 * sigma)}))
+    estimate = fit[name]
+    assert estimate.prior_share > 0.999
+    wider = max(1.0, (flight[name].sigma_corrected / sigma) ** 2)
+    assert any("linkage_lower: the flight is -" in problem for problem in fit.problems)
+    assert not fit.failed
+    assert -12.0 < estimate.disagreement < -0.5 * 10.0 / np.sqrt(wider)

@@ -13,6 +13,9 @@ from swashplate.identification.records import Record
 from swashplate.identification.stochastic import Noise, Nuisance
 from swashplate.vehicles.vehicle import Vehicle
 
+APART = 3.0
+"""Sigmas beyond which a prior and a flight disagree."""
+
 
 @dataclass(frozen=True)
 class Estimate:

@@ -11,10 +11,10 @@ import numpy as np
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification import accuracy, feedback, nelder_mead
-from swashplate.identification.fit import AxisExcitation, Comparison, Estimate, Fit, RecordEstimate
+from swashplate.identification.fit import APART, AxisExcitation, Comparison, Estimate, Fit, RecordEstimate
 from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.output_error import OutputError
-from swashplate.identification.parameters import Free, Parameterization, parameterize
+from swashplate.identification.parameters import FROM_CARD, Free, Parameterization, parameterize
 from swashplate.identification.prediction_error import PredictionError
 from swashplate.identification.records import POSE, Record, records
 from swashplate.identification.scoring import Optimum, minimise
@@ -95,6 +95,11 @@ def identify(
         optimum = minimise(likelihood, iterations=iterations, progress=progress)
     found = _found(table, likelihood, optimum)
     parameters, problems = _estimates(found, vehicle)
+    notes += [
+        f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
+        for e in parameters
+        if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
+    ]
     identified = _identified(found, vehicle, parameters, pieces, method)
     return Fit(
         vehicle=identified,
@@ -167,7 +172,7 @@ def _hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> 
 
 @dataclass(frozen=True)
 class _Found:
-    """An optimum with its covariances, scaled."""
+    """An optimum with its covariances and the step that is left to the exact one, scaled."""
 
     table: Parameterization
     likelihood: PredictionError | OutputError
@@ -175,6 +180,7 @@ class _Found:
     prior: Array
     plain: Array
     corrected: Array
+    left: Array
 
     @property
     def places(self) -> Array:
@@ -196,7 +202,8 @@ def _found(table: Parameterization, likelihood: PredictionError | OutputError, o
     white, sensitivities = likelihood.whitened(optimum.row)
     lags = round(_LAGS / likelihood.model.dt)
     corrected = accuracy.corrected_covariance(plain, prior, white, sensitivities, lags=lags)
-    return _Found(table, likelihood, optimum, prior, plain, corrected)
+    gradient = likelihood.scores(optimum.row)[1] + likelihood.row.prior(optimum.row)[1]
+    return _Found(table, likelihood, optimum, prior, plain, corrected, -plain @ gradient)
 
 
 def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
@@ -207,8 +214,10 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     sigma = np.sqrt(np.maximum(np.diag(found.scaled(found.plain)), 0.0))
     corrected = np.sqrt(np.maximum(np.diag(found.scaled(found.corrected)), 0.0))
     estimates, problems = [], []
+    scales = found.likelihood.row.scale
     for i, free in enumerate(table.free):
-        alone, apart = _against_prior(free, values[free.name], float(sigma[i]), float(corrected[i]))
+        exact = values[free.name] + float(found.left[i] * scales[i])
+        alone, apart = _against_prior(free, exact, float(sigma[i]), float(corrected[i]))
         estimates.append(
             Estimate(
                 name=free.name,
@@ -253,15 +262,16 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     return tuple(estimates), problems
 
 
-_SEEN = 0.99
-"""Share of the prior's information above which the flight says too little to disagree with it."""
+_SEEN = 1.0 - 1e-6
+"""Share of the information that is the prior's above which rounding hides what the flight says."""
 
 
 def _against_prior(free: Free, value: float, sigma: float, corrected: float) -> tuple[float, float]:
     """What the flight alone says, and how many sigmas that is from the prior (NaN, NaN where it says nothing).
 
-    The prior's information is subtracted again: 1/F = 1/C - 1/P for the variances of flight, both and prior. What
-    coloured residuals add to the bound is added to the flight's.
+    The prior's information is subtracted again: 1/F = 1/C - 1/P for the variances of flight, both and prior. A sharp
+    prior holds the value almost still, so `value` must be the exact optimum. What coloured residuals add to the bound
+    is added to the flight's.
     """
     if free.mean is None or free.sigma is None or not sigma**2 < _SEEN * free.sigma**2:
         return float("nan"), float("nan")

@@ -55,7 +55,7 @@ class Choice:
     fixed: tuple[tuple[str, float], ...] = ()
 
 
-_FROM_CARD = "card: "
+FROM_CARD = "card: "
 """How the source of a prior that a card gave begins."""
 
 _PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
@@ -184,7 +184,7 @@ class Parameterization:
         """Places of free parameters whose priors come from one card together, and their correlation."""
         if self.prior_card is None:
             return ()
-        places = [i for i, free in enumerate(self.free) if free.source.startswith(_FROM_CARD)]
+        places = [i for i, free in enumerate(self.free) if free.source.startswith(FROM_CARD)]
         names = [self.free[i].name for i in places]
         covariance = self.prior_card.covariance(names)
         sigma = np.sqrt(np.diag(covariance))
@@ -278,7 +278,7 @@ def _from_card(
     free = {item.name for item in wanted}
     made = [
         replace(item, mean=known[item.name].value, sigma=known[item.name].sigma, start=known[item.name].value,
-                source=f"{_FROM_CARD}{known[item.name].source}") if item.name in known else item
+                source=f"{FROM_CARD}{known[item.name].source}") if item.name in known else item
         for item in wanted
     ]  # fmt: skip
     rest = tuple(name for name in known if name not in free)

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 
-from swashplate.identification.fit import Estimate, Fit
+from swashplate.identification.fit import APART, Estimate, Fit
+from swashplate.identification.parameters import FROM_CARD
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import listed, percent, sigma_words, value_words
 
-APART = 3.0
-"""Sigmas beyond which prior and flight disagree."""
-
-_CARD = "card: "
-
 
 def prior(fit: Fit) -> Section | None:
     """Prior and flight side by side, None where no prior came from a card."""
-    estimates = [e for e in fit.parameters if e.prior_source.startswith(_CARD)]
+    estimates = [e for e in fit.parameters if e.prior_source.startswith(FROM_CARD)]
     held = [name for name in fit.settings.get("held at the prior card", ()) if name in fit.vehicle.card.parameters]
     if not estimates and not held:
         return None
@@ -51,7 +47,7 @@ def prior(fit: Fit) -> Section | None:
                 tuple(_row(e) for e in estimates),
                 note="Flight alone: the prior's information subtracted again, one parameter at a time. Apart: flight "
                 "alone less prior over the standard deviation of that difference, coloured residuals allowed for. "
-                "– where the flight adds less than one per cent to the prior's information.",
+                "It is extrapolated along a straight line: far from the prior read it as a direction.",
             )
         )
     if held:
@@ -86,5 +82,5 @@ def _row(e: Estimate) -> tuple[Cell, ...]:
         Cell(f"{percent(100.0 * e.prior_share)} %", number=True),
         Cell(f"{e.disagreement:+.1f}" if math.isfinite(e.disagreement) else "–", number=True,
              tone="bad" if apart else "plain"),
-        Cell(e.prior_source.removeprefix(_CARD)),
+        Cell(e.prior_source.removeprefix(FROM_CARD)),
     )  # fmt: skip
