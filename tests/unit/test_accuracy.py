@@ -32,14 +32,14 @@ def test_the_corrected_bound_is_the_double_sum(n: int) -> None:
     rng = np.random.default_rng(n)
     p, m, lags = 4, 3, 10
     v, S = _first_order(rng, (n, m), 0.7) @ rng.standard_normal((m, m)), rng.standard_normal((p, n, m))
-    prior, plain = np.diag(rng.uniform(0.0, 1.0, p)), 1e-9 * (np.eye(p) + 0.1)
-    middle = prior.copy()
+    prior, plain = rng.uniform(0.0, 1.0, p), 1e-9 * (np.eye(p) + 0.1)
+    middle = np.diag(prior)
     for i in range(n):
         for j in range(max(0, i - lags), min(n, i + lags + 1)):
             lag = abs(j - i)
             R = v[: n - lag].T @ v[lag:] / n * (1.0 - lag / (lags + 1.0))
             middle += S[:, i] @ (R if j >= i else R.T) @ S[:, j].T
-    found = accuracy.corrected_covariance(plain, prior, [v], [S], lags=lags)
+    found = accuracy.corrected_covariance(plain, np.diag(prior), [v], [S], lags=lags)
     np.testing.assert_allclose(found, plain @ middle @ plain, rtol=1e-6)
     assert np.linalg.eigvalsh(found).min() > 0.0
 
@@ -49,9 +49,9 @@ def test_records_that_know_nothing_of_each_other_add_up() -> None:
     rng = np.random.default_rng(12)
     v, S = _first_order(rng, (300, 2), 0.8), rng.standard_normal((3, 300, 2))
     S[2] = 0.0
-    plain, prior = 1e-9 * np.eye(3), np.zeros((3, 3))
-    one = accuracy.corrected_covariance(plain, prior, [v], [S], lags=30)
-    two = accuracy.corrected_covariance(plain, prior, [v, v], [S, S], lags=30)
+    plain, rest = 1e-9 * np.eye(3), np.zeros((3, 3))
+    one = accuracy.corrected_covariance(plain, rest, [v], [S], lags=30)
+    two = accuracy.corrected_covariance(plain, rest, [v, v], [S, S], lags=30)
     np.testing.assert_allclose(two, 2.0 * one, rtol=1e-6)
     assert not one[2].any()
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli import conditions as given
 from swashplate.cli import options
 from swashplate.errors import SwashError
 
@@ -39,13 +40,14 @@ def simulate(
     wind: Annotated[
         str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")
     ] = "0,0,0",
+    speed: Annotated[float, typer.Option("--speed", help="Speed ahead that the maneuver begins at [m/s].")] = 0.0,
+    switched: given.Switch = None,
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fly a maneuver from hover, held in the room by a minimal controller, and save the flight."""
+    """Fly a maneuver from hover or steady flight, held there by a minimal controller, and save the flight."""
     from swashplate.cli.console import progress
     from swashplate.flights.maneuvers import parse
-    from swashplate.vehicles.catalogue import vehicle as find
 
     suffix = out.suffix.lower()
     if suffix not in (".nc", ".csv"):
@@ -53,15 +55,17 @@ def simulate(
     if not out.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
     blowing = dict(zip(_WIND, options.numbers(wind, option="--wind", count=3), strict=True))
-    excitation, aircraft = parse(maneuver), find(vehicle)
+    excitation, aircraft = parse(maneuver), given.vehicle_of(vehicle, None, switched)
     with progress(quiet=quiet) as line:
         line.say("simulating (compiling takes longest the first time)")
         import swashplate as sp
 
+        coaxial = "motor_upper" in aircraft.input_names
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=sp.hover_hold,
+            controller=sp.hover_hold if coaxial else sp.state_hold,
+            speed=speed,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
             sag=sag,
             rate=rate,

@@ -172,11 +172,12 @@ def simulate_maneuver(
     tail: float = 3.0,
     voltage: float | None = None,
     sag: float = 0.0,
+    speed: float = 0.0,
     rate: float = 100.0,
     wind: Mapping[str, ArrayLike] | None = None,
     environment: Environment | None = None,
 ) -> Flight:
-    """A maneuver flown from hover with a controller that keeps the vehicle around.
+    """A maneuver flown from hover or steady flight with a controller that keeps the vehicle there.
 
     Args:
         vehicle: what flies.
@@ -185,13 +186,14 @@ def simulate_maneuver(
         lead, tail: hover before and after [s].
         voltage: battery voltage at the start [V].
         sag: how much the voltage falls per second [V/s].
+        speed: speed ahead that it begins at [m/s].
         rate: samples per second [Hz].
         wind, environment: as in `simulate_closed_loop`.
     """
     excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
-    start = trim(vehicle, voltage=voltage, environment=environment)
+    start = trim(vehicle, speed=speed, voltage=voltage, environment=environment)
     return simulate_closed_loop(
         vehicle,
         controller(vehicle, start),
