@@ -81,3 +81,7 @@ class DivergenceError(SwashError):
 
 class IdentificationError(SwashError):
     """A fit that cannot be started, or that ended at values which physics forbids."""
+
+
+class BenchError(SwashError):
+    """A bench record that cannot be read, or that contradicts what its procedure measures."""

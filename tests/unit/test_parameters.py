@@ -145,7 +145,7 @@ def test_a_row_is_scaled_and_its_prior_is_a_parabola() -> None:
         away = np.eye(3)[i] * step
         high, middle, low = (row.prior(at + s * away)[0] for s in (1.0, 0.0, -1.0))
         assert gradient[i] == pytest.approx((high - low) / (2.0 * step), abs=1e-6)
-        assert curvature[i] == pytest.approx((high - 2.0 * middle + low) / step**2, rel=1e-3, abs=1e-3)
+        assert curvature[i, i] == pytest.approx((high - 2.0 * middle + low) / step**2, rel=1e-3, abs=1e-3)
 
 
 def test_a_free_parameter_may_be_described(coax: Vehicle) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from swashplate.cli import (
+    bench,
     data,
     demo,
     derivatives,
@@ -70,6 +71,7 @@ app.command("maneuver", short_help="Design an excitation to fly and check its ru
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
+app.add_typer(bench.app, name="bench")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

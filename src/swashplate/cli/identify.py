@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from swashplate.flights.flight import Flight
     from swashplate.identification.fit import Fit
     from swashplate.validation.validation import Validation
+    from swashplate.vehicles.card import Card
     from swashplate.vehicles.vehicle import Vehicle
 
 FILES = ("report.html", "model.toml", "fit.json", "validation.json")
@@ -38,7 +39,7 @@ class Question:
 
     Attributes:
         free: a ready choice or parameter names.
-        method, ties, fixed, priors, iterations, keep_unexcited: as in `swashplate.identify`.
+        method, ties, fixed, priors, prior_card, iterations, keep_unexcited: as in `swashplate.identify`.
     """
 
     free: str | Sequence[str] = "full"
@@ -46,6 +47,7 @@ class Question:
     ties: Sequence[str] = ()
     fixed: Mapping[str, float] | None = None
     priors: Mapping[str, tuple[float, float]] | None = None
+    prior_card: Card | None = None
     iterations: int = 60
     keep_unexcited: bool = False
 
@@ -67,7 +69,11 @@ def identify(
     ] = None,
     prior: Annotated[
         list[str] | None,
-        typer.Option("--prior", metavar="NAME=MEAN,SIGMA", help="What is known of a parameter beforehand."),
+        typer.Option(
+            "--prior",
+            metavar="CARD|NAME=MEAN,SIGMA",
+            help="What is known beforehand: a card of the bench or of another flight, or one parameter; repeatable.",
+        ),
     ] = None,
     iterations: Annotated[int, typer.Option("--iterations", help="At most so many iterations.", min=1)] = 60,
     keep_unexcited: Annotated[
@@ -89,13 +95,15 @@ def identify(
     from swashplate.cli.console import progress
     from swashplate.vehicles.catalogue import vehicle as find
 
+    card, texts = options.prior_card_name(prior)
     names = [name.strip() for name in free.split(",") if name.strip()]
     question = Question(
         free=names[0] if len(names) == 1 else names,
         method=method.value,
         ties=tuple(tie or ()),
         fixed=options.fixed_values(fix) or None,
-        priors=options.prior_values(prior) or None,
+        priors=options.prior_values(texts) or None,
+        prior_card=None if card is None else find(card).card,
         iterations=iterations,
         keep_unexcited=keep_unexcited,
     )
@@ -139,7 +147,7 @@ def run(
 
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     free, ties = question.free, question.ties
-    parameterize(vehicle, free, ties=ties, fixed=question.fixed, priors=question.priors)
+    parameterize(vehicle, free, ties=ties, fixed=question.fixed, priors=question.priors, prior_card=question.prior_card)
     records([*flights, *hold_outs], vehicle)
     with folder_when_complete(out, ours=FILES) as folder:
         line.say("preparing the fit (compiling takes longest the first time)")
@@ -151,6 +159,7 @@ def run(
             ties=ties,
             fixed=question.fixed,
             priors=question.priors,
+            prior_card=question.prior_card,
             iterations=question.iterations,
             keep_unexcited=question.keep_unexcited,
             progress=lambda i, cost: line.say(

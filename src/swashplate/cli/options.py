@@ -108,6 +108,14 @@ def fixed_values(texts: Sequence[str] | None) -> dict[str, float]:
     }
 
 
+def prior_card_name(texts: Sequence[str] | None) -> tuple[str | None, list[str]]:
+    """The card among repeated `--prior CARD` and `--prior name=mean,sigma` (None: none), and the others."""
+    cards = [text for text in texts or () if "=" not in text]
+    if len(cards) > 1:
+        raise SwashError(f"{' and '.join(cards)} are two cards.", channel="--prior", hint="Give one.")
+    return (cards[0] if cards else None), [text for text in texts or () if "=" in text]
+
+
 def prior_values(texts: Sequence[str] | None) -> dict[str, tuple[float, float]]:
     """`--prior name=mean,sigma`, repeated."""
     pairs = {

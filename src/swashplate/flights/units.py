@@ -49,6 +49,10 @@ _UNITS: dict[str, tuple[str, float]] = {
     "A": ("A", 1.0),
     "mA": ("A", 1e-3),
     "N": ("N", 1.0),
+    "mN": ("N", 1e-3),
+    "N m": ("N m", 1.0),
+    "N mm": ("N m", 1e-3),
+    "mN m": ("N m", 1e-3),
     "kg": ("kg", 1.0),
     "Hz": ("Hz", 1.0),
 }

@@ -41,7 +41,7 @@ def refuse_unseen(row: Row, information: Array, *, where: str) -> None:
 
 def covariance(row: Row, information: Array, prior: Array) -> Array:
     """Cramér-Rao bound of the scaled row: the inverse of data and prior information together."""
-    total = information + np.diag(prior)
+    total = information + prior
     d = np.sqrt(np.maximum(np.diag(total), 1e-300))
     return np.asarray(np.linalg.pinv(total / np.outer(d, d), hermitian=True) / np.outer(d, d))
 
@@ -120,7 +120,7 @@ def marginal_information(information: Array, prior: Array, places: Array) -> Arr
     if not others.size:
         return np.asarray(within)
     across = information[np.ix_(places, others)]
-    rest = information[np.ix_(others, others)] + np.diag(prior[others])
+    rest = information[np.ix_(others, others)] + prior[np.ix_(others, others)]
     return np.asarray(within - across @ np.linalg.pinv(rest, hermitian=True) @ across.T)
 
 

@@ -13,6 +13,9 @@ from swashplate.identification.records import Record
 from swashplate.identification.stochastic import Noise, Nuisance
 from swashplate.vehicles.vehicle import Vehicle
 
+APART = 3.0
+"""Sigmas beyond which a prior and a flight disagree."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -27,6 +30,9 @@ class Estimate:
         prior_mean, prior_sigma: the prior, None where the data alone decided.
         prior_share: part of the information that came from the prior, 0 (data alone) to 1 (prior alone).
         at_bound: True where the fit ended on a bound of physics.
+        prior_source: where the prior comes from ("" where there is none).
+        alone: what the flight alone would have said, NaN where it says nothing.
+        disagreement: flight alone less prior, in standard deviations of that difference (NaN: none).
         tie: the expression that ties it to others ("" where it was free).
     """
 
@@ -41,6 +47,9 @@ class Estimate:
     prior_share: float = 0.0
     at_bound: bool = False
     tie: str = ""
+    prior_source: str = ""
+    alone: float = float("nan")
+    disagreement: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,17 @@ import numpy as np
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification import accuracy, feedback, nelder_mead
-from swashplate.identification.fit import AxisExcitation, Comparison, Estimate, Fit, RecordEstimate
+from swashplate.identification.fit import APART, AxisExcitation, Comparison, Estimate, Fit, RecordEstimate
 from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.output_error import OutputError
-from swashplate.identification.parameters import Free, Parameterization, parameterize
+from swashplate.identification.parameters import FROM_CARD, Free, Parameterization, parameterize
 from swashplate.identification.prediction_error import PredictionError
 from swashplate.identification.records import POSE, Record, records
 from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.stochastic import Noise, Nuisance
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.vehicles.card import Card
 from swashplate.vehicles.vehicle import Vehicle
 
 METHODS = ("prediction-error", "output-error", "nelder-mead")
@@ -40,6 +41,7 @@ def identify(
     ties: Sequence[str] = (),
     fixed: Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    prior_card: Card | None = None,
     outputs: Sequence[str] = POSE,
     iterations: int = 60,
     keep_unexcited: bool = False,
@@ -56,6 +58,7 @@ def identify(
         ties: "name = expression" each.
         fixed: values of parameters that are not to move.
         priors: mean and standard deviation by name.
+        prior_card: a card from the bench or from another flight: see `parameterize`.
         outputs: measured channels.
         iterations: at most this many.
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
@@ -74,7 +77,7 @@ def identify(
     enable_compilation_cache()
     started = time.perf_counter()
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
-    table = parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors)
+    table = parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
     pieces = _long_enough(records(flights, vehicle, outputs=outputs))
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
@@ -93,6 +96,11 @@ def identify(
         optimum = minimise(likelihood, iterations=iterations, progress=progress)
     found = _found(table, likelihood, optimum)
     parameters, problems = _estimates(found, vehicle)
+    notes += [
+        f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
+        for e in parameters
+        if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
+    ]
     identified = _identified(found, vehicle, parameters, pieces, method)
     return Fit(
         vehicle=identified,
@@ -122,6 +130,7 @@ def identify(
             "method": method,
             "free": list(table.names),
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
+            "held at the prior card": list(table.held),
             "outputs": list(outputs),
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
@@ -164,7 +173,7 @@ def _hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> 
 
 @dataclass(frozen=True)
 class _Found:
-    """An optimum with its covariances, scaled."""
+    """An optimum with its covariances and the step that is left to the exact one, scaled."""
 
     table: Parameterization
     likelihood: PredictionError | OutputError
@@ -172,6 +181,7 @@ class _Found:
     prior: Array
     plain: Array
     corrected: Array
+    left: Array
 
     @property
     def places(self) -> Array:
@@ -192,8 +202,9 @@ def _found(table: Parameterization, likelihood: PredictionError | OutputError, o
     plain = accuracy.covariance(likelihood.row, optimum.information, prior)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
     lags = round(_LAGS / likelihood.model.dt)
-    corrected = accuracy.corrected_covariance(plain, rest + np.diag(prior), white, sensitivities, lags=lags)
-    return _Found(table, likelihood, optimum, prior, plain, corrected)
+    corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=lags)
+    gradient = likelihood.scores(optimum.row)[1] + likelihood.row.prior(optimum.row)[1]
+    return _Found(table, likelihood, optimum, prior, plain, corrected, -plain @ gradient)
 
 
 def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
@@ -204,7 +215,10 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     sigma = np.sqrt(np.maximum(np.diag(found.scaled(found.plain)), 0.0))
     corrected = np.sqrt(np.maximum(np.diag(found.scaled(found.corrected)), 0.0))
     estimates, problems = [], []
+    scales = found.likelihood.row.scale
     for i, free in enumerate(table.free):
+        exact = values[free.name] + float(found.left[i] * scales[i])
+        alone, apart = _against_prior(free, exact, float(sigma[i]), float(corrected[i]))
         estimates.append(
             Estimate(
                 name=free.name,
@@ -217,6 +231,9 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
                 prior_sigma=free.sigma,
                 prior_share=0.0 if free.sigma is None else float(min(1.0, (sigma[i] / free.sigma) ** 2)),
                 at_bound=free.name in found.optimum.at_bound,
+                prior_source=free.source if free.sigma is not None else "",
+                alone=alone,
+                disagreement=apart,
             )
         )
     for name, expression in table.ties:
@@ -244,6 +261,25 @@ def _estimates(found: _Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], l
     if not np.isfinite(found.optimum.cost):
         problems.append("the cost is not finite")
     return tuple(estimates), problems
+
+
+_SEEN = 1.0 - 1e-6
+"""Share of the information that is the prior's above which rounding hides what the flight says."""
+
+
+def _against_prior(free: Free, value: float, sigma: float, corrected: float) -> tuple[float, float]:
+    """What the flight alone says, and how many sigmas that is from the prior (NaN, NaN where it says nothing).
+
+    The prior's information is subtracted again: 1/F = 1/C - 1/P for the variances of flight, both and prior. A sharp
+    prior holds the value almost still, so `value` must be the exact optimum. What coloured residuals add to the bound
+    is added to the flight's.
+    """
+    if free.mean is None or free.sigma is None or not sigma**2 < _SEEN * free.sigma**2:
+        return float("nan"), float("nan")
+    flight = 1.0 / (sigma**-2.0 - free.sigma**-2.0)
+    alone = flight * (value / sigma**2 - free.mean / free.sigma**2)
+    wider = max(1.0, (corrected / sigma) ** 2)
+    return alone, (alone - free.mean) / float(np.sqrt(free.sigma**2 + wider * flight))
 
 
 def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> float:
@@ -305,7 +341,9 @@ def _identified(
     changed = {
         name: parameter.value
         for name, parameter in card.parameters.items()
-        if parameter.status != "identified" and parameter.value != vehicle.card.parameters[name].value
+        if parameter.status != "identified"
+        and name not in found.table.held
+        and parameter.value != vehicle.card.parameters[name].value
     }
     card = card.with_values(changed, status="assumed", source="held during the identification")
     noise, nuisance = _noise(found), _mean_nuisance(found)

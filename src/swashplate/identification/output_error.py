@@ -119,7 +119,7 @@ class OutputError:
         for place in range(len(self._places)):
             for name, (scale, sigma) in self._own.items():
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
-        self.row = Row(tuple(entries))
+        self.row = Row(tuple(entries), table.prior_correlations)
         self._plan = _Plan(
             self.model, table.layout, len(self.logs), self.nuisances, drifting, self.length, self._shared
         )

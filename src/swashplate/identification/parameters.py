@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.errors import IdentificationError
+from swashplate.errors import CardError, IdentificationError
 from swashplate.identification.expressions import Expression, parse_tie
+from swashplate.vehicles.card import Card
 from swashplate.vehicles.vehicle import Vehicle
 
 
@@ -53,6 +54,9 @@ class Choice:
     ties: tuple[str, ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
 
+
+FROM_CARD = "card: "
+"""How the source of a prior that a card gave begins."""
 
 _PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
 _LINEAR_TIES = (
@@ -135,11 +139,15 @@ class Parameterization:
         vehicle: whose parameters they are.
         free: the parameters to move, in the row's order.
         ties: tied names and their expressions, in an order in which each uses only what stands before.
+        held: what is not free and stands at the value of the prior card.
+        prior_card: whose correlations the priors have (None: they are independent).
     """
 
     vehicle: Vehicle
     free: tuple[Free, ...]
     ties: tuple[tuple[str, Expression], ...] = ()
+    held: tuple[str, ...] = ()
+    prior_card: Card | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -171,6 +179,22 @@ class Parameterization:
         moved = self.layout.values(self.card_row, np.asarray(row))
         return {name: float(getattr(moved, name)) for name in (*self.names, *(name for name, _ in self.ties))}
 
+    @property
+    def prior_correlations(self) -> tuple[tuple[int, int, float], ...]:
+        """Places of free parameters whose priors come from one card together, and their correlation."""
+        if self.prior_card is None:
+            return ()
+        places = [i for i, free in enumerate(self.free) if free.source.startswith(FROM_CARD)]
+        names = [self.free[i].name for i in places]
+        covariance = self.prior_card.covariance(names)
+        sigma = np.sqrt(np.diag(covariance))
+        return tuple(
+            (places[i], places[j], float(covariance[i, j] / (sigma[i] * sigma[j])))
+            for i in range(len(names))
+            for j in range(i + 1, len(names))
+            if covariance[i, j] != 0.0
+        )
+
     def without(self, names: Iterable[str]) -> Parameterization:
         """The same with some parameters fixed at the card."""
         dropped = set(names)
@@ -184,6 +208,7 @@ def parameterize(
     ties: Sequence[str] = (),
     fixed: Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    prior_card: Card | None = None,
 ) -> Parameterization:
     """Free parameters, ties and priors, checked against the vehicle's card.
 
@@ -193,8 +218,11 @@ def parameterize(
         ties: "name = expression" each, beside those of the choice; one here replaces the choice's for the same name.
         fixed: values held for parameters that are not to move, whatever the choice says of them.
         priors: mean and standard deviation by name; a prior here replaces the choice's.
+        prior_card: what it says with status measured or identified and a sigma is the prior of what is free, with its
+            correlations, and the value of what is not; `fixed`, ties and `priors` go before it.
 
     Raises:
+        CardError: for a prior card of another vehicle, or one that measured nothing.
         IdentificationError: for a name that the card does not have, one that is both free and tied, a prior on one
             that is not free, ties that go round in a circle, or a value that physics forbids.
         ExpressionError: for a tie that does not parse.
@@ -221,6 +249,9 @@ def parameterize(
     vehicle = vehicle.with_values(held)
     wanted = [item for item in wanted if item.name not in held]
     _known(vehicle, [f.name for f in wanted])
+    taken: tuple[str, ...] = ()
+    if prior_card is not None:
+        vehicle, wanted, taken = _from_card(vehicle, wanted, prior_card, {*held, *(parse_tie(t)[0] for t in texts)})
     wanted = _with_priors(vehicle, wanted, priors or {})
     tied = [parse_tie(text) for text in texts]
     for name, expression in tied:
@@ -228,9 +259,39 @@ def parameterize(
     _once([f.name for f in wanted], [name for name, _ in tied], held)
     if not wanted:
         raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(CHOICES)}.")
-    table = Parameterization(vehicle, tuple(wanted), _in_order(dict(tied)))
+    table = Parameterization(vehicle, tuple(wanted), _in_order(dict(tied)), taken, prior_card)
     _check_ties(table)
     return table
+
+
+def _from_card(
+    vehicle: Vehicle, wanted: list[Free], card: Card, settled: set[str]
+) -> tuple[Vehicle, list[Free], tuple[str, ...]]:
+    """What a prior card measured: priors of what is free, values of the rest; and the names of the rest."""
+    vehicle.with_card(card)  # says where it is for another vehicle
+    known = {
+        name: entry
+        for name, entry in card.parameters.items()
+        if entry.status in ("measured", "identified") and entry.sigma is not None and name not in settled
+    }
+    if not any(entry.sigma for entry in known.values()):
+        raise CardError(
+            "has no parameter with status measured or identified and a sigma.",
+            where=card.path or card.vehicle,
+            hint="Make one with 'swash bench' or 'swash identify', or give --prior NAME=MEAN,SIGMA.",
+        )
+    _known(vehicle, known)
+    free = {item.name for item in wanted}
+    made = [
+        replace(item, mean=known[item.name].value, sigma=known[item.name].sigma, start=known[item.name].value,
+                source=f"{FROM_CARD}{known[item.name].source}") if item.name in known else item
+        for item in wanted
+    ]  # fmt: skip
+    rest = tuple(name for name in known if name not in free)
+    for name in rest:
+        entry = known[name]
+        vehicle = vehicle.with_values({name: entry.value}, status=entry.status, sigma=entry.sigma, source=entry.source)
+    return vehicle, made, rest
 
 
 def _with_priors(vehicle: Vehicle, wanted: list[Free], priors: Mapping[str, tuple[float, float]]) -> list[Free]:

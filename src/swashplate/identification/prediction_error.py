@@ -130,7 +130,7 @@ class PredictionError:
                 entries.append(
                     Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
                 )
-        self.row = Row(tuple(entries))
+        self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
         self._plan = _Plan(self.model, table.layout, len(self.logs), estimate_noise)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,9 +39,15 @@ class Entry:
 
 @dataclass(frozen=True)
 class Row:
-    """Entries in the order of the row; the row itself holds value / scale."""
+    """Entries in the order of the row; the row itself holds value / scale.
+
+    Attributes:
+        entries: what the row holds.
+        prior_correlations: (place, other place, correlation) of priors that were measured together.
+    """
 
     entries: tuple[Entry, ...]
+    prior_correlations: tuple[tuple[int, int, float], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,10 +70,25 @@ class Row:
         return self.column("lower") / self.scale, self.column("upper") / self.scale
 
     def prior(self, row: Array) -> tuple[float, Array, Array]:
-        """Half the squared distance from the priors, its gradient and the diagonal of its Hessian."""
-        weight = self.scale / self.column("sigma")
-        away = (row - self.column("mean") / self.scale) * weight
-        return 0.5 * float(away @ away), away * weight, weight**2
+        """Half the squared distance from the priors, its gradient and its Hessian (the priors' information)."""
+        away = row - self.column("mean") / self.scale
+        gradient = self.prior_information @ away
+        return 0.5 * float(away @ gradient), gradient, self.prior_information
+
+    @cached_property
+    def prior_information(self) -> Array:
+        """Inverse of the priors' scaled covariance, shape (p, p); zero where there is no prior."""
+        sigma = self.column("sigma") / self.scale
+        if not self.prior_correlations:
+            return np.diag(sigma**-2.0)
+        known = np.flatnonzero(np.isfinite(sigma))
+        correlation = np.eye(len(self.entries))
+        for first, second, value in self.prior_correlations:
+            correlation[first, second] = correlation[second, first] = value
+        information = np.zeros_like(correlation)
+        own = 1.0 / sigma[known]
+        information[np.ix_(known, known)] = np.linalg.inv(correlation[np.ix_(known, known)]) * np.outer(own, own)
+        return information
 
     def places(self, group: str) -> Array:
         """Indices of a group's entries."""

@@ -145,7 +145,7 @@ def minimise(
 def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
     cost, gradient, information = likelihood.scores(row)
     prior_cost, prior_gradient, prior_information = likelihood.row.prior(row)
-    return cost + prior_cost, gradient + prior_gradient, (information, information + np.diag(prior_information))
+    return cost + prior_cost, gradient + prior_gradient, (information, information + prior_information)
 
 
 def _step(row: Array, gradient: Array, hessian: Array, damping: Array, low: Array, high: Array) -> Array:

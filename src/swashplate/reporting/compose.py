@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from swashplate.errors import SwashError
 from swashplate.identification.fit import Fit
-from swashplate.reporting import sections_data, sections_fit, sections_sight, sections_validation
+from swashplate.reporting import sections_data, sections_fit, sections_prior, sections_sight, sections_validation
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
 from swashplate.reporting.structure import Figure, Report, Section
@@ -43,6 +43,7 @@ def compose(
         sections_data.asked(fit, validation),
         sections_data.data(fit, validation),
         _with_warnings(fit) if fit else None,
+        sections_prior.prior(fit) if fit else None,
         sections_fit.comparison(fit) if fit and fit.comparisons else None,
         sections_validation.prediction(validation) if validation else None,
         sections_fit.residuals(fit) if fit and fit.comparisons else None,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from swashplate.errors import CardError
@@ -53,6 +54,7 @@ class Card:
         options: the switches of the equations.
         parameters: the numbers by name.
         observer: what an identification learnt beside the parameters (noise, delays), by section.
+        correlations: of the parameters' uncertainties, by two names; what is not there is zero.
         path: the file it came from.
     """
 
@@ -62,20 +64,44 @@ class Card:
     options: Mapping[str, Any]
     parameters: Mapping[str, Parameter]
     observer: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    correlations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     path: str = ""
 
     def values(self) -> dict[str, float]:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def with_values(self, values: Mapping[str, float], **changes: Any) -> Card:
-        """A copy with other numbers; `changes` go to each changed `Parameter` (status, source, ...)."""
+        """A copy with other numbers; `changes` go to each changed `Parameter` (status, source, ...).
+
+        Correlations of what changes are dropped: they were those of the old numbers.
+        """
         unknown = sorted(set(values) - set(self.parameters))
         if unknown:
             raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.path or self.vehicle)
         changed = {
             name: replace(self.parameters[name], value=float(value), **changes) for name, value in values.items()
         }
-        return replace(self, parameters={**self.parameters, **changed})
+        correlations = {
+            first: {second: value for second, value in row.items() if second not in values}
+            for first, row in self.correlations.items()
+            if first not in values
+        }
+        return replace(
+            self,
+            parameters={**self.parameters, **changed},
+            correlations={first: row for first, row in correlations.items() if row},
+        )
+
+    def covariance(self, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Covariance of parameters that have a sigma, shape (n, n), from the sigmas and the correlations."""
+        matrix = np.eye(len(names))
+        for i, first in enumerate(names):
+            for j, second in enumerate(names):
+                if i != j:
+                    row, turned = self.correlations.get(first, {}), self.correlations.get(second, {})
+                    matrix[i, j] = row.get(second, turned.get(first, 0.0))
+        sigma = np.array([self.parameters[name].sigma or 0.0 for name in names], dtype=np.float64)
+        return np.asarray(matrix * np.outer(sigma, sigma))
 
     def checked_against(self, units: Mapping[str, str]) -> Card:
         """The card itself, if it has exactly the parameters in `units`, each in its unit and within its bounds.
@@ -120,6 +146,8 @@ class Card:
         }
         if self.observer:
             document["observer"] = {section: dict(numbers) for section, numbers in self.observer.items()}
+        if self.correlations:
+            document["correlations"] = {first: dict(row) for first, row in self.correlations.items()}
         return tomli_w.dumps(document)
 
 
@@ -142,13 +170,15 @@ def parse_card(text: str, *, path: str = "") -> Card:
     missing = sorted({"vehicle", "title", "parameters"} - document.keys())
     if missing or not isinstance(document["parameters"], dict):
         raise CardError(f"lacks {', '.join(missing) or 'a table of parameters'}.", where=path)
+    parameters = {name: _parameter(name, entry, path) for name, entry in document["parameters"].items()}
     return Card(
         vehicle=str(document["vehicle"]),
         title=str(document["title"]),
         trust=str(document.get("trust", "")),
         options=document.get("options", {}),
-        parameters={name: _parameter(name, entry, path) for name, entry in document["parameters"].items()},
+        parameters=parameters,
         observer=document.get("observer", {}),
+        correlations=_correlations(document.get("correlations", {}), parameters, path),
         path=path,
     )
 
@@ -170,6 +200,23 @@ def _parameter(name: str, entry: Any, path: str) -> Parameter:
     numbers = {key: float(entry[key]) for key in ("value", "sigma", "lower", "upper") if key in entry}
     texts = {key: str(entry[key]) for key in ("unit", "source", "status", "note") if key in entry}
     return Parameter(**numbers, **texts)  # type: ignore[arg-type]
+
+
+def _correlations(entry: Any, parameters: Mapping[str, Parameter], path: str) -> dict[str, dict[str, float]]:
+    """The table [correlations], checked: two known parameters with a sigma each, a number between -1 and 1."""
+    if not isinstance(entry, dict) or not all(isinstance(row, dict) for row in entry.values()):
+        raise CardError("is not a table of tables.", where=path, channel="correlations")
+    for first, row in entry.items():
+        for second, value in row.items():
+            known = all(name in parameters and parameters[name].sigma is not None for name in (first, second))
+            number = isinstance(value, int | float) and not isinstance(value, bool) and -1.0 <= value <= 1.0
+            if not known or not number or first == second:
+                raise CardError(
+                    f"{first}, {second} = {value!r}: expected two parameters with a sigma and a number in -1 to 1.",
+                    where=path,
+                    channel="correlations",
+                )
+    return {first: {second: float(value) for second, value in row.items()} for first, row in entry.items()}
 
 
 def read_card(path: str | Path) -> Card:

@@ -1,0 +1,178 @@
+"""`swash bench`: a folder of bench records becomes a card; the measurement plan; records of the virtual bench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from swashplate.cli import options
+from swashplate.errors import SwashError
+
+_EVALUATE = "evaluate"
+
+
+class RecordsFirst(TyperGroup):
+    """A group that takes `swash bench RECORDS_DIR` as `swash bench evaluate RECORDS_DIR`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        known = {*self.commands, "--help", "-h"}
+        return super().parse_args(ctx, [_EVALUATE, *args] if args and args[0] not in known else args)
+
+
+app = typer.Typer(
+    cls=RecordsFirst,
+    help="From a folder of bench records to a parameter card: `swash bench DIR --out card.toml --report report.html`.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+)
+
+_Vehicle = Annotated[str, typer.Option("--vehicle", help="The published card: a vehicle's name, or a file.")]
+_Only = Annotated[
+    list[str] | None, typer.Option("--only", metavar="PROCEDURE", help="Only this procedure; may be repeated.")
+]
+
+
+@app.command(_EVALUATE)
+def evaluate(
+    records: Annotated[Path, typer.Argument(metavar="RECORDS_DIR", help="Folder with one CSV file a record.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The card (.toml).")] = None,
+    report: Annotated[Path | None, typer.Option("--report", metavar="FILE", help="The report (.html).")] = None,
+    vehicle: _Vehicle = "coax",
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Evaluate every record of a folder; a contradiction in one of them ends without a card.
+
+    The card has value, standard deviation, source files and procedure of what was measured, and the published value
+    of what was not.
+    """
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, console, progress
+    from swashplate.cli.tables import table
+    from swashplate.flights.bench_record import read_records
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    _check_places(out, report)
+    aircraft = find(vehicle)
+    with progress(quiet=quiet or json) as line:
+        line.say("reading records")
+        read = read_records(records)
+        line.say("evaluating the bench")
+        from swashplate.identification.bench.evaluate import evaluate as run
+
+        found = run(read, aircraft)
+        if report is not None:
+            line.say("writing the report")
+            from swashplate.reporting.bench import bench_report
+
+            bench_report(found, path=report)
+        if out is not None:
+            write_text(out, found.card.to_toml())
+    measured = {name: found.card.parameters[name] for name in found.names}
+    doubts = [check.words for result in found.results for check in result.checks if not check.good]
+    doubts += [check.words for check in found.disagreements if not check.good]
+    if json:
+        document = {
+            "parameters": {name: vars(entry) for name, entry in measured.items()},
+            "kept": found.kept,
+            "doubts": doubts,
+            "findings": [finding for result in found.results for finding in result.findings],
+        }
+        typer.echo(as_json(document))
+    elif not quiet:
+        published = found.published.parameters
+        rows = [
+            (name, f"{published[name].value:.5g}", f"{e.value:.5g}", f"{2.0 * (e.sigma or 0.0):.2g}", e.unit, e.source)
+            for name, e in measured.items()
+        ]
+        made = table(("parameter", "published", "measured", "+- 2 sigma", "unit", "source"), rows)
+        made.columns[4].justify = made.columns[5].justify = "left"
+        console().print(made)
+        lines = [f"! {words}" for words in doubts]
+        lines += [f"Kept as published, no record: {', '.join(found.kept)}"] if found.kept else []
+        lines += [f"Card:   {out or 'not written (give --out FILE)'}"]
+        lines += [f"Report: {report or 'not written (give --report FILE)'}"]
+        typer.echo("\n" + "\n".join(lines))
+
+
+@app.command("plan")
+def plan(
+    vehicle: _Vehicle = "coax",
+    only: _Only = None,
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="Wanted standard deviation over value.", min=1e-5, max=1.0)
+    ] = 0.01,
+    json: options.Json = False,
+) -> None:
+    """Print the measurement plan: the records, how long each takes, and how many passes the wanted accuracy needs."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table
+    from swashplate.identification.bench.plan import plan as make
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    made = make(find(vehicle), only=tuple(only or ()), accuracy=accuracy)
+    if json:
+        records = [
+            {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.words}
+            for r in made.records
+        ]
+        typer.echo(as_json({"records": records, "parameters": [vars(aim) for aim in made.aims]}))
+        return
+    screen = console()
+    rows = [(r.name, ", ".join(r.procedures), f"{r.duration:.0f}", r.words) for r in made.records]
+    first = table(("record", "procedure", "seconds", "points"), rows, left=2)
+    first.columns[3].justify = "left"
+    screen.print(first)
+    typer.echo(f"\nOne pass takes {made.duration / 60.0:.0f} min of records. It gives, on the virtual bench:\n")
+    cells = [
+        (a.name, f"{a.value:.5g}", f"{a.sigma:.2g}", a.unit, str(a.repeats or "too many"), ", ".join(a.procedures))
+        for a in made.aims
+    ]
+    second = table(("parameter", "value", "sigma", "unit", f"passes for {100 * accuracy:g} %", "by"), cells)
+    second.columns[3].justify = second.columns[5].justify = "left"
+    screen.print(second)
+
+
+@app.command("simulate")
+def simulate(
+    out: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the records; it is made if missing.")],
+    vehicle: _Vehicle = "coax",
+    only: _Only = None,
+    repeats: Annotated[int, typer.Option("--repeats", help="Passes through the points of each record.", min=1)] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Of noise, bias, drift and vibration.", min=0)] = 0,
+    quiet: options.Quiet = False,
+) -> None:
+    """Make the records of the virtual bench: the vehicle held still, by the equations of flight."""
+    from swashplate.cli.console import progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    aircraft = find(vehicle)
+    with progress(quiet=quiet) as line:
+        line.say("simulating the bench (compiling takes longest the first time)")
+        from swashplate.flights.bench_record import write_record
+        from swashplate.identification.bench.plan import planned
+        from swashplate.simulation.bench import repeated, virtual_bench
+
+        wanted = [repeated(record, repeats) for record in planned(aircraft, tuple(only or ()))]
+        records = virtual_bench(aircraft, wanted, seed=seed)
+        with folder_when_complete(out, ours=()) as folder:
+            assert folder is not None
+            for record in records:
+                write_record(record, folder / record.name)
+    if not quiet:
+        typer.echo(f"{len(records)} records in {out}: {', '.join(record.name for record in records)}")
+
+
+def _check_places(out: Path | None, report: Path | None) -> None:
+    """That files can be written before anything is computed."""
+    for place, suffix, option in ((out, ".toml", "--out"), (report, ".html", "--report")):
+        if place is None:
+            continue
+        if place.suffix.lower() != suffix:
+            raise SwashError(f"ends in '{place.suffix}', expected {suffix}.", where=place, channel=option)
+        if not place.absolute().parent.is_dir():
+            raise SwashError("the folder does not exist.", where=place.parent, channel=option, hint="Make it first.")

@@ -1,0 +1,81 @@
+"""Linkage of the stabilizer bar to the upper rotor, and that hub's stiffness, from a bar that a magnet holds deflected.
+
+    (alpha, beta)_up = l_up R (alpha, beta)_bar             (Fankhauser et al., sec. IV-A5, eqs 10, 11 and Fig. 7)
+
+Forces and moments are split as for the lower rotor (eq. 18). What spoils it: a magnet that lets the bar wobble, a
+deflection that is read off with the rotor at rest, and the downwash on the magnet's arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swashplate.errors import BenchError
+from swashplate.flights.bench_record import BenchRecord
+from swashplate.identification.bench.result import BenchResult
+from swashplate.identification.bench.steady import steady_points
+from swashplate.identification.bench.tilt import CHANNELS, XP, figure_6, fit_tilt, tilt_checks
+from swashplate.physics.frames import Euler
+from swashplate.physics.rotor import TipPathPlane
+from swashplate.physics.stabilizer_bar import StabilizerBar, upper_tip_path_plane
+from swashplate.simulation.bench import Schedule, points
+
+NAME = "bar_linkage"
+TITLE = "Stabilizer bar: linkage to the upper rotor"
+SOURCE = "Fankhauser et al., sec. IV-A5, eqs 6, 10, 11 and 18, Fig. 7"
+COLUMNS = ("point", "motor_upper", "omega_upper", "bar_alpha", "bar_beta", *CHANNELS)
+
+_LEVEL = Euler(0.0, 0.0, 0.0)
+
+
+def schedules(hover: Mapping[str, float]) -> list[Schedule]:
+    """The bar held at up to 0.2 rad about both axes, at hover."""
+    angles = [(axis, sign * a) for axis in ("bar_alpha", "bar_beta") for a in (0.1, 0.2) for sign in (1.0, -1.0)]
+    settings = [{**hover, axis: angle} for axis, angle in angles]
+    words = "hover; bar held at +-0.1 and +-0.2 rad about x, then about y; back through the same points"
+    return [points("bar_linkage", (NAME,), [hover, *settings, *settings[::-1], hover], settle=1.0, words=words)]
+
+
+def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+    """`linkage_upper` and `hub_stiffness_upper`; the lag is a finding.
+
+    Args:
+        records: one.
+        card: `k_thrust_upper`, `hub_height_upper`, `air_density` are taken as known.
+    """
+    if len(records) != 1:
+        raise BenchError(
+            f"{len(records)} records, expected one.", where=", ".join(r.name for r in records), hint="Join them."
+        )
+    record = records[0]
+    found = steady_points(record, COLUMNS[1:])
+    density = record.number("air_density", card["air_density"]) / card["air_density"]
+    thrust = card["k_thrust_upper"] * density * found["omega_upper"] ** 2
+    alpha, beta = found["bar_alpha"], found["bar_beta"]
+
+    def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
+        bar = StabilizerBar(float(alpha[i]), float(beta[i]))
+        return upper_tip_path_plane(bar, _LEVEL, linkage=linkage, lag=lag, mixing="rotation", xp=XP)
+
+    height = card["hub_height_upper"]
+    lag = card["k_zeta_upper"] * float(found["omega_upper"].mean()) + card["o_zeta_upper"]
+    start = np.array([card["linkage_upper"], lag, card["hub_stiffness_upper"]])
+    fit = fit_tilt(found, steering, thrust, hub_height=height, start=start)
+    kept = {name: card[name] for name in ("k_thrust_upper", "hub_height_upper")}
+    pair = [0, 2]
+    return BenchResult(
+        NAME,
+        TITLE,
+        SOURCE,
+        ("linkage_upper", "hub_stiffness_upper"),
+        fit.values[pair],
+        fit.covariance[np.ix_(pair, pair)],
+        (record.name,),
+        tuple(tilt_checks(found, fit, kept)),
+        tuple(figure_6(fit, float(thrust.mean()), hub_height=height, rotor_name="upper")),
+        leans_on={"k_thrust_upper": fit.by_thrust[pair] / card["k_thrust_upper"]},
+        findings=(("phase lag offset of the upper rotor", float(fit.values[1]),
+                   float(np.sqrt(fit.covariance[1, 1])), "rad"),),
+    )  # fmt: skip

@@ -1,0 +1,316 @@
+"""A folder of bench records becomes a parameter card: every procedure's numbers with their joint covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+import numpy as np
+
+from swashplate.errors import BenchError
+from swashplate.flights.bench_record import LOADS, BenchRecord
+from swashplate.flights.flight import Array
+from swashplate.identification.bench import (
+    bar_linkage,
+    bar_motion,
+    drive_frequency,
+    drive_steps,
+    fuselage_drag,
+    phase_lag,
+    servo_steps,
+    single_rotor,
+    speed_map,
+    supply,
+    swashplate,
+    thrust,
+)
+from swashplate.identification.bench.result import BenchResult, Check
+from swashplate.simulation.bench import Schedule
+from swashplate.vehicles.card import Card
+from swashplate.vehicles.vehicle import Vehicle
+
+_MODULES: tuple[ModuleType, ...] = (
+    supply,
+    speed_map,
+    thrust,
+    single_rotor,
+    drive_steps,
+    drive_frequency,
+    phase_lag,
+    swashplate,
+    servo_steps,
+    bar_linkage,
+    bar_motion,
+    fuselage_drag,
+)
+PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
+"""Every procedure, in an order in which each finds what it takes as known already measured."""
+
+MEASURED = (
+    "k_drive_voltage",
+    *(f"{k}_drive_{rotor}" for rotor in ("upper", "lower") for k in ("k", "o")),
+    *thrust.NAMES,
+    "tau_drive_upper",
+    "tau_drive_lower",
+    "k_zeta_lower",
+    "linkage_lower",
+    "hub_stiffness_lower",
+    "tau_f_lower",
+    "linkage_upper",
+    "hub_stiffness_upper",
+    "tau_f_upper",
+    "drag_x",
+    "drag_y",
+)
+"""Every parameter that the bench can measure."""
+
+_CLIPPED = 8
+"""So many samples in a row at exactly the largest value of a channel are a sensor at its range."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What the bench found.
+
+    Attributes:
+        results: of each procedure that has records, in the order of `PROCEDURES`.
+        card: the published card with what was measured, its standard deviations and correlations.
+        published: the card before.
+        kept: parameters that the bench could measure and that no record was there for.
+        names, covariance: joint covariance of what was measured.
+        disagreements: where two procedures measure the same parameter, in words.
+    """
+
+    results: tuple[BenchResult, ...]
+    card: Card
+    published: Card
+    kept: tuple[str, ...]
+    names: tuple[str, ...]
+    covariance: Array
+    disagreements: tuple[Check, ...] = ()
+
+    def __repr__(self) -> str:
+        card = self.card.parameters
+        rows = [f"{n:22s} {card[n].value:12.5g} +- {card[n].sigma or 0.0:8.2g} {card[n].unit}" for n in self.names]
+        return "\n".join([f"Bench of {self.card.vehicle}: {len(self.results)} procedures", *rows])
+
+
+def schedules(hover: Mapping[str, float]) -> list[Schedule]:
+    """The records of the whole bench before they are measured.
+
+    Args:
+        hover: `motor_lower` and `motor_upper` at hover.
+    """
+    made: list[Schedule] = []
+    for module in _MODULES:
+        planned: Callable[[Mapping[str, float]], list[Schedule]] | None = getattr(module, "schedules", None)
+        if planned is not None:
+            made += planned(hover)
+    return made
+
+
+def hover_commands(card: Mapping[str, float], gravity: float = 9.81) -> dict[str, float]:
+    """Motor commands that carry the card's mass without yawing at the nominal voltage (thrust and torque balance)."""
+    ratio = card["k_torque_lower"] / card["k_torque_upper"]
+    lower = np.sqrt(card["mass"] * gravity / (card["k_thrust_lower"] + card["k_thrust_upper"] * ratio))
+    speeds = {"lower": float(lower), "upper": float(lower * np.sqrt(ratio))}
+    return {
+        f"motor_{rotor}": round((speed - card[f"o_drive_{rotor}"]) / card[f"k_drive_{rotor}"], 4)
+        for rotor, speed in speeds.items()
+    }
+
+
+def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
+    """Every procedure that has records, and the card that follows.
+
+    Args:
+        records: in any order.
+        vehicle: whose published card holds what the bench does not measure.
+
+    Raises:
+        BenchError: for a record that no procedure knows, lacks a column, or contradicts what it measures: a saturated
+            sensor, a motor that did not reach its speed, signs that physics forbids, too few points.
+    """
+    published = vehicle.card
+    by_procedure = _sorted(records)
+    for record in records:
+        refuse_saturated(record)
+        refuse_stalled(record, published.values())
+    numbers, joint, results, disagreements = published.values(), _Joint(), [], []
+    for name, chosen in by_procedure.items():
+        result: BenchResult = PROCEDURES[name].estimate(chosen, numbers)
+        results.append(result)
+        disagreements += joint.add(result)
+        numbers = {**numbers, **joint.values}
+    return Bench(
+        tuple(results),
+        _card(published, joint, results),
+        published,
+        tuple(name for name in MEASURED if name not in joint.names),
+        tuple(joint.names),
+        joint.covariance,
+        tuple(disagreements),
+    )
+
+
+def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
+    """Records by procedure, in the order of `PROCEDURES`; columns are checked."""
+    found: dict[str, list[BenchRecord]] = {}
+    for record in records:
+        for name in record.procedures:
+            if name not in PROCEDURES:
+                raise BenchError(
+                    f"procedure '{name}' is not known; known are {', '.join(PROCEDURES)}.",
+                    where=record.name,
+                    hint="Correct the line '# procedure:' of its header.",
+                )
+            for column in PROCEDURES[name].COLUMNS:
+                _ = record[column]  # says what is missing
+            found.setdefault(name, []).append(record)
+    return {name: found[name] for name in PROCEDURES if name in found}
+
+
+def refuse_saturated(record: BenchRecord) -> None:
+    """Raise where a force or moment stands at its largest value for several samples: the sensor is at its range.
+
+    Raises:
+        BenchError: naming the channel.
+    """
+    for channel in LOADS:
+        values = record.channels.get(channel)
+        if values is None or np.ptp(values) == 0.0:
+            continue
+        for limit in (values.max(), values.min()):
+            at = np.r_[False, values == limit, False]
+            edges = np.flatnonzero(np.diff(at.astype(int)))
+            longest = int((edges[1::2] - edges[::2]).max())
+            if longest >= _CLIPPED:
+                time = record["time"][edges[::2][np.argmax(edges[1::2] - edges[::2])]]
+                raise BenchError(
+                    f"stands at {limit:.4g} for {longest} samples from {time:.2f} s on: the sensor is saturated.",
+                    where=record.name,
+                    channel=channel,
+                    hint="Choose a larger range or smaller inputs, and damp vibration at the mount.",
+                )
+
+
+def refuse_stalled(record: BenchRecord, card: Mapping[str, float]) -> None:
+    """Raise where a motor is told to turn and its rotor does not, or hardly.
+
+    Raises:
+        BenchError: naming the rotor and the time.
+    """
+    removed = record.header.get("rotor_removed", "")
+    for rotor in ("upper", "lower"):
+        if rotor == removed or not {f"motor_{rotor}", f"omega_{rotor}"} <= record.channels.keys():
+            continue
+        command, speed = record[f"motor_{rotor}"], record[f"omega_{rotor}"]
+        expected = card[f"k_drive_{rotor}"] * command + card[f"o_drive_{rotor}"]
+        span = round(1.5 / record.dt)  # s: eight of the slower drive train's time constants
+        running = np.convolve(command > 0.42, np.ones(span), mode="full")[: command.size] >= span
+        slow = running & (speed < 0.6 * expected)
+        if slow.sum() > 0.2 / record.dt:
+            at = int(np.argmax(slow))
+            raise BenchError(
+                f"is {speed[at]:.0f} rad/s at {record['time'][at]:.2f} s where motor_{rotor} = {command[at]:.2f} "
+                f"should give about {expected[at]:.0f}: the motor did not reach its speed.",
+                where=record.name,
+                channel=f"omega_{rotor}",
+                hint="Check supply, motor and tachometer (and that the rotors' columns are not exchanged).",
+            )
+
+
+class _Joint:
+    """Values and joint covariance as procedures are added."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self.values: dict[str, float] = {}
+        self.sources: dict[str, list[BenchResult]] = {}
+        self.covariance: Array = np.zeros((0, 0))
+
+    def add(self, result: BenchResult) -> list[Check]:
+        """Add a result; what is known already is combined by its weights (told if it disagrees)."""
+        told = [self._combine(name, result) for name in result.names if name in self.names]
+        fresh = [i for i, name in enumerate(result.names) if name not in self.names]
+        if fresh:
+            lean = np.zeros((len(fresh), len(self.names)))
+            for known, slope in result.leans_on.items():
+                if known in self.names:
+                    lean[:, self.names.index(known)] = np.asarray(slope)[fresh]
+            across = lean @ self.covariance
+            own = result.covariance[np.ix_(fresh, fresh)] + across @ lean.T
+            self.covariance = np.block([[self.covariance, across.T], [across, own]])
+            self.names += [result.names[i] for i in fresh]
+            self.values |= {result.names[i]: float(result.values[i]) for i in fresh}
+        for name in result.names:
+            self.sources.setdefault(name, []).append(result)
+        return told
+
+    def _combine(self, name: str, result: BenchResult) -> Check:
+        place = self.names.index(name)
+        value, sigma = result[name]
+        before, variance = self.values[name], self.covariance[place, place]
+        apart = (value - before) / float(np.sqrt(sigma**2 + variance))
+        share = variance / (variance + sigma**2)
+        self.values[name] = before + share * (value - before)
+        self.covariance[place] *= 1.0 - share
+        self.covariance[:, place] *= 1.0 - share
+        self.covariance[place, place] = variance * sigma**2 / (variance + sigma**2)
+        first = self.sources[name][0].procedure
+        return Check(f"{name}: {result.procedure} and {first} are {apart:+.1f} sigmas apart.", good=abs(apart) < 3.0)
+
+
+def _card(published: Card, joint: _Joint, results: Sequence[BenchResult]) -> Card:
+    """The published card with what was measured."""
+    card = published
+    sigma = np.sqrt(np.diag(joint.covariance))
+    for place, name in enumerate(joint.names):
+        sources = joint.sources[name]
+        files = ", ".join(dict.fromkeys(file for result in sources for file in result.records))
+        how = ", ".join(result.procedure for result in sources)
+        _refuse_impossible(published, name, joint.values[name], files)
+        card = card.with_values(
+            {name: joint.values[name]},
+            status="measured",
+            sigma=float(sigma[place]),
+            source=f"bench: {how} from {files}",
+        )
+    if "k_zeta_lower" in joint.names:  # both rotors alike (Fankhauser et al., sec. IV-A3)
+        value = card.parameters["k_zeta_lower"]
+        card = card.with_values(
+            {"k_zeta_upper": value.value}, status="derived", sigma=value.sigma, source="derived: k_zeta_lower"
+        )
+    done = ", ".join(result.procedure for result in results)
+    return replace(
+        card,
+        title=f"{published.title}; measured on the bench: {done}",
+        correlations=_correlations(joint.names, joint.covariance),
+        path="",
+    )
+
+
+def _refuse_impossible(card: Card, name: str, value: float, files: str) -> None:
+    entry = card.parameters[name]
+    low = -np.inf if entry.lower is None else entry.lower
+    high = np.inf if entry.upper is None else entry.upper
+    if not low <= value <= high:
+        raise BenchError(
+            f"comes out as {value:.4g} {entry.unit}; physics allows {low:g} to {high:g}.",
+            where=files,
+            channel=name,
+            hint="Check signs, units and axes of the record.",
+        )
+
+
+def _correlations(names: Sequence[str], covariance: Array) -> dict[str, dict[str, float]]:
+    """Correlations worth keeping, by the first and the second name."""
+    sigma = np.sqrt(np.diag(covariance))
+    made: dict[str, dict[str, float]] = {}
+    for i, first in enumerate(names):
+        for j in range(i + 1, len(names)):
+            value = float(covariance[i, j] / (sigma[i] * sigma[j]))
+            if abs(value) > 1e-4:
+                made.setdefault(first, {})[names[j]] = round(value, 9)
+    return made

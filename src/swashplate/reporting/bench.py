@@ -1,0 +1,188 @@
+"""The bench's report: every fit as the paper shows its own, what was checked, and the card that came out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from swashplate.atomic import write_text
+from swashplate.errors import SwashError
+from swashplate.identification.bench.evaluate import Bench
+from swashplate.identification.bench.result import BenchResult, Check, Curve
+from swashplate.reporting.html import render
+from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
+from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words
+from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.words import counted, listed, sigma_words, value_words
+
+_COLORS = (MODEL, PUBLISHED, GREEN)
+_DASHES = ("solid", "dash", "dot")
+_HEIGHT = 300
+
+
+def bench_report(bench: Bench, *, path: str | os.PathLike[str]) -> Path:
+    """Write one self-contained HTML file about a bench.
+
+    Args:
+        bench: result of `evaluate`.
+        path: where to write; the folder is made where it is missing.
+
+    Raises:
+        SwashError: a place that cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(compose_bench(bench)))
+    except OSError as error:
+        raise SwashError(
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
+
+
+def compose_bench(bench: Bench) -> Report:
+    """The structure of a bench's report."""
+    files = list(dict.fromkeys(name for result in bench.results for name in result.records))
+    doubts = [(result, check) for result in bench.results for check in result.checks if not check.good]
+    apart = [check for check in bench.disagreements if not check.good]
+    measured = f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.results), 'procedure')}."
+    kept = f"Published, for want of a record: {listed(bench.kept, most=30)}."
+    agreement = " ".join(c.words for c in bench.disagreements) or "No parameter was measured in two ways."
+    summary = (
+        ("Records", f"{counted(len(files), 'file')}: {listed(files, most=5)}.", "plain"),
+        ("Measured", measured, "plain"),
+        ("Kept", kept, "caution" if bench.kept else "good"),
+        ("Checks", _doubts(doubts), "caution" if doubts else "good"),
+        ("Agreement", agreement, "caution" if apart else "plain"),
+    )
+    sections = (_card(bench), *(_procedure(result, bench) for result in bench.results), _made(bench))
+    picture = next((b for r in bench.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
+    return Report(
+        title=f"{bench.card.vehicle} on the test bench",
+        banners=(),
+        summary=summary,
+        picture=picture,
+        sections=sections,
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def _doubts(doubts: Sequence[tuple[BenchResult, Check]]) -> str:
+    if not doubts:
+        return "Nothing was found that spoils a measurement."
+    names = dict.fromkeys(result.title for result, _ in doubts)
+    return f"{counted(len(doubts), 'check')} raised a doubt, in: {listed(names)}."
+
+
+def _card(bench: Bench) -> Section:
+    rows = []
+    for name in (*bench.names, *bench.kept):
+        new, old = bench.card.parameters[name], bench.published.parameters[name]
+        measured = name in bench.names
+        source = new.source if measured else "published value kept: no record"
+        change = (new.value - old.value) / new.sigma if measured and new.sigma else None
+        rows.append(
+            (
+                Cell(name),
+                Cell(unit_words(new.unit)),
+                Cell(value_words(old.value), number=True),
+                Cell(value_words(new.value, new.sigma) if measured else "–", number=True, strong=measured),
+                Cell(sigma_words(new.sigma) if measured else "–", number=True),
+                Cell(f"{change:+.1f}" if change is not None else "–", number=True),
+                Cell(source, tone="plain" if measured else "quiet"),
+            )
+        )
+    note = (
+        "σ: from the scatter of the measurements about the formula. It does not hold what all measurements share: the "
+        "calibration of the sensor, the position of the CG, the hub heights. Correlations are on the card."
+    )
+    columns = ("parameter", "unit", "published", "measured", "σ", "change / σ", "source")
+    return Section("card", "The card", (Table("Published and measured values", columns, tuple(rows), note=note),))
+
+
+def _procedure(result: BenchResult, bench: Bench) -> Section:
+    blocks: list[Block] = [Text(f"Formula: {result.source}. Records: {', '.join(result.records)}.")]
+    blocks += _figures(result)
+    rows = [
+        (Cell(n), Cell(unit_words(bench.card.parameters[n].unit)), Cell(value_words(float(v), float(s)), number=True),
+         Cell(sigma_words(float(s)), number=True))
+        for n, v, s in zip(result.names, result.values, result.sigma, strict=True)
+    ]  # fmt: skip
+    rows += [
+        (Cell(f"{name} (not on the card)"), Cell(unit_words(unit)), Cell(value_words(value, sigma), number=True),
+         Cell(sigma_words(sigma), number=True))
+        for name, value, sigma, unit in result.findings
+    ]  # fmt: skip
+    blocks.append(Table(f"{result.title}: result", ("quantity", "unit", "value", "σ"), tuple(rows)))
+    doubts = [check.words for check in result.checks if not check.good]
+    if doubts:
+        blocks += [Text(words, tone="caution") for words in doubts]
+    if result.left_out:
+        blocks.append(Points(result.left_out, title="Points left out"))
+    blocks.append(Points(tuple(c.words for c in result.checks if c.good), title="Checked"))
+    return Section(result.procedure, result.title, tuple(blocks))
+
+
+def _figures(result: BenchResult, prefix: str = "") -> list[Figure]:
+    """One figure for each title; curves of one title share it."""
+    made = []
+    for number, (_, group) in enumerate(groupby(result.curves, key=lambda curve: curve.title)):
+        made.append(_figure(f"{prefix}{result.procedure}-{number}", list(group)))
+    return made
+
+
+def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
+    traces: list[dict[str, Any]] = []
+    keys = []
+    for curve, color, dash in zip(curves, _COLORS, _DASHES, strict=False):
+        name = curve.name or "fit"
+        many = curve.x.size > 200
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines" if many else "markers",
+                "x": packed(curve.x),
+                "y": packed(curve.y),
+                "marker": {"color": color if len(curves) > 1 else BLACK, "size": 6},
+                "line": {"color": GREY, "width": 1.0},
+                "name": f"{name}, measured",
+            }
+        )
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": packed(curve.line_x),
+                "y": packed(curve.line_y),
+                "line": {"color": color, "dash": dash, "width": 1.8},
+                "name": name,
+            }
+        )
+        keys.append(Key(name, color, dash))
+        if curve.out_x.size:
+            marker = {"color": GREY, "symbol": "x", "size": 8}
+            traces.append(
+                {"type": "scatter", "mode": "markers", "x": packed(curve.out_x), "y": packed(curve.out_y),
+                 "marker": marker, "name": "left out"}
+            )  # fmt: skip
+            keys.append(Key("left out", GREY, "x"))
+    first = curves[0]
+    layout = base_layout(_HEIGHT)
+    layout["xaxis"], layout["yaxis"] = axis(first.x_title), axis(first.y_title)
+    return Figure(
+        identifier=identifier,
+        spec={"data": traces, "layout": layout},
+        height=_HEIGHT,
+        caption=f"{first.title}: measured (markers or thin grey) and fitted.",
+        alt=f"{first.title}: {first.y_title} against {first.x_title}, measured and fitted.",
+        keys=tuple(keys),
+    )
+
+
+def _made(bench: Bench) -> Section:
+    lines = [f"{name} {version}" for name, version in versions().items()]
+    lines += [f"published card SHA-256 {card_hash(bench.published)}", f"measured card SHA-256 {card_hash(bench.card)}"]
+    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)

@@ -1,0 +1,86 @@
+"""Section on priors: which number came from where, and whether flight and bench disagree."""
+
+from __future__ import annotations
+
+import math
+
+from swashplate.identification.fit import APART, Estimate, Fit
+from swashplate.identification.parameters import FROM_CARD
+from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.words import listed, percent, sigma_words, value_words
+
+
+def prior(fit: Fit) -> Section | None:
+    """Prior and flight side by side, None where no prior came from a card."""
+    estimates = [e for e in fit.parameters if e.prior_source.startswith(FROM_CARD)]
+    held = [name for name in fit.settings.get("held at the prior card", ()) if name in fit.vehicle.card.parameters]
+    if not estimates and not held:
+        return None
+    apart = [e for e in estimates if math.isfinite(e.disagreement) and abs(e.disagreement) > APART]
+    seen = [e for e in estimates if math.isfinite(e.disagreement)]
+    verdict = (
+        f"Flight and prior disagree by more than {APART:g} σ in {listed(e.name for e in apart)}. One of the two "
+        "measures something else, or is surer of itself than it should be; the joined value is true to neither."
+        if apart
+        else f"Flight and prior agree within {APART:g} σ in what both can see: {listed(e.name for e in seen)}."
+        if seen
+        else "The flight says nothing beyond the prior, so the two cannot disagree."
+    )
+    blocks: list[Block] = [Text(verdict, tone="bad" if apart else "good" if seen else "plain")]
+    if estimates:
+        blocks.append(
+            Table(
+                "What the prior said, what the flight says alone, and both together",
+                (
+                    "parameter",
+                    "unit",
+                    "prior",
+                    "±σ",
+                    "flight alone",
+                    "both",
+                    "±σ",
+                    "prior share",
+                    "apart [σ]",
+                    "prior from",
+                ),
+                tuple(_row(e) for e in estimates),
+                note="Flight alone: the prior's information subtracted again, one parameter at a time. Apart: flight "
+                "alone less prior over the standard deviation of that difference, coloured residuals allowed for. "
+                "It is extrapolated along a straight line: far from the prior read it as a direction.",
+            )
+        )
+    if held:
+        card = fit.vehicle.card.parameters
+        rows = tuple(
+            (
+                Cell(name),
+                Cell(unit_words(card[name].unit)),
+                Cell(value_words(fit.published.card.parameters[name].value), number=True),
+                Cell(value_words(card[name].value, card[name].sigma), number=True),
+                Cell(sigma_words(card[name].sigma), number=True),
+                Cell(card[name].source),
+            )
+            for name in held
+        )
+        blocks.append(
+            Table("Held at the prior card", ("parameter", "unit", "published", "held at", "±σ", "from"), rows)
+        )
+    return Section("prior", "Prior and flight", tuple(blocks))
+
+
+def _row(e: Estimate) -> tuple[Cell, ...]:
+    apart = math.isfinite(e.disagreement) and abs(e.disagreement) > APART
+    return (
+        Cell(e.name, link=f"meaning-{e.name}"),
+        Cell(unit_words(e.unit)),
+        Cell(value_words(e.prior_mean, e.prior_sigma), number=True),
+        Cell(sigma_words(e.prior_sigma), number=True),
+        Cell(value_words(e.alone, e.prior_sigma), number=True),
+        Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
+        Cell(sigma_words(e.sigma_corrected), number=True),
+        Cell(f"{percent(100.0 * e.prior_share)} %", number=True),
+        Cell(f"{e.disagreement:+.1f}" if math.isfinite(e.disagreement) else "–", number=True,
+             tone="bad" if apart else "plain"),
+        Cell(e.prior_source.removeprefix(FROM_CARD)),
+    )  # fmt: skip

@@ -1,0 +1,231 @@
+"""Single procedures of the bench on records whose answer is known, and records that contradict what they measure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.errors import BenchError, CardError
+from swashplate.flights.bench_record import BenchRecord
+from swashplate.identification.bench import fuselage_drag, lag, speed_map, steady, supply
+from swashplate.identification.bench.evaluate import PROCEDURES, evaluate, hover_commands, schedules
+from swashplate.identification.bench.result import BenchResult
+from swashplate.simulation.bench import virtual_bench
+from swashplate.vehicles.card import parse_card
+from swashplate.vehicles.vehicle import Vehicle
+
+Records = dict[str, BenchRecord]
+
+
+@pytest.fixture(scope="module")
+def coax() -> Vehicle:
+    return sp.vehicle("coax")
+
+
+@pytest.fixture(scope="module")
+def records(coax: Vehicle) -> Records:
+    made = virtual_bench(coax, schedules(hover_commands(coax.card.values())), seed=5)
+    return {record.name.removesuffix(".csv"): record for record in made}
+
+
+def _changed(record: BenchRecord, **channels: np.ndarray) -> BenchRecord:
+    return replace(record, channels={**record.channels, **channels})
+
+
+def test_hover_commands_are_the_published_ones(coax: Vehicle) -> None:
+    assert hover_commands(coax.card.values()) == {"motor_lower": 0.5526, "motor_upper": 0.5386}
+
+
+def test_first_order_is_exact_for_held_commands() -> None:
+    command = np.r_[0.0, np.ones(50)]
+    found = lag.first_order(command, 0.2, 0.01)
+    np.testing.assert_allclose(found[1:], 1.0 - np.exp(-np.arange(50) * 0.01 / 0.2), atol=1e-12)
+    np.testing.assert_allclose(lag.first_order(np.full(9, 3.0), 0.2, 0.01), 3.0)
+
+
+def test_a_lag_is_found_exactly_and_one_that_is_not_there_is_refused() -> None:
+    command = np.repeat([0.0, 1.0, 0.0, 1.0], 100)
+
+    def response(tau: float) -> tuple[np.ndarray, list[np.ndarray]]:
+        return np.zeros(400), [lag.first_order(command, tau, 0.01), np.ones(400)]
+
+    measured = 3.0 * lag.first_order(command, 0.137, 0.01) + 0.5
+    fit = lag.fit_lag(response, measured, dt=0.01, bounds=(0.01, 2.0), where="r.csv")
+    assert fit.tau == pytest.approx(0.137, rel=1e-6)
+    np.testing.assert_allclose(fit.linear, [3.0, 0.5], rtol=1e-6)
+    with pytest.raises(BenchError, match=r"r\.csv: shows no first-order response"):
+        lag.fit_lag(response, 3.0 * command, dt=0.01, bounds=(0.05, 2.0), where="r.csv")
+
+
+def test_a_straight_line_has_the_textbook_covariance() -> None:
+    x, e = np.arange(6.0), np.array([0.1, -0.2, 0.15, -0.1, 0.2, -0.15])
+    line = steady.fit_line([x, np.ones(6)], 2.0 * x + 1.0 + e, where="r")
+    values, covariance = np.polyfit(x, 2.0 * x + 1.0 + e, 1, cov=True)
+    np.testing.assert_allclose(line.values, values)
+    np.testing.assert_allclose(line.covariance, covariance)
+    with pytest.raises(BenchError, match="has 3 points for 2 unknowns"):
+        steady.fit_line([x[:3], np.ones(3)], x[:3], where="r")
+    with pytest.raises(BenchError, match="do not tell the unknowns apart"):
+        steady.fit_line([np.ones(6), np.ones(6)], x, where="r")
+
+
+def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
+    level = np.repeat(np.linspace(0.0, 1.0, 8), 2)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(16)
+    straight, bent = (
+        steady.check_structure(
+            steady.fit_line([level, np.ones(16)], level + c * level**2 + noise, where="r"), level, what="y"
+        )
+        for c in (0.0, 0.1)
+    )
+    assert all(check.good for check in straight)
+    assert any("structure beyond the repeats" in check.words and not check.good for check in bent)
+    time = np.arange(400) / 100
+    still, moving = (
+        steady.steady_points(
+            BenchRecord("r", ("x",), {"time": time, "point": 1.0 + time // 1, "y": noise_of + c * time}), ["y"]
+        )
+        for noise_of in [0.1 * np.random.default_rng(2).standard_normal(400)]
+        for c in (0.0, 0.5)
+    )
+    assert steady.check_settled(still, "y").good
+    assert not steady.check_settled(moving, "y").good
+
+
+@pytest.mark.parametrize(
+    ("speed", "message"),
+    [
+        (np.arange(4.0), "has 4 levels of motor_upper, expected at least 5"),
+        (-np.arange(9.0), "omega_upper does not rise with motor_upper"),
+    ],
+)
+def test_a_speed_map_that_is_none(speed: np.ndarray, message: str) -> None:
+    with pytest.raises(BenchError) as error:
+        speed_map.linear_part(np.linspace(0.4, 0.8, speed.size), speed, where="r.csv", rotor="upper")
+    assert message in str(error.value)
+
+
+def test_two_slopes_that_disagree_widen_their_mean() -> None:
+    mean, sigma, apart = supply.together([13.0, 14.0], [0.5, 0.5])
+    assert (mean, sigma) == pytest.approx((13.5, 0.5 / 2**0.5))
+    assert apart == pytest.approx(-(2**0.5))
+    assert supply.together([10.0, 14.0], [0.5, 0.5])[1] == pytest.approx(2.0)  # half the difference
+
+
+def test_a_result_is_asked_by_name() -> None:
+    result = BenchResult("p", "t", "s", ("a", "b"), np.array([1.0, 2.0]), np.diag([4.0, 9.0]), ())
+    assert result["b"] == (2.0, 3.0)
+
+
+def _clip(record: BenchRecord) -> BenchRecord:
+    return _changed(record, Fz=np.maximum(record["Fz"], -3.0))
+
+
+def _weak(record: BenchRecord) -> BenchRecord:
+    return _changed(record, Mx=0.2 * record["Mx"], My=0.2 * record["My"])
+
+
+def _stall(record: BenchRecord) -> BenchRecord:
+    return _changed(record, omega_lower=0.3 * record["omega_lower"])
+
+
+def _flip(*names: str) -> Callable[[BenchRecord], BenchRecord]:
+    return lambda record: _changed(record, **{name: -record[name] for name in names})
+
+
+def _swap_speeds(record: BenchRecord) -> BenchRecord:
+    return _changed(record, omega_lower=record["omega_upper"], omega_upper=record["omega_lower"])
+
+
+def _without(name: str) -> Callable[[BenchRecord], BenchRecord]:
+    return lambda record: replace(record, channels={k: v for k, v in record.channels.items() if k != name})
+
+
+def _short(record: BenchRecord) -> BenchRecord:
+    return replace(record, channels={name: values[:1000] for name, values in record.channels.items()})
+
+
+def _no_points(record: BenchRecord) -> BenchRecord:
+    return _changed(record, point=np.zeros_like(record["point"]))
+
+
+def _for_another(record: BenchRecord) -> BenchRecord:
+    return replace(record, procedures=("weighing",))
+
+
+def _not_removed(record: BenchRecord) -> BenchRecord:
+    return replace(record, header={})
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("sweep_upper", _clip, "Fz: stands at -3 for"),
+        ("sweep_upper", _stall, "omega_lower: is"),
+        ("sweep_upper", _flip("Fz"), "Fz: grows with rotor speed, but thrust points up"),
+        ("sweep_upper", _flip("Mz"), "Mz: falls with the upper rotor's speed"),
+        ("sweep_upper", _swap_speeds, "omega_"),
+        ("sweep_upper", _without("Mz"), "Mz: the column is missing"),
+        ("sweep_upper", _no_points, "point: no sample belongs to a measuring point"),
+        ("sweep_upper", _for_another, "procedure 'weighing' is not known"),
+        ("sweep_upper", _short, "levels of motor_upper, expected at least 5"),
+        ("phase_lag", _flip("My"), "My: grows with servo_pitch"),
+        ("phase_lag", _short, "points for"),
+        ("swashplate", _flip("Fx", "Fy"), "Fx, Fy: forces lean against the deflection"),
+        ("swashplate", _flip("Mx", "My"), "Mx, My: moments point against the deflection"),
+        ("swashplate", _weak, "Mx, My: moments are smaller than the tilted thrust"),
+        ("swashplate", _short, "expected at least 8"),
+        ("fan_front", _flip("Fx"), "Fx: grows with airspeed_x"),
+        ("fan_front", lambda r: _changed(r, omega_lower=r["omega_lower"] + 100.0), "a rotor turns"),
+        ("fan_front", lambda r: _changed(r, airspeed_x=0.0 * r["time"]), "varies no single stream"),
+        ("single_upper", _not_removed, "rotor_removed"),
+        ("supply", lambda r: _changed(r, voltage=12.0 + 0.0 * r["time"]), "vary the supply"),
+        ("steps_upper", lambda r: _changed(r, motor_upper=0.5 + 0.0 * r["time"]), "steps no motor, expected one"),
+        ("steps_upper", lambda r: _changed(r, omega_upper=200.0 + r["motor_upper"]), "no first-order response"),
+        ("multisine_upper", _short, "whole periods"),
+        ("servo_steps_pitch", lambda r: _changed(r, servo_pitch=0.0 * r["time"]), "steps no servo"),
+        ("bar_motion", lambda r: _changed(r, phi=0.0 * r["time"]), "phi: moves by 0 rad"),
+    ],
+)
+def test_a_record_that_contradicts_what_it_measures_is_refused(
+    coax: Vehicle, records: Records, name: str, change: Callable[[BenchRecord], BenchRecord], message: str
+) -> None:
+    with pytest.raises(BenchError) as error:
+        evaluate([change(records[name])], coax)
+    assert f"{name}.csv" in str(error.value)
+    assert message in str(error.value)
+
+
+def test_what_has_no_record_keeps_the_published_value(coax: Vehicle, records: Records) -> None:
+    found = evaluate([records["fan_front"], records["supply"]], coax)
+    assert set(found.names) == {"drag_x", "k_drive_voltage"}
+    assert "tau_f_lower" in found.kept
+    assert found.card.parameters["tau_f_lower"] == coax.card.parameters["tau_f_lower"]
+    assert "k_drive_voltage" in repr(found)
+
+
+def test_a_number_that_physics_forbids_is_refused(coax: Vehicle, records: Records) -> None:
+    strong = _changed(records["fan_front"], Fx=1e6 * records["fan_front"]["Fx"])
+    with pytest.raises(BenchError, match=r"drag_x: comes out as .* physics allows"):
+        evaluate([strong], coax)
+
+
+def test_every_procedure_names_its_source_and_what_spoils_it() -> None:
+    for name, module in PROCEDURES.items():
+        assert "eq" in module.SOURCE, name
+        assert "spoils" in (module.__doc__ or "") or name == "drive_frequency", name
+    assert fuselage_drag.NAME in PROCEDURES
+
+
+def test_correlations_of_a_card_are_kept_checked_and_dropped_with_their_number(coax: Vehicle) -> None:
+    card = coax.card.with_values({"mass": 0.3}, sigma=0.01).with_values({"drag_x": 0.01}, sigma=0.002)
+    card = parse_card(replace(card, correlations={"mass": {"drag_x": -0.5}}).to_toml())
+    np.testing.assert_allclose(card.covariance(["drag_x", "mass"]), [[4e-6, -1e-5], [-1e-5, 1e-4]])
+    assert card.with_values({"drag_x": 0.02}).correlations == {}
+    for row in ({"mass": {"drag_x": 1.5}}, {"mass": {"wings": 0.1}}, {"mass": {"mass": 1.0}}):
+        with pytest.raises(CardError, match="correlations: "):
+            parse_card(replace(card, correlations=row).to_toml())
