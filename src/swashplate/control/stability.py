@@ -1,0 +1,98 @@
+"""Modes of a vehicle under a sampled controller: the loop's own map from one sample to the next, linearised."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import SwashError
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    rk4_step,
+    row_rates,
+)
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.vehicle import Vehicle
+
+_SUBSTEPS = 10
+_NO_STATE = 1e-8
+"""Below this modulus an eigenvalue of the map is no mode: memory that every sample writes anew."""
+
+
+def loop_modes(vehicle: Vehicle, controller: Controller, trim: Trim) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the closed loop about a hover, with the controller's sampling and hold in them.
+
+    The sampled map of states and memory is differentiated and its eigenvalues z are given as rate ln z, least stable
+    first. Terms such as u |u| have no slope at hover and no part in it.
+
+    Args:
+        vehicle: what flies, which need not be what the controller was designed on.
+        controller: see `swashplate.simulation.closed_loop.Controller`.
+        trim: the hover; the reference is its place and heading.
+
+    Raises:
+        SwashError: where the loop is not finite there.
+    """
+    enable_double_precision()
+    surroundings = np.array([getattr(trim.environment, name) for name in SURROUNDINGS], dtype=np.float64)
+    states = trim.states()
+    reference = np.array([states.get(name, 0.0) for name in REFERENCES])
+    matrix = np.asarray(
+        _jacobian(
+            equations_of(vehicle),
+            controller.step,
+            trim.state,
+            controller.memory,
+            controller.gains,
+            reference,
+            surroundings,
+            parameter_row(vehicle, trim.environment),
+            np.array(vehicle.input_limits).T,
+            1.0 / controller.rate,
+        )
+    )
+    if not np.all(np.isfinite(matrix)):
+        raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
+    values = np.linalg.eigvals(matrix).astype(np.complex128)
+    modes = np.log(values[np.abs(values) > _NO_STATE]) * controller.rate
+    return np.asarray(modes[np.argsort(-modes.real, kind="stable")])
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _jacobian(
+    equations: Equations,
+    control: Step,
+    x: Any,
+    memory: Any,
+    gains: Any,
+    reference: Any,
+    surroundings: Any,
+    p: Any,
+    limits: Any,
+    dt: Any,
+) -> Any:
+    rates = row_rates(equations, padded=False)
+    n = x.shape[0]
+
+    def sample(both: Any) -> Any:
+        x, memory = both[:n], both[n:]
+        after, command = control(memory, 0.0, jnp.concatenate([x, surroundings[-1:]]), reference, gains)
+        w = jnp.concatenate([jnp.clip(command, limits[0], limits[1]), surroundings])
+
+        def substep(x: Any, _: Any) -> tuple[Any, None]:
+            return rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt / _SUBSTEPS), None
+
+        x, _ = jax.lax.scan(substep, x, None, length=_SUBSTEPS)  # a loop: unrolled it takes a minute to compile
+        return jnp.concatenate([x, after])
+
+    return jax.jacfwd(sample)(jnp.concatenate([x, memory]))
