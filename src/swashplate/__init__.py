@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from swashplate.control.autopilot import autopilot
     from swashplate.control.hold import hover_hold
     from swashplate.errors import SwashError
     from swashplate.flights.flight import Flight
@@ -49,6 +50,7 @@ __all__ = [
     "Validation",
     "Vehicle",
     "__version__",
+    "autopilot",
     "hover_hold",
     "identify",
     "inspect",
@@ -79,6 +81,7 @@ _LIGHT: Mapping[str, tuple[str, str]] = {
 }
 _COMPUTING: Mapping[str, tuple[str, str]] = {
     "Sensors": ("swashplate.simulation.sensors", "Sensors"),
+    "autopilot": ("swashplate.control.autopilot", "autopilot"),
     "hover_hold": ("swashplate.control.hold", "hover_hold"),
     "identify": ("swashplate.identification.identify", "identify"),
     "linearize": ("swashplate.simulation.linearize", "linearize"),

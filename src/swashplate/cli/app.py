@@ -8,7 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from swashplate.cli import data, demo, identify, inspect, simulate, validate, vehicles
+from swashplate.cli import data, decouple, demo, identify, inspect, simulate, validate, vehicles
 from swashplate.cli.guard import Guarded
 
 app = typer.Typer(
@@ -48,6 +48,7 @@ def root(
 app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)
 app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
+app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")

@@ -12,7 +12,12 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from swashplate.flights.flight import Flight
+    from swashplate.simulation.closed_loop import Controller
+    from swashplate.simulation.trim import Trim
+    from swashplate.vehicles.vehicle import Vehicle
 
 _WIND = ("wind_north", "wind_east", "wind_down")
 
@@ -39,10 +44,18 @@ def simulate(
     wind: Annotated[
         str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")
     ] = "0,0,0",
+    controller: Annotated[
+        Path | None,
+        typer.Option("--controller", metavar="FILE", help="A controller from `swash decouple`, instead of the hold."),
+    ] = None,
+    pilot: Annotated[
+        bool,
+        typer.Option("--pilot", help="Roll and pitch are a pilot's commands to the controller."),
+    ] = False,
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fly a maneuver from hover, held in the room by a minimal controller, and save the flight."""
+    """Fly a maneuver from hover under a controller, and save the flight."""
     from swashplate.cli.console import progress
     from swashplate.flights.maneuvers import parse
     from swashplate.vehicles.catalogue import vehicle as find
@@ -54,6 +67,8 @@ def simulate(
         raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
     blowing = dict(zip(_WIND, options.numbers(wind, option="--wind", count=3), strict=True))
     excitation, aircraft = parse(maneuver), find(vehicle)
+    if pilot and controller is None:
+        raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
     with progress(quiet=quiet) as line:
         line.say("simulating (compiling takes longest the first time)")
         import swashplate as sp
@@ -61,7 +76,8 @@ def simulate(
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=sp.hover_hold,
+            controller=sp.hover_hold if controller is None else _from_file(controller),
+            pilot=pilot,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
             sag=sag,
             rate=rate,
@@ -76,6 +92,21 @@ def simulate(
     if not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def _from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle."""
+    from swashplate.control.controller_file import read_controller
+    from swashplate.errors import ControllerError
+
+    saved = read_controller(path)
+
+    def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if saved.vehicle != vehicle.name:
+            raise ControllerError(f"is for '{saved.vehicle}', not for '{vehicle.name}'.", where=path)
+        return saved
+
+    return make
 
 
 def _save(flight: Flight, out: Path) -> tuple[Path, ...]:

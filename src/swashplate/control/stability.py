@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.errors import SwashError
+from swashplate.errors import ControllerError, SwashError
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -25,6 +25,8 @@ from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
 _SUBSTEPS = 10
+_SAMPLES = 20.0
+"""Samples per period that a controller needs for a mode that it must hold."""
 _NO_STATE = 1e-8
 """Below this modulus an eigenvalue of the map is no mode: memory that every sample writes anew."""
 
@@ -66,6 +68,28 @@ def loop_modes(vehicle: Vehicle, controller: Controller, trim: Trim) -> NDArray[
     values = np.linalg.eigvals(matrix).astype(np.complex128)
     modes = np.log(values[np.abs(values) > _NO_STATE]) * controller.rate
     return np.asarray(modes[np.argsort(-modes.real, kind="stable")])
+
+
+def require_stable(mode: complex, *, rate: float, where: str) -> None:
+    """Say which mode a loop does not hold.
+
+    Args:
+        mode: the least stable of `loop_modes` [1/s].
+        rate: of the controller [Hz].
+        where: the model.
+
+    Raises:
+        ControllerError: where the mode grows; fewer than `_SAMPLES` samples per period are named as the likely reason.
+    """
+    if mode.real < 0.0:
+        return
+    frequency = abs(mode) / (2.0 * np.pi)
+    slow = frequency * _SAMPLES > rate
+    raise ControllerError(
+        f"the loop at {rate:g} Hz has a growing mode at {mode.real:+.3g} +- {abs(mode.imag):.3g}j 1/s.",
+        where=where,
+        hint=f"Run it at {_SAMPLES * frequency:.0f} Hz or more." if slow else "Change its gains.",
+    )
 
 
 @partial(jax.jit, static_argnums=(0, 1))

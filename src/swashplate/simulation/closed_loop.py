@@ -174,6 +174,7 @@ def simulate_maneuver(
     controller: Callable[[Vehicle, Trim], Controller],
     lead: float = 3.0,
     tail: float = 3.0,
+    pilot: bool = False,
     voltage: float | None = None,
     sag: float = 0.0,
     rate: float = 100.0,
@@ -187,6 +188,8 @@ def simulate_maneuver(
         maneuver: a `Maneuver` or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
         controller: makes the controller for the vehicle and its trim, e.g. `swashplate.control.hold.hover_hold`.
         lead, tail: hover before and after [s].
+        pilot: True sends roll and pitch to the controller as a pilot's commands; otherwise every axis is added to what
+            the controller commands.
         voltage: battery voltage at the start [V].
         sag: how much the voltage falls per second [V/s].
         rate: samples per second [Hz].
@@ -196,11 +199,14 @@ def simulate_maneuver(
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
     start = trim(vehicle, voltage=voltage, environment=environment)
+    commanded = [axis for axis in excitation.axes if pilot and axis in REFERENCES]
+    signals = excitation.signals(time - lead)
     return simulate_closed_loop(
         vehicle,
         controller(vehicle, start),
         duration=duration,
-        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names),
+        reference={axis: signals[axis] for axis in commanded},
+        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names, without=commanded),
         voltage=float(start.environment.voltage) - sag * time,
         wind=wind,
         start=start,

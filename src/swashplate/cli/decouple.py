@@ -1,0 +1,115 @@
+"""`swash decouple`: from a card, published or identified, to a controller file."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from swashplate.cli import options
+from swashplate.errors import SwashError
+
+
+class Mode(StrEnum):
+    MANUAL = "manual"
+    SPEED = "speed"
+    PLACE = "place"
+
+
+class Mixing(StrEnum):
+    ROTATION = "rotation"
+    AS_PRINTED = "as_printed"
+
+
+def decouple(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or a vehicle's name.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the controller (.toml).")] = None,
+    lag: Annotated[
+        str,
+        typer.Option(
+            "--lag",
+            help="Phase lag from the battery-compensated motor command (battery), the plain one (motor), the "
+            "hover's rotor speed (hover), or a constant in degrees.",
+        ),
+    ] = "battery",
+    mixing: Annotated[
+        Mixing | None, typer.Option("--mixing", help="Form of the equations to invert; the model's own by default.")
+    ] = None,
+    speed_terms: Annotated[
+        bool, typer.Option("--speed-terms/--no-speed-terms", help="Cancel what speed does across the motion.")
+    ] = True,
+    mode: Annotated[
+        Mode, typer.Option("--mode", help="What the servos hold besides a pilot's commands.")
+    ] = Mode.MANUAL,
+    voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the hover [V].")] = None,
+    rate: Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)] = 100.0,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Design the decoupling controller of a coaxial helicopter: height and yaw held, roll and pitch decoupled.
+
+    The law inverts the lower rotor's equations with the model's numbers (Fankhauser et al., eqs 19 to 22).
+    """
+    if out is not None and out.suffix != ".toml":
+        raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
+    import swashplate as sp
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table
+    from swashplate.control.autopilot import autopilot
+    from swashplate.control.controller_file import save_controller
+    from swashplate.control.decoupling import LAGS, estimated_lag
+    from swashplate.control.stability import loop_modes, require_stable
+
+    vehicle = sp.vehicle(model)
+    hover = sp.trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage)
+    named = lag in LAGS or lag.isalpha()
+    wanted: Any = lag if named else math.radians(options.numbers(lag, option="--lag", count=1)[0])
+    made = autopilot(
+        vehicle,
+        hover,
+        mode=mode.value,
+        rate=rate,
+        lag=wanted,
+        speed_terms=speed_terms,
+        mixing=None if mixing is None else mixing.value,
+    )
+    law, slowest = made.numbers.law, loop_modes(vehicle, made, hover)[0]
+    if made.mode != "manual":  # a pilot damps what "manual" leaves alone
+        require_stable(slowest, rate=made.rate, where=model)
+    volts = float(hover.environment.voltage)
+    motor = hover.commands()["motor_lower"]
+    degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
+    if out is not None:
+        save_controller(made, out)
+    found = {
+        "vehicle": vehicle.name,
+        "model": vehicle.card.title,
+        "mode": made.mode,
+        "rate": made.rate,
+        "mixing": "rotation" if law.mixing > 0 else "as_printed",
+        "lag_at_hover_deg": degrees[volts],
+        "law": law._asdict(),
+        "least_stable_mode": {"real": slowest.real, "imaginary": abs(slowest.imag)},
+    }
+    if json:
+        typer.echo(as_json(found))
+    elif not quiet:
+        across = 100.0 * math.sin(math.radians(degrees[volts]))
+        rows = [
+            ("form of the equations", str(found["mixing"]), ""),
+            ("lower rotor at hover", f"{hover.states()['omega_lower']:.1f}", "rad/s"),
+            ("phase lag taken out at hover", f"{degrees[volts]:.2f}", "deg"),
+            ("  at the same command, 1 V less", f"{degrees[volts - 1.0]:.2f}", "deg"),
+            ("of a command goes across without it", f"{across:.0f}", "%"),
+            ("roll command against 1 m/s ahead", f"{(law.across_u + law.across_u_linear) / law.linkage:+.3f}", "1"),
+            ("pitch command against 1 m/s right", f"{-(law.across_v + law.across_v_linear) / law.linkage:+.3f}", "1"),
+            ("least stable mode of the loop", f"{slowest.real:+.3f} +- {abs(slowest.imag):.3f}j", "1/s"),
+        ]
+        made_table = table((f"decoupling of {vehicle.name}, mode {made.mode}", "", ""), rows)
+        made_table.columns[2].justify = "left"
+        console().print(made_table)
+        if out is not None:
+            typer.echo(f"\nWritten: {out}")
