@@ -92,3 +92,28 @@ def test_bad_files_are_named_with_their_entry(tmp_path: Path) -> None:
     outcome = swash(*command, "--out", tmp_path / "f.nc")
     assert outcome.code == 2
     assert "is for 'raptor', not for 'coax'" in outcome.err
+
+
+def test_the_step_is_flown_on_models_that_the_data_cannot_tell_apart(tmp_path: Path) -> None:
+    names = ["o_zeta_lower", "o_zeta_upper"]
+    covariance = (np.radians(1.0) ** 2 * np.eye(2)).tolist()
+    values = sp.vehicle("coax").card.values()
+    document = {
+        "kind": "fit",
+        "names": names,
+        "parameters": [{"name": n, "value": values[n], "tie": ""} for n in names],
+        "covariance": covariance,
+        "covariance_corrected": covariance,
+    }
+    fit = tmp_path / "fit.json"
+    fit.write_text(json.dumps(document))
+    found = json.loads(swash("decouple", "coax", "--step", "0.2", "--fit", fit, "--draws", "60", "--json").out)["step"]
+    assert found["without"]["drift"] == pytest.approx(-0.77, abs=0.05)
+    assert found["with"]["drift"] == pytest.approx(0.65, abs=0.03)
+    low, high = (found[f"with, {percent} %"]["drift"] for percent in (5, 95))
+    # One degree of either lag is 0.1 to 0.25 m at 6 m.
+    assert 0.2 < high - low < 1.5
+    assert low < 0.65 < high
+    outcome = swash("decouple", "coax", "--fit", fit)
+    assert outcome.code == 2
+    assert "--fit: is for the paths of a --step" in outcome.err

@@ -11,7 +11,8 @@ from swashplate.control.autopilot import Autopilot, Memory, Reference, autopilot
 from swashplate.control.height_yaw import HeightYawGains, HeightYawMemory, coaxial_rotors, motors_for, thrust_and_torque
 from swashplate.control.hover_trim import hover_trim
 from swashplate.control.stability import loop_modes
-from swashplate.errors import FlightError, SwashError
+from swashplate.control.straightness import step_paths
+from swashplate.errors import ControllerError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rigid_body import RigidBody
@@ -61,6 +62,19 @@ def test_figure_10(coax: Vehicle, hover: Trim) -> None:
     for flight in (without, by_law, constant):
         assert np.max(np.abs(flight.values("z"))) < 0.01
         assert math.degrees(np.max(np.abs(flight.values("psi")))) < 1.1
+
+
+def test_a_law_wrong_by_three_degrees(coax: Vehicle) -> None:
+    """An independent calculation without the bar's misalignment: +0.78 m and -0.74 m at 6 m for a lag 3 deg off."""
+    aligned = coax.with_values({"k_zeta_upper": 0.0, "o_zeta_upper": 0.0})
+    hover = trim(aligned)
+    controller = autopilot(aligned, hover, mode="manual")
+    lag = coax.card.values()["o_zeta_lower"] + np.radians([-3.0, 0.0, 3.0])
+    paths = step_paths(aligned, controller, hover, command=0.2, duration=7.0, size=3, parameters={"o_zeta_lower": lag})
+    np.testing.assert_allclose(paths.drift, [-0.74, 0.0, 0.78], atol=0.06)
+    assert paths.drift[1] == pytest.approx(six_metres(aligned, controller).values("y")[-1], abs=0.005)
+    with pytest.raises(ControllerError, match="no flight covers 6 m in 1 s"):
+        step_paths(coax, controller, hover, command=0.2, duration=1.0)
 
 
 def test_a_bar_without_misalignment_leaves_no_drift(coax: Vehicle) -> None:

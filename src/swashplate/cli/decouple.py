@@ -5,12 +5,19 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli import options
 from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from swashplate.control.autopilot import Autopilot
+    from swashplate.simulation.trim import Trim
+    from swashplate.vehicles.vehicle import Vehicle
 
 
 class Mode(StrEnum):
@@ -46,6 +53,18 @@ def decouple(
     ] = Mode.MANUAL,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the hover [V].")] = None,
     rate: Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)] = 100.0,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            "--step", help="Fly this step of the pitch command for 6 m, with and without the decoupling.", min=0.01
+        ),
+    ] = None,
+    fit: Annotated[
+        Path | None,
+        typer.Option("--fit", metavar="FILE", help="With --step: also on models drawn from a fit.json."),
+    ] = None,
+    draws: Annotated[int, typer.Option("--draws", help="How many of them.", min=2)] = 500,
+    seed: Annotated[int, typer.Option("--seed", help="Of the draws.", min=0)] = 0,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -53,6 +72,8 @@ def decouple(
 
     The law inverts the lower rotor's equations with the model's numbers (Fankhauser et al., eqs 19 to 22).
     """
+    if fit is not None and step is None:
+        raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
     if out is not None and out.suffix != ".toml":
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     import swashplate as sp
@@ -94,6 +115,11 @@ def decouple(
         "law": law._asdict(),
         "least_stable_mode": {"real": slowest.real, "imaginary": abs(slowest.imag)},
     }
+    flown = {}
+    if step is not None:
+        bare = autopilot(vehicle, hover, mode="manual", rate=rate, decoupled=False)
+        flown = _steps(vehicle, hover, {"without": bare, "with": made}, step, fit, draws, seed)
+        found["step"] = flown
     if json:
         typer.echo(as_json(found))
     elif not quiet:
@@ -111,5 +137,43 @@ def decouple(
         made_table = table((f"decoupling of {vehicle.name}, mode {made.mode}", "", ""), rows)
         made_table.columns[2].justify = "left"
         console().print(made_table)
+        if flown:
+            head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
+            cells = [
+                (name, *(f"{entry[key]:+.2f}" for key in ("drift", "leftmost", "rightmost", "speed")), entry["models"])
+                for name, entry in flown.items()
+            ]
+            typer.echo()
+            console().print(table(head, cells))
         if out is not None:
             typer.echo(f"\nWritten: {out}")
+
+
+def _steps(
+    vehicle: Vehicle,
+    hover: Trim,
+    controllers: Mapping[str, Autopilot],
+    command: float,
+    fit: Path | None,
+    draws: int,
+    seed: int,
+) -> dict[str, dict[str, Any]]:
+    """Paths on the step: of the model itself, and percentiles over drawn models."""
+    import numpy as np
+
+    from swashplate.control.robustness import draw_models
+    from swashplate.control.straightness import step_paths
+
+    figures = ("drift", "leftmost", "rightmost", "speed")
+    drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+    found: dict[str, dict[str, Any]] = {}
+    for name, controller in controllers.items():
+        path = step_paths(vehicle, controller, hover, command=command)
+        found[name] = {key: float(getattr(path, key)[0]) for key in figures} | {"models": "this one"}
+        if drawn is not None:
+            paths = step_paths(vehicle, controller, hover, command=command, size=draws, parameters=drawn)
+            arrived = int(np.sum(np.isfinite(paths.drift)))
+            for percent in (5, 50, 95):
+                values = {key: float(np.nanpercentile(getattr(paths, key), percent)) for key in figures}
+                found[f"{name}, {percent} %"] = values | {"models": f"{arrived} of {draws}"}
+    return found
