@@ -192,9 +192,11 @@ def dynamic_decoupling(
     worst = int(np.argmax(values.real))
     if values[worst].real > _STABLE:
         order = np.argsort(-np.abs(vectors[:, worst]))[:3]
+        zero = np.round(values[worst], 6) + 0.0  # chains of integrators leave rounding about the origin
         states = ", ".join(part.state_labels[i] for i in order if abs(vectors[i, worst]) > 0.1)
         raise SwashError(
-            f"the filter would not come to rest: the model has a zero at {values[worst]:.3g} 1/s (in {states}).",
+            f"the filter would not come to rest: the model has a zero at {zero.real:.3g} +- {abs(zero.imag):.3g}j 1/s "
+            f"(in {states}).",
             where="model",
             hint="Leave slow states out of the copy (keep=...), choose other outputs, or decouple statically.",
         )
