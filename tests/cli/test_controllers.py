@@ -41,6 +41,14 @@ def test_a_controller_comes_back_from_its_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.gains, made.gains)
 
 
+def test_c_code_is_written_where_asked(tmp_path: Path) -> None:
+    pytest.importorskip("casadi")
+    outcome = swash("decouple", "coax", "--c", tmp_path / "c.c", "--precision", "float")
+    assert outcome.code == 0, outcome.err
+    assert "operations a step" in outcome.out
+    assert "void swash_step(float memory[5]" in (tmp_path / "c.c").read_text()
+
+
 def test_json_says_what_the_table_says() -> None:
     found = json.loads(swash("decouple", "coax", "--lag", "hover", "--json").out)
     assert found["lag_at_hover_deg"] == pytest.approx(17.01, abs=0.01)
@@ -54,6 +62,7 @@ def test_json_says_what_the_table_says() -> None:
         (("decouple", "coax", "--lag", "wrong"), "lag: is 'wrong', expected hover, motor, battery or a number."),
         (("decouple", "coax", "--lag", "44", "--mixing", "as_printed"), "no inverse at 45 deg"),
         (("decouple", "coax", "--out", "c.json"), "ends in '.json', expected .toml"),
+        (("decouple", "coax", "--c", "c.h"), "ends in '.h', expected .c"),
         (("decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
         (("decouple", "coax", "--mode", "place", "--rate", "6"), "growing mode"),
         (

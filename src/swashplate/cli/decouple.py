@@ -31,6 +31,11 @@ class Mixing(StrEnum):
     AS_PRINTED = "as_printed"
 
 
+class Precision(StrEnum):
+    DOUBLE = "double"
+    FLOAT = "float"
+
+
 def decouple(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or a vehicle's name.")],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the controller (.toml).")] = None,
@@ -53,6 +58,10 @@ def decouple(
     ] = Mode.MANUAL,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the hover [V].")] = None,
     rate: Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)] = 100.0,
+    c_code: Annotated[
+        Path | None, typer.Option("--c", metavar="FILE", help="Write one step of it as C99 (needs the extra 'export').")
+    ] = None,
+    precision: Annotated[Precision, typer.Option("--precision", help="Of the C.")] = Precision.DOUBLE,
     step: Annotated[
         float | None,
         typer.Option(
@@ -76,6 +85,8 @@ def decouple(
         raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
     if out is not None and out.suffix != ".toml":
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
+    if c_code is not None and c_code.suffix != ".c":
+        raise SwashError(f"ends in '{c_code.suffix}', expected .c.", where=c_code, channel="--c")
     import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
@@ -105,7 +116,13 @@ def decouple(
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
     if out is not None:
         save_controller(made, out)
-    found = {
+    code = None
+    if c_code is not None:
+        from swashplate.export.controller_c import controller_code
+
+        code = controller_code(made, precision=precision.value)
+        code.save(c_code)
+    found: dict[str, Any] = {
         "vehicle": vehicle.name,
         "model": vehicle.card.title,
         "mode": made.mode,
@@ -145,8 +162,12 @@ def decouple(
             ]
             typer.echo()
             console().print(table(head, cells))
-        if out is not None:
-            typer.echo(f"\nWritten: {out}")
+        if code is not None:
+            told = f"{code.operations} operations a step, {code.work_bytes} bytes of temporaries"
+            typer.echo(f"\nC of one step: {told}")
+        written = ", ".join(str(path) for path in (out, c_code) if path is not None)
+        if written:
+            typer.echo(f"\nWritten: {written}")
 
 
 def _steps(
