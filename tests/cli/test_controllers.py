@@ -54,6 +54,9 @@ def test_json_says_what_the_table_says() -> None:
     assert found["lag_at_hover_deg"] == pytest.approx(17.01, abs=0.01)
     assert found["law"]["k_zeta"] == 0.0
     assert found["least_stable_mode"]["real"] == pytest.approx(0.247, abs=0.002)
+    assert "margins" not in found  # of an unstable loop
+    held = json.loads(swash("decouple", "coax", "--mode", "place", "--json").out)["margins"]
+    assert held["servo_roll"]["phase_deg"] > held["together"]["phase_deg"] > 20.0
 
 
 @pytest.mark.parametrize(

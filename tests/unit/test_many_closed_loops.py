@@ -68,7 +68,7 @@ def test_noise_has_its_size_its_seed_and_its_effect(coax: Vehicle, hover: Trim) 
     assert not np.array_equal(a.states, c.states)
     # In the first sample the roll servo sees lean_rate times the noise of p, turned by the lag.
     servo = np.hypot(a.rows[0, 2], a.rows[0, 3])
-    assert np.sqrt(np.mean(servo**2)) == pytest.approx(0.2 * 0.02, rel=0.35)
+    assert np.sqrt(np.mean(servo**2)) == pytest.approx(0.25 * 0.02, rel=0.35)
 
 
 def test_gusts_have_drydens_variance_and_spectrum() -> None:

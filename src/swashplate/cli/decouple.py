@@ -93,7 +93,7 @@ def decouple(
     from swashplate.control.autopilot import autopilot
     from swashplate.control.controller_file import save_controller
     from swashplate.control.decoupling import LAGS, estimated_lag
-    from swashplate.control.stability import loop_modes, require_stable
+    from swashplate.control.stability import loop_margins, loop_modes, require_stable
 
     vehicle = sp.vehicle(model)
     hover = sp.trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage)
@@ -111,6 +111,7 @@ def decouple(
     law, slowest = made.numbers.law, loop_modes(vehicle, made, hover)[0]
     if made.mode != "manual":  # a pilot damps what "manual" leaves alone
         require_stable(slowest, rate=made.rate, where=model)
+    margins = None if slowest.real > 0.0 or made.mode == "manual" else loop_margins(vehicle, made, hover)
     volts = float(hover.environment.voltage)
     motor = hover.commands()["motor_lower"]
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
@@ -132,6 +133,12 @@ def decouple(
         "law": law._asdict(),
         "least_stable_mode": {"real": slowest.real, "imaginary": abs(slowest.imag)},
     }
+    if margins is not None:
+        together = margins.together
+        found["margins"] = {
+            **{axis.name: {"gain": axis.gain, "phase_deg": math.degrees(axis.phase)} for axis in margins.axes},
+            "together": {"disc": together.alpha, "gain": together.gain, "phase_deg": math.degrees(together.phase)},
+        }
     flown = {}
     if step is not None:
         bare = autopilot(vehicle, hover, mode="manual", rate=rate, decoupled=False)
@@ -154,6 +161,8 @@ def decouple(
         made_table = table((f"decoupling of {vehicle.name}, mode {made.mode}", "", ""), rows)
         made_table.columns[2].justify = "left"
         console().print(made_table)
+        if margins is not None:
+            typer.echo(f"\n{margins!r}")
         if flown:
             head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
             cells = [

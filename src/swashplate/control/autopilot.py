@@ -38,6 +38,9 @@ MODES: tuple[Mode, ...] = ("manual", "speed", "place")
 class CyclicGains(NamedTuple):
     """Numbers of the loops on the servos.
 
+    The defaults were found by a random search for the largest multi-loop disc margin on the published CoaX with every
+    mode decaying. Stiffer loops lose it at the bar's mode (lean 1.5: a disc of 0.08 instead of 0.45).
+
     Attributes:
         place: wanted speed per distance [1/s], at most `greatest_speed` [m/s].
         speed, speed_integral: wanted lean per speed error [rad s/m] and its integral [rad/m], at most `greatest_lean`.
@@ -45,13 +48,13 @@ class CyclicGains(NamedTuple):
         trim_roll, trim_pitch: servo commands of the trimmed hover.
     """
 
-    place: float = 0.4
+    place: float = 0.2
     greatest_speed: float = 1.0
-    speed: float = 0.20
-    speed_integral: float = 0.04
-    greatest_lean: float = 0.25
-    lean: float = 1.5
-    lean_rate: float = 0.2
+    speed: float = 0.45
+    speed_integral: float = 0.09
+    greatest_lean: float = 0.4
+    lean: float = 0.5
+    lean_rate: float = 0.25
     trim_roll: float = 0.0
     trim_pitch: float = 0.0
 
