@@ -129,3 +129,22 @@ def test_the_step_is_flown_on_models_that_the_data_cannot_tell_apart(tmp_path: P
     outcome = swash("decouple", "coax", "--fit", fit)
     assert outcome.code == 2
     assert "--fit: is for the paths of a --step" in outcome.err
+
+
+def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> None:
+    controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
+    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
+    command = ("simulate", "--vehicle", "coax", "--controller", controller, "--out", worst, "--monte-carlo", "20")
+    outcome = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--gusts", "indoor", "--sag", "0.1", "--seed", "3")
+    assert outcome.code == 0, outcome.err
+    assert "20 flights, 0 lost" in outcome.out
+    largest = float(next(line for line in outcome.out.splitlines() if "place, largest" in line).split()[-1])
+    flight = sp.read(worst)
+    assert np.max(np.hypot(flight.values("x"), flight.values("y"))) == pytest.approx(largest, rel=1e-3)
+    assert flight.values("voltage")[-1] == pytest.approx(12.22 - 0.8, abs=0.02)
+    yaw = swash(*command, "--maneuver", "doublet:yaw,1s,0.1")
+    assert yaw.code == 2
+    assert "moves yaw; with --monte-carlo a maneuver is a pilot's roll or pitch" in yaw.err
+    windy = swash(*command[:7], "--maneuver", "doublet:pitch,1s", "--gusts", "indoor")
+    assert windy.code == 2
+    assert "are for --monte-carlo" in windy.err

@@ -38,7 +38,7 @@ def simulate(
         SensorSet,
         typer.Option("--sensors", help="The true states, motion capture with noise only, or with gaps and outliers."),
     ] = SensorSet.NONE,
-    seed: Annotated[int, typer.Option("--seed", help="Of the sensors' noise.", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Of all that is random.", min=0)] = 0,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage at the start [V].")] = None,
     sag: Annotated[float, typer.Option("--sag", help="Fall of the voltage [V/s].")] = 0.0,
     wind: Annotated[
@@ -52,6 +52,16 @@ def simulate(
         bool,
         typer.Option("--pilot", help="Roll and pitch are a pilot's commands to the controller."),
     ] = False,
+    many: Annotated[
+        int | None,
+        typer.Option("--monte-carlo", help="So many flights with sensor noise; --out keeps the worst.", min=2),
+    ] = None,
+    fit: Annotated[
+        Path | None, typer.Option("--fit", metavar="FILE", help="With --monte-carlo: models drawn from this fit.json.")
+    ] = None,
+    gusts: Annotated[
+        str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
+    ] = "none",
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
@@ -69,6 +79,30 @@ def simulate(
     excitation, aircraft = parse(maneuver), find(vehicle)
     if pilot and controller is None:
         raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
+    if many is None and (fit is not None or gusts != "none"):
+        raise SwashError("are for --monte-carlo.", channel="--fit and --gusts", hint="Add --monte-carlo 100.")
+    if many is not None:
+        if controller is None:
+            raise SwashError("needs a --controller.", channel="--monte-carlo", hint="`swash decouple` writes one.")
+        from swashplate.cli import monte_carlo
+
+        with progress(quiet=quiet) as line:
+            line.say(f"simulating {many} flights (compiling takes longest the first time)")
+            summary, worst = monte_carlo.fly(
+                aircraft,
+                excitation,
+                controller,
+                count=many,
+                fit=fit,
+                gusts=gusts,
+                seed=seed,
+                voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
+                sag=sag,
+            )
+            paths = _save(worst, out)
+        if not quiet:
+            typer.echo(f"{summary!r}\n\nThe worst flight is written: {', '.join(map(str, paths))}")
+        return
     with progress(quiet=quiet) as line:
         line.say("simulating (compiling takes longest the first time)")
         import swashplate as sp
@@ -76,7 +110,7 @@ def simulate(
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=sp.hover_hold if controller is None else _from_file(controller),
+            controller=sp.hover_hold if controller is None else from_file(controller),
             pilot=pilot,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
             sag=sag,
@@ -94,7 +128,7 @@ def simulate(
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
 
 
-def _from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
+def from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
     """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle."""
     from swashplate.control.controller_file import read_controller
     from swashplate.errors import ControllerError

@@ -19,6 +19,13 @@ from swashplate.vehicles.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 PERCENTILES = (5.0, 50.0, 95.0, 100.0)
+SENSOR_NOISE: Mapping[str, float] = {
+    **dict.fromkeys(("x", "y", "z"), 0.002),
+    **dict.fromkeys(("u", "v", "w"), 0.02),
+    **dict.fromkeys(("phi", "theta", "psi"), 0.005),
+    **dict.fromkeys(("p", "q", "r"), 0.01),
+}
+"""White noise on each sample of what a controller is told [m, m/s, rad, rad/s]; assumed, as of cameras and gyros."""
 _TRIES = 100
 
 
