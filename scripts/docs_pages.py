@@ -249,7 +249,7 @@ def _same_word(a: str, b: str, tolerance: float) -> bool:
         x, y = float(a.strip("(),%")), float(b.strip("(),%"))
     except ValueError:
         return a == b
-    return (x != x and y != y) or abs(x - y) <= max(tolerance * max(abs(x), abs(y)), 1e-9)
+    return x == y or (x != x and y != y) or abs(x - y) <= max(tolerance * max(abs(x), abs(y)), 1e-9)
 
 
 # ---- generated parts -------------------------------------------------------------------------------------------------

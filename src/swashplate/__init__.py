@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from swashplate.control.autopilot import autopilot
     from swashplate.control.hold import hover_hold
     from swashplate.control.state_hold import state_hold
     from swashplate.errors import SwashError
@@ -57,6 +58,7 @@ __all__ = [
     "Validation",
     "Vehicle",
     "__version__",
+    "autopilot",
     "fit_state_space",
     "fit_transfer_function",
     "hover_hold",
@@ -99,6 +101,7 @@ _LIGHT: Mapping[str, tuple[str, str]] = {
 }
 _COMPUTING: Mapping[str, tuple[str, str]] = {
     "Sensors": ("swashplate.simulation.sensors", "Sensors"),
+    "autopilot": ("swashplate.control.autopilot", "autopilot"),
     "hover_hold": ("swashplate.control.hold", "hover_hold"),
     "identify": ("swashplate.identification.identify", "identify"),
     "linearize": ("swashplate.simulation.linearize", "linearize"),

@@ -63,6 +63,10 @@ class TrimError(SwashError):
     """An equilibrium that does not exist, with the limit that prevents it."""
 
 
+class ControllerError(SwashError):
+    """A controller that cannot be designed, read or used."""
+
+
 class DivergenceError(SwashError):
     """A simulation that left the finite numbers.
 

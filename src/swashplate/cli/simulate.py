@@ -13,7 +13,12 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from swashplate.flights.flight import Flight
+    from swashplate.simulation.closed_loop import Controller
+    from swashplate.simulation.trim import Trim
+    from swashplate.vehicles.vehicle import Vehicle
 
 _WIND = ("wind_north", "wind_east", "wind_down")
 
@@ -34,7 +39,7 @@ def simulate(
         SensorSet,
         typer.Option("--sensors", help="The true states, motion capture with noise only, or with gaps and outliers."),
     ] = SensorSet.NONE,
-    seed: Annotated[int, typer.Option("--seed", help="Of the sensors' noise.", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Of all that is random.", min=0)] = 0,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage at the start [V].")] = None,
     sag: Annotated[float, typer.Option("--sag", help="Fall of the voltage [V/s].")] = 0.0,
     wind: Annotated[
@@ -42,10 +47,28 @@ def simulate(
     ] = "0,0,0",
     speed: Annotated[float, typer.Option("--speed", help="Speed ahead that the maneuver begins at [m/s].")] = 0.0,
     switched: given.Switch = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option("--controller", metavar="FILE", help="A controller from `swash decouple`, instead of the hold."),
+    ] = None,
+    pilot: Annotated[
+        bool,
+        typer.Option("--pilot", help="Roll and pitch are a pilot's commands to the controller."),
+    ] = False,
+    many: Annotated[
+        int | None,
+        typer.Option("--monte-carlo", help="So many flights with sensor noise; --out keeps the worst.", min=2),
+    ] = None,
+    fit: Annotated[
+        Path | None, typer.Option("--fit", metavar="FILE", help="With --monte-carlo: models drawn from this fit.json.")
+    ] = None,
+    gusts: Annotated[
+        str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
+    ] = "none",
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fly a maneuver from hover or steady flight, held there by a minimal controller, and save the flight."""
+    """Fly a maneuver from hover or steady flight under a controller, and save the flight."""
     from swashplate.cli.console import progress
     from swashplate.flights.maneuvers import parse
 
@@ -56,15 +79,42 @@ def simulate(
         raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
     blowing = dict(zip(_WIND, options.numbers(wind, option="--wind", count=3), strict=True))
     excitation, aircraft = parse(maneuver), given.vehicle_of(vehicle, None, switched)
+    if pilot and controller is None:
+        raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
+    if many is None and (fit is not None or gusts != "none"):
+        raise SwashError("are for --monte-carlo.", channel="--fit and --gusts", hint="Add --monte-carlo 100.")
+    if many is not None:
+        if controller is None:
+            raise SwashError("needs a --controller.", channel="--monte-carlo", hint="`swash decouple` writes one.")
+        from swashplate.cli import monte_carlo
+
+        with progress(quiet=quiet) as line:
+            line.say(f"simulating {many} flights (compiling takes longest the first time)")
+            summary, worst = monte_carlo.fly(
+                aircraft,
+                excitation,
+                controller,
+                count=many,
+                fit=fit,
+                gusts=gusts,
+                seed=seed,
+                voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
+                sag=sag,
+            )
+            paths = _save(worst, out)
+        if not quiet:
+            typer.echo(f"{summary!r}\n\nThe worst flight is written: {', '.join(map(str, paths))}")
+        return
     with progress(quiet=quiet) as line:
         line.say("simulating (compiling takes longest the first time)")
         import swashplate as sp
 
-        coaxial = "motor_upper" in aircraft.input_names
+        hold = sp.hover_hold if "motor_upper" in aircraft.input_names else sp.state_hold
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=sp.hover_hold if coaxial else sp.state_hold,
+            controller=hold if controller is None else from_file(controller),
+            pilot=pilot,
             speed=speed,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
             sag=sag,
@@ -80,6 +130,21 @@ def simulate(
     if not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle."""
+    from swashplate.control.controller_file import read_controller
+    from swashplate.errors import ControllerError
+
+    saved = read_controller(path)
+
+    def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if saved.vehicle != vehicle.name:
+            raise ControllerError(f"is for '{saved.vehicle}', not for '{vehicle.name}'.", where=path)
+        return saved
+
+    return make
 
 
 def _save(flight: Flight, out: Path) -> tuple[Path, ...]:

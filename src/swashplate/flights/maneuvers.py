@@ -6,7 +6,7 @@ A maneuver is described in one line, `kind:axis,...`, e.g. "sweep:pitch,0.5-8Hz,
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,8 +64,8 @@ class Maneuver:
             axis: np.where(inside, self.amplitude * shape, 0.0) for axis, shape in zip(self.axes, shapes, strict=True)
         }
 
-    def offsets(self, time: Array, *, inputs: Iterable[str]) -> dict[str, Array]:
-        """What to add to each input at times [s] counted from the maneuver's start.
+    def offsets(self, time: Array, *, inputs: Iterable[str], without: Collection[str] = ()) -> dict[str, Array]:
+        """What to add to each input at times [s] counted from the maneuver's start, leaving out some of its axes.
 
         Raises:
             ManeuverError: where an axis moves an input that the vehicle does not have.
@@ -73,6 +73,8 @@ class Maneuver:
         names = tuple(inputs)
         added = {name: np.zeros(np.shape(time)) for name in names}
         for axis, signal in self.signals(time).items():
+            if axis in without:
+                continue
             sets = AXES.get(axis, ({axis: 1.0},))
             moved = next((chosen for chosen in sets if chosen.keys() <= added.keys()), sets[0])
             for name, share in moved.items():

@@ -32,8 +32,9 @@ from swashplate.vehicles.vehicle import Vehicle
 Array = NDArray[np.float64]
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
-REFERENCES = ("x", "y", "z", "psi")
-"""What a controller is asked to hold, in the order of the reference row."""
+REFERENCES = ("x", "y", "z", "psi", "ahead", "right", "roll", "pitch")
+"""What a controller is asked for, in the order of the reference row: place [m] and heading [rad] to hold, speed ahead
+and to the right [m/s], and a pilot's cyclic commands [-1 to 1] (right and nose down positive)."""
 
 
 class Controller(Protocol):
@@ -44,7 +45,7 @@ class Controller(Protocol):
         memory: its state at the start, a row of numbers.
         gains: its numbers, a row, so that other gains compile nothing anew.
         step: a module's function `(memory, time, measured, reference, gains) -> (memory, inputs)`; `measured` is the
-            vehicle's state row, `reference` the row of `REFERENCES`. JAX traces it.
+            vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it.
     """
 
     @property
@@ -76,7 +77,8 @@ def simulate_closed_loop(
         vehicle, start, rate, environment: as in `simulate`; inputs are held over a step.
         controller: see `Controller`.
         duration: [s].
-        reference: numbers or series (n,) of `REFERENCES`; what is not given stays at the start's value.
+        reference: numbers or series (n,) of `REFERENCES`; a place or heading that is not given stays at the start's
+            value, a speed or command at zero.
         excitation: series (n,) by input name, added to the commands before the limits.
         voltage: battery voltage [V], a number or series (n,).
         wind: "wind_north", "wind_east", "wind_down" [m/s], numbers or series (n,).
@@ -98,7 +100,8 @@ def simulate_closed_loop(
     given = {**(wind or {}), **({} if voltage is None else {"voltage": voltage})}
     around = _table(SURROUNDINGS, given, n, [getattr(surroundings, name) for name in SURROUNDINGS])
     x0 = start_row(vehicle, start, surroundings._replace(**dict(zip(SURROUNDINGS, around[0], strict=True))))
-    wanted = _table(REFERENCES, reference or {}, n, [x0[vehicle.index(name)] for name in REFERENCES])
+    at_start = dict(zip(vehicle.state_names, x0, strict=True))
+    wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
     states, inputs = _fly(
         equations_of(vehicle),
@@ -139,7 +142,8 @@ def _fly(
     def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
         x, memory, command, k = carry
         surroundings, reference, excitation = now
-        fresh_memory, fresh = control(memory, k * dt, x, reference, gains)
+        measured = jnp.concatenate([x, surroundings[-1:]])
+        fresh_memory, fresh = control(memory, k * dt, measured, reference, gains)
         due = k % every == 0
         memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
         inputs = jnp.clip(command + excitation, limits[0], limits[1])
@@ -170,6 +174,7 @@ def simulate_maneuver(
     controller: Callable[[Vehicle, Trim], Controller],
     lead: float = 3.0,
     tail: float = 3.0,
+    pilot: bool = False,
     voltage: float | None = None,
     sag: float = 0.0,
     speed: float = 0.0,
@@ -184,6 +189,8 @@ def simulate_maneuver(
         maneuver: a `Maneuver` or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
         controller: makes the controller for the vehicle and its trim, e.g. `swashplate.control.hold.hover_hold`.
         lead, tail: hover before and after [s].
+        pilot: True sends roll and pitch to the controller as a pilot's commands; otherwise every axis is added to what
+            the controller commands.
         voltage: battery voltage at the start [V].
         sag: how much the voltage falls per second [V/s].
         speed: speed ahead that it begins at [m/s].
@@ -194,11 +201,14 @@ def simulate_maneuver(
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
     start = trim(vehicle, speed=speed, voltage=voltage, environment=environment)
+    commanded = [axis for axis in excitation.axes if pilot and axis in REFERENCES]
+    signals = excitation.signals(time - lead)
     return simulate_closed_loop(
         vehicle,
         controller(vehicle, start),
         duration=duration,
-        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names),
+        reference={axis: signals[axis] for axis in commanded},
+        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names, without=commanded),
         voltage=float(start.environment.voltage) - sag * time,
         wind=wind,
         start=start,

@@ -1,0 +1,88 @@
+"""Controllers as files: `kind = "controller"`, every number by name, readable and editable."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from swashplate.atomic import write_text
+from swashplate.control.autopilot import MODES, Autopilot, CyclicGains, Gains
+from swashplate.control.decoupling import Decoupler
+from swashplate.control.height_yaw import CoaxialRotors, HeightYawGains
+from swashplate.errors import ControllerError
+
+SCHEMA = 1
+TYPE = "autopilot"
+_GROUPS: dict[str, Any] = {
+    "motors": HeightYawGains,
+    "rotors": CoaxialRotors,
+    "cyclic": CyclicGains,
+    "law": Decoupler,
+}
+
+
+def save_controller(controller: Autopilot, path: str | Path) -> None:
+    """Write a controller as a TOML file."""
+    document = {
+        "kind": "controller",
+        "schema": SCHEMA,
+        "type": TYPE,
+        "vehicle": controller.vehicle,
+        "model": controller.model,
+        "mode": controller.mode,
+        "rate": controller.rate,
+        **{name: getattr(controller.numbers, name)._asdict() for name in _GROUPS},
+    }
+    write_text(path, tomli_w.dumps(document))
+
+
+def read_controller(path: str | Path) -> Autopilot:
+    """A controller from its file.
+
+    Raises:
+        ControllerError: naming the file and the entry that is missing, unknown or no number.
+    """
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ControllerError(f"cannot be read: {error}.", where=path) from None
+    except tomllib.TOMLDecodeError as error:
+        raise ControllerError(f"is not TOML: {error}.", where=path) from None
+    if document.get("kind") != "controller":
+        raise ControllerError(
+            f"kind is {document.get('kind')!r}, expected 'controller'.",
+            where=path,
+            hint="`swash decouple MODEL --out FILE` writes one.",
+        )
+    if document.get("type") != TYPE or document.get("schema") != SCHEMA:
+        found = f"type {document.get('type')!r}, schema {document.get('schema')!r}"
+        raise ControllerError(f"{found}: expected type '{TYPE}', schema {SCHEMA}.", where=path)
+    if document.get("mode") not in MODES:
+        raise ControllerError(f"is {document.get('mode')!r}, expected {', '.join(MODES)}.", where=path, channel="mode")
+    rate = _number(document, "rate", path)
+    if rate <= 0.0:
+        raise ControllerError(f"is {rate:g} Hz, expected a positive rate.", where=path, channel="rate")
+    groups = {name: _group(document.get(name), name, kind, path) for name, kind in _GROUPS.items()}
+    return Autopilot(
+        str(document.get("vehicle", "")), str(document.get("model", "")), document["mode"], Gains(1.0 / rate, **groups)
+    )
+
+
+def _group(entries: Any, name: str, kind: Any, path: str | Path) -> Any:
+    if not isinstance(entries, dict):
+        raise ControllerError("is missing.", where=path, channel=f"[{name}]")
+    missing, unknown = sorted(set(kind._fields) - entries.keys()), sorted(entries.keys() - set(kind._fields))
+    if missing or unknown:
+        raise ControllerError(f"lacks {missing} and has unknown {unknown}.", where=path, channel=f"[{name}]")
+    return kind(**{field: _number(entries, field, path) for field in kind._fields})
+
+
+def _number(entries: dict[str, Any], name: str, path: str | Path) -> float:
+    value = entries.get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ControllerError(f"is {value!r}, expected a number.", where=path, channel=name)
+    return float(value)

@@ -1,0 +1,191 @@
+"""Many closed loops at once: one controller on many vehicles, each in its own gusts, with its own sensor noise."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import CardError, SwashError
+from swashplate.physics.environment import Environment
+from swashplate.simulation.batch import Batch
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    rk4_step,
+    row_rates,
+)
+from swashplate.simulation.trigonometry import vector_backend
+from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import trim as find_trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+BLOCK = 256
+"""Vehicles per block; each block keeps one core busy."""
+
+
+def simulate_closed_loops(
+    vehicle: Vehicle,
+    controller: Controller,
+    *,
+    duration: float,
+    size: int,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    reference: Mapping[str, ArrayLike] | None = None,
+    wind: Mapping[str, ArrayLike] | None = None,
+    voltage: ArrayLike | None = None,
+    noise: Mapping[str, float] | None = None,
+    seed: int = 0,
+    start: Trim | None = None,
+    rate: float = 500.0,
+    keep: int = 1,
+    environment: Environment | None = None,
+) -> Batch:
+    """Fly one controller on many vehicles; without noise it agrees with `simulate_closed_loop` at the same rates.
+
+    Args:
+        vehicle: the equations and the numbers that `parameters` does not replace.
+        controller: see `swashplate.simulation.closed_loop.Controller`; the same for all.
+        duration: [s].
+        size: number of vehicles.
+        parameters: numbers of the card by name, shape (size,) each.
+        reference: as in `simulate_closed_loop`, numbers or series (n,) at the controller's rate, the same for all.
+        wind, voltage: numbers, series (n,) or (n, size) at the controller's rate, held between samples.
+        noise: standard deviation of the white noise on a measured state, by its name [its unit].
+        seed: of that noise.
+        start: where all start; the hover of `vehicle` where it is not given.
+        rate: of the physics [Hz], a whole multiple of the controller's.
+        keep: every how many samples of the controller one is kept.
+        environment: air, gravity, and wind and voltage where they are not given.
+
+    Returns:
+        States, inputs and surroundings at the kept samples. A vehicle that is lost has numbers that are not finite.
+    """
+    enable_double_precision()
+    substeps = rate / controller.rate
+    if substeps < 1.0 or abs(substeps - round(substeps)) > 1e-9:
+        raise SwashError(
+            f"the physics runs at {rate:g} Hz, expected a multiple of the controller's {controller.rate:g}."
+        )
+    samples = round(duration * controller.rate) // keep * keep
+    if samples < 1 or size < 1:
+        raise SwashError(f"{samples} samples of {size} vehicles, expected at least one of each.")
+    begin = start or find_trim(vehicle, environment=environment)
+    surroundings = environment or begin.environment
+    given: dict[str, Any] = {**(wind or {}), **({} if voltage is None else {"voltage": voltage})}
+    around = np.stack(
+        [_series(name, given.get(name, getattr(surroundings, name)), samples, size) for name in SURROUNDINGS], 1
+    )
+    states = begin.states()
+    wanted = np.stack(
+        [_series(n, (reference or {}).get(n, states.get(n, 0.0)), samples, 1)[:, 0] for n in REFERENCES], 1
+    )
+    p = np.repeat(parameter_row(vehicle, surroundings)[:, None], size, axis=1)
+    for name, values in (parameters or {}).items():
+        if name not in vehicle.parameter_names:
+            raise CardError("is not a parameter of the vehicle.", where=vehicle.name, channel=name)
+        p[vehicle.parameter_names.index(name)] = values
+    sigma = np.zeros(len(vehicle.state_names))
+    for name, value in (noise or {}).items():
+        sigma[vehicle.index(name)] = value
+
+    def block(first: int) -> tuple[Array, Array]:
+        part = slice(first, min(first + BLOCK, size))
+        count = part.stop - first
+        key = jax.random.fold_in(jax.random.key(seed), first)
+        found = _fly_many(
+            equations_of(vehicle),
+            controller.step,
+            round(substeps),
+            keep,
+            bool(np.any(sigma)),
+            np.repeat(begin.state[:, None], count, axis=1),
+            np.repeat(np.asarray(controller.memory)[:, None], count, axis=1),
+            np.asarray(controller.gains),
+            around if around.shape[2] == 1 else around[:, :, part],
+            wanted,
+            p[:, part],
+            np.array(vehicle.input_limits).T[:, :, None],
+            sigma[:, None],
+            key,
+            1.0 / rate,
+        )
+        return np.asarray(found[0]), np.asarray(found[1])
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        parts = list(threads.map(block, range(0, size, BLOCK)))
+    flown, inputs = (np.concatenate([part[i] for part in parts], axis=2) for i in (0, 1))
+    kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
+    rows = np.concatenate([inputs, kept], axis=1)
+    return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
+
+
+def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
+    """A series (samples, size or 1) from a number, (n,) or (n, size) with n at least the samples."""
+    given = np.asarray(values, dtype=np.float64)
+    if given.ndim == 0:
+        return np.full((samples, 1 if size == 1 else size), float(given))
+    table = given[:, None] if given.ndim == 1 else given
+    if table.shape[0] < samples or table.shape[1] not in (1, size):
+        raise SwashError(f"has shape {given.shape}, expected ({samples}, {size}) or ({samples},).", channel=name)
+    return np.broadcast_to(table[:samples], (samples, size))
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
+def _fly_many(
+    equations: Equations,
+    control: Step,
+    substeps: int,
+    keep: int,
+    noisy: bool,
+    x0: Any,
+    memory: Any,
+    gains: Any,
+    around: Any,
+    wanted: Any,
+    p: Any,
+    limits: Any,
+    sigma: Any,
+    key: Any,
+    dt: Any,
+) -> tuple[Any, Any]:
+    rates = row_rates(equations, padded=False, xp=vector_backend())
+    flying: Any = jax.vmap(
+        lambda x, w, p: rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt), in_axes=(1, 1, 1), out_axes=1
+    )
+    deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
+    voltage = SURROUNDINGS.index("voltage")
+
+    def sample(carry: tuple[Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
+        x, memory, k = carry
+        surroundings, reference = now
+        measured = x
+        if noisy:
+            measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
+        measured = jnp.concatenate([measured, surroundings[voltage][None]])
+        memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
+        inputs = jnp.clip(command, limits[0], limits[1])
+        w = jnp.concatenate([inputs, surroundings])
+        after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
+        return (after, memory, k + 1), (x, inputs)
+
+    def kept(carry: Any, now: Any) -> Any:
+        carry, (x, inputs) = jax.lax.scan(sample, carry, now)
+        return carry, (x[0], inputs[0])
+
+    tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted))
+    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), 0), tables)
+    return record  # type: ignore[no-any-return]

@@ -1,0 +1,87 @@
+"""Gusts: Dryden turbulence as series of wind for one vehicle or many (MIL-F-8785C, 1980, sec. 3.7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from swashplate.errors import SwashError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gusts:
+    """A setting of the turbulence.
+
+    Attributes:
+        sigma: standard deviations along the mean wind, across it and down [m/s].
+        length: scale lengths in the same order [m].
+        speed: of the air past the aircraft [m/s]; a hovering one is passed by the mean wind.
+    """
+
+    sigma: tuple[float, float, float]
+    length: tuple[float, float, float]
+    speed: float
+
+
+INDOOR = Gusts((0.15, 0.15, 0.1), (1.0, 1.0, 1.0), 0.5)
+"""A room with ventilation and the rotor's own recirculation; assumed, no standard speaks of rooms."""
+
+
+def outdoor(mean: float, *, height: float = 10.0) -> Gusts:
+    """Low-altitude Dryden (MIL-F-8785C, sec. 3.7.3.4) for a mean wind of `mean` m/s at 6 m and a height [m]."""
+    if mean <= 0.0 or not 0.0 < height < 300.0:
+        raise SwashError(f"{mean:g} m/s at {height:g} m: expected a wind above zero and a height below 300 m.")
+    feet = max(height, 3.05) / 0.3048
+    ratio = 0.177 + 0.000823 * feet
+    vertical = 0.1 * mean
+    across, scale = vertical / ratio**0.4, feet / ratio**1.2 * 0.3048
+    return Gusts((across, across, vertical), (scale, scale, feet * 0.3048), mean)
+
+
+def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1) -> dict[str, Array]:
+    """Turbulence blowing from the south (the mean itself is not in it), shape (samples, count) each.
+
+    Along: sigma sqrt(2 L / pi V) / (1 + T s); across and down: sigma sqrt(L / pi V) (1 + sqrt3 T s) / (1 + T s)^2, with
+    T = L / V. Sampled exactly: states start in their stationary distribution and step by their own covariance.
+
+    Args:
+        gusts: the setting, `INDOOR` or `outdoor(...)`.
+        samples: how many.
+        rate: per second [Hz].
+        seed: of the noise.
+        count: how many independent series.
+    """
+    random = np.random.default_rng(seed)
+    found = {}
+    names = ("wind_north", "wind_east", "wind_down")
+    for i, (name, sigma, length) in enumerate(zip(names, gusts.sigma, gusts.length, strict=True)):
+        T = length / gusts.speed
+        if i == 0:
+            A, c = np.array([[-1.0 / T]]), np.array([1.0])
+        else:
+            A = np.array([[0.0, 1.0], [-1.0 / T**2, -2.0 / T]])
+            c = np.array([1.0, np.sqrt(3.0) * T])
+        b = np.zeros((A.shape[0], 1))
+        b[-1] = 1.0
+        P = scipy.linalg.solve_continuous_lyapunov(A, -b @ b.T)
+        P *= sigma**2 / (c @ P @ c)
+        step = scipy.linalg.expm(A / rate)
+        noise = _root(P - step @ P @ step.T)
+        x = _root(P) @ random.standard_normal((A.shape[0], count))
+        series = np.empty((samples, count))
+        for k in range(samples):
+            series[k] = c @ x
+            x = step @ x + noise @ random.standard_normal(x.shape)
+        found[name] = series
+    return found
+
+
+def _root(P: Array) -> Array:
+    """A square root of a covariance that may have lost rank to rounding."""
+    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)), dtype=np.float64)

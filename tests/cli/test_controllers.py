@@ -1,0 +1,150 @@
+"""`swash decouple` and `swash simulate --controller`: the file between them, and what they say to bad input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import swash
+
+import swashplate as sp
+from swashplate.control.autopilot import autopilot
+from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.errors import ControllerError
+
+
+def test_figure_10_by_two_commands(tmp_path: Path) -> None:
+    drift = {}
+    for name, options in (("law", ()), ("constant", ("--lag", "20"))):
+        file, flown = tmp_path / f"{name}.toml", tmp_path / f"{name}.nc"
+        designed = swash("decouple", "coax", *options, "--out", file)
+        assert designed.code == 0, designed.err
+        assert "17.01" in designed.out or "20.00" in designed.out
+        maneuver = ("--maneuver", "step:pitch,4.6s,0.2", "--pilot", "--rate", "500")
+        simulated = swash("simulate", "--vehicle", "coax", "--controller", file, *maneuver, "--out", flown, "--quiet")
+        assert simulated.code == 0, simulated.err
+        flight = sp.read(flown).between(0.0, 7.6)  # 3 s of hover before
+        assert flight.values("x")[-1] > 5.8
+        drift[name] = abs(flight.values("y")[-1])
+    assert drift["law"] == pytest.approx(0.65, abs=0.05)
+    assert drift["constant"] < 0.15
+
+
+def test_a_controller_comes_back_from_its_file(tmp_path: Path) -> None:
+    coax = sp.vehicle("coax")
+    made = autopilot(coax, sp.trim(coax), mode="speed", lag="motor", rate=50.0)
+    save_controller(made, tmp_path / "c.toml")
+    again = read_controller(tmp_path / "c.toml")
+    assert again == made
+    np.testing.assert_array_equal(again.gains, made.gains)
+
+
+def test_c_code_is_written_where_asked(tmp_path: Path) -> None:
+    pytest.importorskip("casadi")
+    outcome = swash("decouple", "coax", "--c", tmp_path / "c.c", "--precision", "float")
+    assert outcome.code == 0, outcome.err
+    assert "operations a step" in outcome.out
+    assert "void swash_step(float memory[5]" in (tmp_path / "c.c").read_text()
+
+
+def test_json_says_what_the_table_says() -> None:
+    found = json.loads(swash("decouple", "coax", "--lag", "hover", "--json").out)
+    assert found["lag_at_hover_deg"] == pytest.approx(17.01, abs=0.01)
+    assert found["law"]["k_zeta"] == 0.0
+    assert found["least_stable_mode"]["real"] == pytest.approx(0.247, abs=0.002)
+    assert "margins" not in found  # of an unstable loop
+    held = json.loads(swash("decouple", "coax", "--mode", "place", "--json").out)["margins"]
+    assert held["servo_roll"]["phase_deg"] > held["together"]["phase_deg"] > 20.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("decouple", "coax", "--lag", "wrong"), "lag: is 'wrong', expected hover, motor, battery or a number."),
+        (("decouple", "coax", "--lag", "44", "--mixing", "as_printed"), "no inverse at 45 deg"),
+        (("decouple", "coax", "--out", "c.json"), "ends in '.json', expected .toml"),
+        (("decouple", "coax", "--c", "c.h"), "ends in '.h', expected .c"),
+        (("decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
+        (("decouple", "coax", "--mode", "place", "--rate", "6"), "growing mode"),
+        (
+            ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--pilot", "--out", "f.nc"),
+            "--pilot: is for",
+        ),
+    ],
+)
+def test_bad_input_gives_2_and_says_why(arguments: tuple[str, ...], said: str) -> None:
+    outcome = swash(*arguments)
+    assert outcome.code == 2
+    assert said in outcome.err
+
+
+def test_bad_files_are_named_with_their_entry(tmp_path: Path) -> None:
+    coax = sp.vehicle("coax")
+    good = tmp_path / "good.toml"
+    save_controller(autopilot(coax, sp.trim(coax)), good)
+    text = good.read_text()
+    for change, said in (
+        (("linkage", "leverage"), r"\[law\]: lacks \['linkage'\] and has unknown \['leverage'\]"),
+        (('kind = "controller"', 'kind = "vehicle"'), "kind is 'vehicle', expected 'controller'"),
+        (("schema = 1", "schema = 9"), "expected type 'autopilot', schema 1"),
+        (('mode = "place"', 'mode = "acro"'), "mode: is 'acro'"),
+        (("rate = 100.0", "rate = 0.0"), "rate: is 0 Hz"),
+        (("climb = 3.0", "climb = nan"), "climb: is nan, expected a number"),
+        (("[cyclic]", "[cyclic"), "is not TOML"),
+    ):
+        bad = tmp_path / "bad.toml"
+        assert change[0] in text
+        bad.write_text(text.replace(*change))
+        with pytest.raises(ControllerError, match=said):
+            read_controller(bad)
+    bad.write_text(text.replace('vehicle = "coax"', 'vehicle = "raptor"'))
+    command = ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--controller", bad)
+    outcome = swash(*command, "--out", tmp_path / "f.nc")
+    assert outcome.code == 2
+    assert "is for 'raptor', not for 'coax'" in outcome.err
+
+
+def test_the_step_is_flown_on_models_that_the_data_cannot_tell_apart(tmp_path: Path) -> None:
+    names = ["o_zeta_lower", "o_zeta_upper"]
+    covariance = (np.radians(1.0) ** 2 * np.eye(2)).tolist()
+    values = sp.vehicle("coax").card.values()
+    document = {
+        "kind": "fit",
+        "names": names,
+        "parameters": [{"name": n, "value": values[n], "tie": ""} for n in names],
+        "covariance": covariance,
+        "covariance_corrected": covariance,
+    }
+    fit = tmp_path / "fit.json"
+    fit.write_text(json.dumps(document))
+    found = json.loads(swash("decouple", "coax", "--step", "0.2", "--fit", fit, "--draws", "60", "--json").out)["step"]
+    assert found["without"]["drift"] == pytest.approx(-0.77, abs=0.05)
+    assert found["with"]["drift"] == pytest.approx(0.65, abs=0.03)
+    low, high = (found[f"with, {percent} %"]["drift"] for percent in (5, 95))
+    # One degree of either lag is 0.1 to 0.25 m at 6 m.
+    assert 0.2 < high - low < 1.5
+    assert low < 0.65 < high
+    outcome = swash("decouple", "coax", "--fit", fit)
+    assert outcome.code == 2
+    assert "--fit: is for the paths of a --step" in outcome.err
+
+
+def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> None:
+    controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
+    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
+    command = ("simulate", "--vehicle", "coax", "--controller", controller, "--out", worst, "--monte-carlo", "20")
+    outcome = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--gusts", "indoor", "--sag", "0.1", "--seed", "3")
+    assert outcome.code == 0, outcome.err
+    assert "20 flights, 0 lost" in outcome.out
+    largest = float(next(line for line in outcome.out.splitlines() if "place, largest" in line).split()[-1])
+    flight = sp.read(worst)
+    assert np.max(np.hypot(flight.values("x"), flight.values("y"))) == pytest.approx(largest, rel=1e-3)
+    assert flight.values("voltage")[-1] == pytest.approx(12.22 - 0.8, abs=0.02)
+    yaw = swash(*command, "--maneuver", "doublet:yaw,1s,0.1")
+    assert yaw.code == 2
+    assert "moves yaw; with --monte-carlo a maneuver is a pilot's roll or pitch" in yaw.err
+    windy = swash(*command[:7], "--maneuver", "doublet:pitch,1s", "--gusts", "indoor")
+    assert windy.code == 2
+    assert "are for --monte-carlo" in windy.err
