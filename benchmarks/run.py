@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import identifying, many, peers, single
+from benchmarks import frequency, helicopter, identifying, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -34,6 +34,9 @@ def measure(*, short: bool) -> list[Result]:
         single.c_loop(steps=100_000 * scale, repeats=repeats),
         many.batch("float64", steps=50 * scale, repeats=repeats),
         many.batch("float32", steps=50 * scale, repeats=repeats),
+        helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),
+        helicopter.speeds(repeats=repeats),
+        helicopter.lpv(steps=1_000 * scale, repeats=repeats),
     ]
     jsbsim, scan = results[0], results[1]
     results[0] = replace(jsbsim, note=f"{jsbsim.note}; the scan is {scan.rate / jsbsim.rate:.1f} times faster")
@@ -76,7 +79,12 @@ def main() -> None:
         verdict = "" if result.target is None else ("met" if result.met else "MISSED")
         table.add_row(result.name, f"{result.rate:,.0f}", promised, verdict, result.note)
     Console().print(table)
-    spans = identifying.measure(short=options.short)
+    repeats = 2 if options.short else 5
+    spans = [
+        *identifying.measure(short=options.short),
+        frequency.responses(repeats=repeats),
+        frequency.fit(repeats=1),
+    ]
     table = Table(title="Seconds of an identification")
     for heading in ("what", "seconds", "promised", "", "note"):
         table.add_column(heading, justify="right" if heading in ("seconds", "promised") else "left")

@@ -74,6 +74,7 @@ def record(of: Flight, *, start: int = 0, stop: int | None = None) -> Record:
         voltage=np.full(time.size, 12.0),
         output_names=POSE,
         voltage_known=False,
+        log=of.provenance.source,
     )
 
 
@@ -130,8 +131,8 @@ def fit(
         choice="full",
         parameters=tuple(estimates),
         record_estimates=tuple(
-            RecordEstimate(c.record.name, n, u, v, s)
-            for c in comparisons
+            RecordEstimate(log, n, u, v, s)
+            for log in dict.fromkeys(c.record.log for c in comparisons)
             for n, u, v, s in (("delay_servo", "s", 0.021, 0.002), ("lever_y", "m", 0.17, 0.004))
         ),
         noise=Noise(),

@@ -21,13 +21,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swashplate.control.autopilot import autopilot
     from swashplate.control.hold import hover_hold
+    from swashplate.control.state_hold import state_hold
     from swashplate.errors import SwashError
     from swashplate.flights.flight import Flight
     from swashplate.flights.inspect import inspect
     from swashplate.flights.maneuvers import parse as maneuver
     from swashplate.identification.fit import Fit
+    from swashplate.identification.frequency_response import FrequencyResponse
     from swashplate.identification.identify import identify
     from swashplate.identification.parameters import CHOICES
+    from swashplate.identification.respond import respond
+    from swashplate.identification.state_space_file import structure
+    from swashplate.identification.state_space_fit import fit_state_space
+    from swashplate.identification.transfer_function_fit import fit_transfer_function
+    from swashplate.identification.verification import verify
     from swashplate.reporting.report import report
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
     from swashplate.simulation.integrate import simulate
@@ -45,12 +52,15 @@ __all__ = [
     "CHOICES",
     "Fit",
     "Flight",
+    "FrequencyResponse",
     "Sensors",
     "SwashError",
     "Validation",
     "Vehicle",
     "__version__",
     "autopilot",
+    "fit_state_space",
+    "fit_transfer_function",
     "hover_hold",
     "identify",
     "inspect",
@@ -59,16 +69,26 @@ __all__ = [
     "observe",
     "read",
     "report",
+    "respond",
     "simulate",
     "simulate_closed_loop",
     "simulate_maneuver",
+    "state_hold",
+    "structure",
     "trim",
     "validate",
     "vehicle",
+    "verify",
 ]
 
 _LIGHT: Mapping[str, tuple[str, str]] = {
     "Fit": ("swashplate.identification.fit", "Fit"),
+    "FrequencyResponse": ("swashplate.identification.frequency_response", "FrequencyResponse"),
+    "fit_state_space": ("swashplate.identification.state_space_fit", "fit_state_space"),
+    "fit_transfer_function": ("swashplate.identification.transfer_function_fit", "fit_transfer_function"),
+    "respond": ("swashplate.identification.respond", "respond"),
+    "structure": ("swashplate.identification.state_space_file", "structure"),
+    "verify": ("swashplate.identification.verification", "verify"),
     "Flight": ("swashplate.flights.flight", "Flight"),
     "SwashError": ("swashplate.errors", "SwashError"),
     "Validation": ("swashplate.validation.validation", "Validation"),
@@ -89,6 +109,7 @@ _COMPUTING: Mapping[str, tuple[str, str]] = {
     "simulate": ("swashplate.simulation.integrate", "simulate"),
     "simulate_closed_loop": ("swashplate.simulation.closed_loop", "simulate_closed_loop"),
     "simulate_maneuver": ("swashplate.simulation.closed_loop", "simulate_maneuver"),
+    "state_hold": ("swashplate.control.state_hold", "state_hold"),
     "trim": ("swashplate.simulation.trim", "trim"),
     "validate": ("swashplate.validation.validate", "validate"),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 import swashplate as sp
 from swashplate.flights.flight import Array, Flight
@@ -12,6 +13,9 @@ from swashplate.vehicles.vehicle import Vehicle
 
 MANEUVER = "sweep:pitch,0.5-8Hz,34s"
 """The band that Fankhauser et al. flew; 40 s with the hover before and after it."""
+
+SAMPLES = 4001
+"""At 100 Hz, with 3 s of hover before and after."""
 
 OFF = {
     "a_alpha_v": 0.02,
@@ -31,6 +35,16 @@ def truth() -> Vehicle:
 def flown() -> Flight:
     """The maneuver in calm air under a hold of height and heading, every state known."""
     return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold)
+
+
+def flown_in_gusts(seed: int, *, sigma: float = 0.3, fade: float = 1.0, rate: float = 100.0) -> Flight:
+    """The same in horizontal gusts: Ornstein-Uhlenbeck, standard deviation `sigma` [m/s], fading in `fade` [s]."""
+    random = np.random.default_rng(seed)
+    keep = np.exp(-1.0 / (rate * fade))
+    steps = sigma * np.sqrt(1.0 - keep**2) * random.standard_normal((2, SAMPLES))
+    north, east = (lfilter([1.0], [1.0, -keep], row) for row in steps)
+    wind = {"wind_north": north, "wind_east": east}
+    return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold, wind=wind, rate=rate)
 
 
 @dataclass(frozen=True)
@@ -53,11 +67,11 @@ class Recovery:
         return np.asarray(self.error / self.sigma)
 
 
-def recover(flight: Flight, *, seed: int) -> Recovery:
+def recover(flight: Flight, *, seed: int, method: str = "output-error") -> Recovery:
     """What one seed of the usual sensors (noise, gaps, outliers, jitter, battery) makes of a flight."""
     vehicle = truth()
     logged = sp.observe(flight, vehicle, seed=seed, sensors=sp.Sensors()).condition(rate=100.0, cutoff=0.0)
-    fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method="output-error")
+    fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method=method)
     free = [estimate for estimate in fit.parameters if not estimate.tie]
     known = vehicle.card.values()
     return Recovery(

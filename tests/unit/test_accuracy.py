@@ -39,7 +39,7 @@ def test_the_corrected_bound_is_the_double_sum(n: int) -> None:
             lag = abs(j - i)
             R = v[: n - lag].T @ v[lag:] / n * (1.0 - lag / (lags + 1.0))
             middle += S[:, i] @ (R if j >= i else R.T) @ S[:, j].T
-    found = accuracy.corrected_covariance(plain, prior, [v], [S], lags=lags)
+    found = accuracy.corrected_covariance(plain, np.diag(prior), [v], [S], lags=lags)
     np.testing.assert_allclose(found, plain @ middle @ plain, rtol=1e-6)
     assert np.linalg.eigvalsh(found).min() > 0.0
 
@@ -49,9 +49,9 @@ def test_records_that_know_nothing_of_each_other_add_up() -> None:
     rng = np.random.default_rng(12)
     v, S = _first_order(rng, (300, 2), 0.8), rng.standard_normal((3, 300, 2))
     S[2] = 0.0
-    plain, prior = 1e-9 * np.eye(3), np.zeros(3)
-    one = accuracy.corrected_covariance(plain, prior, [v], [S], lags=30)
-    two = accuracy.corrected_covariance(plain, prior, [v, v], [S, S], lags=30)
+    plain, rest = 1e-9 * np.eye(3), np.zeros((3, 3))
+    one = accuracy.corrected_covariance(plain, rest, [v], [S], lags=30)
+    two = accuracy.corrected_covariance(plain, rest, [v, v], [S, S], lags=30)
     np.testing.assert_allclose(two, 2.0 * one, rtol=1e-6)
     assert not one[2].any()
 
@@ -61,7 +61,7 @@ def test_white_residuals_leave_the_bound_alone() -> None:
     n, p, m = 40_000, 3, 2
     S = rng.standard_normal((p, n, m))
     plain = np.linalg.inv(S.reshape(p, -1) @ S.reshape(p, -1).T)
-    found = accuracy.corrected_covariance(plain, np.zeros(p), [rng.standard_normal((n, m))], [S], lags=20)
+    found = accuracy.corrected_covariance(plain, np.zeros((p, p)), [rng.standard_normal((n, m))], [S], lags=20)
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(plain)), rtol=0.05)
 
 
@@ -75,7 +75,7 @@ def test_coloured_residuals_widen_the_bound_of_a_mean_by_their_spectrum(rho: flo
     S = np.ones((1, n, 1))
     plain = np.array([[1.0 / n]])
     residual = _first_order(np.random.default_rng(5), (n, 1), rho)
-    found = accuracy.corrected_covariance(plain, np.zeros(1), [residual], [S], lags=lags)
+    found = accuracy.corrected_covariance(plain, np.zeros((1, 1)), [residual], [S], lags=lags)
     lag = np.arange(1, lags + 1)
     tapered = 1.0 + 2.0 * np.sum((1.0 - lag / (lags + 1.0)) * rho**lag)
     assert found[0, 0] / plain[0, 0] == pytest.approx(tapered, rel=0.05)
@@ -95,7 +95,7 @@ def test_the_corrected_bound_is_the_scatter_of_a_regression() -> None:
         estimate = plain @ flat @ noise.ravel()
         found.append(estimate)
         left = noise - (flat.T @ estimate)[:, None]
-        promised.append(np.diag(accuracy.corrected_covariance(plain, np.zeros(2), [left], [S], lags=50)))
+        promised.append(np.diag(accuracy.corrected_covariance(plain, np.zeros((2, 2)), [left], [S], lags=50)))
     ratio = np.std(found, axis=0) / np.sqrt(np.mean(promised, axis=0))
     assert np.all(np.abs(ratio - 1.0) < 0.2), ratio
     assert np.all(np.std(found, axis=0) > 2.5 * np.sqrt(np.diag(plain)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import jax
@@ -44,3 +45,16 @@ def test_a_folder_that_cannot_be_made_changes_nothing(tmp_path: Path) -> None:
     before = jax.config.values["jax_compilation_cache_dir"]
     assert enable_compilation_cache(tmp_path / "file" / "cache") is None
     assert jax.config.values["jax_compilation_cache_dir"] == before
+
+
+def test_small_loops_are_asked_for_once_and_a_users_options_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    from swashplate.simulation.compilation import compile_small_loops_whole
+
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
+    compile_small_loops_whole()
+    compile_small_loops_whole()
+    assert os.environ["XLA_FLAGS"].startswith("--xla_cpu_enable_fast_math=false --xla_backend_extra_options=")
+    assert os.environ["XLA_FLAGS"].count("xla_backend_extra_options") == 1
+    monkeypatch.setenv("XLA_FLAGS", "--xla_backend_extra_options=other=1")
+    compile_small_loops_whole()
+    assert os.environ["XLA_FLAGS"] == "--xla_backend_extra_options=other=1"

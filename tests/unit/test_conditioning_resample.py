@@ -164,3 +164,13 @@ def test_measured_rates_are_not_overwritten() -> None:
     out = derive(resample(flight))
     assert np.allclose(out.values("p"), 7.0)
     assert out.history[-1].details["derived"] == ["q", "r"]
+
+
+def test_slow_commands_beside_fast_motion_keep_their_size() -> None:
+    """Commands at the new rate come through as they are, whatever the other streams need against aliases."""
+    slow, fast = np.arange(1001) / 100.0, np.arange(2001) / 200.0
+    command = np.sin(2 * np.pi * 8.0 * slow)
+    flight = Flight({"inputs": stream(slow, {"servo_pitch": command}), "motion": stream(fast, {"theta": np.sin(fast)})})
+    out = resample(flight, rate=100.0)
+    assert np.allclose(out.values("servo_pitch"), np.interp(out.time("servo_pitch"), slow, command), atol=1e-12)
+    assert np.max(np.abs(out.values("theta") - np.sin(out.time("theta")))) < 2e-3

@@ -17,7 +17,7 @@ from swashplate.simulation.trim import trim
 from swashplate.vehicles.catalogue import vehicle
 
 COAX = vehicle("coax")
-LEVER = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03)
+LEVER = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03, level_psi=0.4)
 RATE = 100.0
 
 
@@ -49,7 +49,8 @@ def _record(nuisance: Nuisance, seconds: float = 4.0) -> tuple[Record, np.ndarra
     position, velocity, attitude, omega = _tumble(time)
     arm = np.array([float(getattr(nuisance, f"lever_{axis}")) for axis in "xyz"])
     euler = attitude.as_euler("ZYX")[:, ::-1]
-    shown = euler + np.array([float(nuisance.level_phi), float(nuisance.level_theta), 0.0])
+    shown = (attitude * Rotation.from_euler("Z", float(nuisance.level_psi))).as_euler("ZYX")[:, ::-1]
+    shown = shown + np.array([float(nuisance.level_phi), float(nuisance.level_theta), 0.0])
     outputs = np.concatenate([position + attitude.apply(arm), shown], axis=1)
     body = attitude.apply(velocity, inverse=True)
     inputs = np.tile(trim(COAX).inputs, (time.size, 1))
@@ -105,20 +106,22 @@ def test_the_closed_form_of_hover_is_the_trim(voltage: float) -> None:
     assert np.abs(np.delete(np.asarray(x), speeds)).max() == 0.0
 
 
-def test_the_first_guess_of_rotor_speeds_is_steady_and_knows_its_trim() -> None:
+def test_the_first_guess_of_rotor_speeds_is_steady() -> None:
     """One percent of motor is 4.4 rad/s at the lower rotor, one volt 13.6 rad/s: the card's slopes."""
     record, _ = _record(Nuisance())
     value, rate = slopes(record, np.array([100]))
 
-    def speed(trim_lower: float, voltage: float) -> jax.Array:
+    lower = COAX.input_names.index("motor_lower")
+
+    def speed(more: float, voltage: float) -> jax.Array:
         x = start_state(
             COAX,
             POSE,
             COAX.values(),
-            Nuisance(trim_motor_lower=trim_lower),
+            Nuisance(),
             value=jnp.asarray(value[0]),
             rate=jnp.asarray(rate[0]),
-            inputs=jnp.asarray(record.inputs[100]),
+            inputs=jnp.asarray(record.inputs[100]).at[lower].add(more),
             voltage=voltage,
         )
         return x[COAX.index("omega_lower")]

@@ -115,7 +115,7 @@ def test_both_find_the_truth_within_their_bounds(likelihood: OutputError | Predi
 def test_innovations_at_the_truth_are_as_large_as_promised() -> None:
     """One-step errors over their own covariance: one on average, channel by channel."""
     likelihood = _prediction_error()
-    white, sensitivities = likelihood.whitened(_best(likelihood).row)
+    white, sensitivities, _ = likelihood.whitened(_best(likelihood).row)
     assert len(white) == 1
     counted = int(likelihood.counted.sum())
     assert white[0].shape == (counted, 6)
@@ -129,7 +129,7 @@ def test_output_errors_are_as_large_as_their_covariance_says() -> None:
     likelihood.refresh(best)
     residual = np.asarray(likelihood.residuals(best)[0]).reshape(-1, 6)
     np.testing.assert_allclose(np.sqrt(np.diag(likelihood.covariance)), np.std(residual, axis=0), rtol=0.1)
-    white, _ = likelihood.whitened(best)
+    white, _, _ = likelihood.whitened(best)
     np.testing.assert_allclose(np.mean(np.concatenate(white) ** 2, axis=0), 1.0, atol=0.2)
 
 
@@ -159,7 +159,7 @@ def test_windows_start_where_they_should_and_share_nothing_but_the_record() -> N
     assert names[:2] == ("tau_f_upper", "linkage_lower")
     assert f"x at window {last}" in names
     assert last > 0
-    _, sensitivities = likelihood.whitened(_somewhere(likelihood))
+    _, sensitivities, _ = likelihood.whitened(_somewhere(likelihood))
     for window, sensitivity in enumerate(sensitivities):
         seen = {names[i] for i in np.flatnonzero(sensitivity.any(axis=(1, 2)))}
         assert {name for name in seen if " at window " in name} <= {n for n in names if n.endswith(f"window {window}")}

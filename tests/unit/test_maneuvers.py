@@ -97,7 +97,7 @@ def test_a_wrong_description_is_explained(text: str, says: str) -> None:
 @settings(max_examples=50, deadline=None)
 @given(st.sampled_from(sorted(KINDS)), st.floats(0.01, 1.0), st.floats(10.0, 60.0))
 def test_no_maneuver_exceeds_its_amplitude(kind: str, amplitude: float, duration: float) -> None:
-    band = (0.5, 4.0) if kind in ("sweep", "multisine") else None
+    band = {"sweep": (0.5, 4.0), "multisine": (0.5, 4.0), "sine": (2.0, 2.0)}.get(kind)
     signal = Maneuver(kind, ("roll",), duration, amplitude, band).signals(np.linspace(-1.0, duration + 1.0, 5001))[
         "roll"
     ]

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from swashplate.identification.records import POSE
 from swashplate.identification.start_states import hover
@@ -31,7 +32,7 @@ from swashplate.vehicles.catalogue import vehicle
 
 COAX = vehicle("coax")
 DT = 0.01
-TILTED = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03)
+TILTED = Nuisance(lever_x=0.05, lever_y=0.18, lever_z=-0.1, level_phi=0.02, level_theta=-0.03, level_psi=0.4)
 VOLTAGE = 12.0
 
 
@@ -94,7 +95,9 @@ def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
     found = np.asarray(_model().measure(jnp.asarray(x), TILTED))
     lever = body_to_local(Vector(0.05, 0.18, -0.1), Euler(at["phi"], at["theta"], at["psi"]), FloatBackend())
     expected = [at["x"] + lever.x, at["y"] + lever.y, at["z"] + lever.z]
-    expected += [at["phi"] + 0.02, at["theta"] - 0.03, at["psi"]]
+    attitude = Rotation.from_euler("ZYX", [at["psi"], at["theta"], at["phi"]])
+    psi, theta, phi = (attitude * Rotation.from_euler("Z", 0.4)).as_euler("ZYX")
+    expected += [phi + 0.02, theta - 0.03, psi]
     np.testing.assert_allclose(found, expected, atol=1e-14)
 
 

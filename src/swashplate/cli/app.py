@@ -8,7 +8,22 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from swashplate.cli import data, decouple, demo, identify, inspect, simulate, validate, vehicles
+from swashplate.cli import (
+    data,
+    decouple,
+    demo,
+    derivatives,
+    fit_ss,
+    fit_tf,
+    identify,
+    inspect,
+    maneuver,
+    respond,
+    simulate,
+    trim,
+    validate,
+    vehicles,
+)
 from swashplate.cli.guard import Guarded
 
 app = typer.Typer(
@@ -47,9 +62,16 @@ def root(
 
 app.command("identify", short_help="Identify a vehicle from flights, with a report.")(identify.identify)
 app.command("validate", short_help="Predict flights with a model and judge the predictions.")(validate.validate)
+app.command("respond", short_help="Frequency responses from logs of sweeps.")(respond.respond)
+app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
+app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
+app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
+app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
+app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
+app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

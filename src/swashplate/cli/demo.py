@@ -80,7 +80,7 @@ def simulated_log(vehicle: Vehicle, maneuver: str, *, seed: int, rate: float = 1
     time = np.arange(round(duration * rate) + 1) / rate
     added = {name: np.zeros_like(time) for name in aircraft.input_names}
     for axis, signal in excitation.signals(time - _LEAD).items():
-        for name, share in AXES[axis].items():
+        for name, share in AXES[axis][0].items():
             added[name] += share * _AMPLITUDES[axis] * signal
     start = sp.trim(aircraft, voltage=aircraft.card.values()["voltage_nominal"] + 0.3)
     flight = sp.simulate_closed_loop(

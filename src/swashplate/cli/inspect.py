@@ -6,6 +6,7 @@ import typer
 
 from swashplate.cli import options
 from swashplate.cli.reading import Reading
+from swashplate.errors import FlightError
 
 
 def inspect(
@@ -16,7 +17,11 @@ def inspect(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show a log's channels, units, rates and gaps, and the problems found in it; nothing is changed."""
+    """Show a log's channels, units, rates, gaps and frequency sweeps, and the problems in it; nothing is changed.
+
+    A log that is itself damaged (cut off, bytes lost, its clock set back) is shown as far as it could be read, and ends
+    with an error.
+    """
     from swashplate.cli.console import as_json, console
     from swashplate.cli.reading import read
     from swashplate.flights.inspect import inspect as look
@@ -26,3 +31,9 @@ def inspect(
         typer.echo(as_json(found.as_dict()))
     elif not quiet:
         console().print(found)
+    if found.damage:
+        raise FlightError(
+            f"{'; '.join(found.damage)}.",
+            where=flight,
+            hint="Everything else was read" + (", and is shown." if not quiet else "."),
+        )

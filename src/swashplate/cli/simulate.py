@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli import conditions as given
 from swashplate.cli import options
 from swashplate.errors import SwashError
 
@@ -62,13 +63,14 @@ def simulate(
     gusts: Annotated[
         str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
     ] = "none",
+    speed: Annotated[float, typer.Option("--speed", help="Speed ahead that the maneuver begins at [m/s].")] = 0.0,
+    switched: given.Switch = None,
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
-    """Fly a maneuver from hover under a controller, and save the flight."""
+    """Fly a maneuver from hover or steady flight, under a controller, and save the flight."""
     from swashplate.cli.console import progress
     from swashplate.flights.maneuvers import parse
-    from swashplate.vehicles.catalogue import vehicle as find
 
     suffix = out.suffix.lower()
     if suffix not in (".nc", ".csv"):
@@ -76,7 +78,7 @@ def simulate(
     if not out.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=out.parent, channel="--out", hint="Make it first.")
     blowing = dict(zip(_WIND, options.numbers(wind, option="--wind", count=3), strict=True))
-    excitation, aircraft = parse(maneuver), find(vehicle)
+    excitation, aircraft = parse(maneuver), given.vehicle_of(vehicle, None, switched)
     if pilot and controller is None:
         raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
     if many is None and (fit is not None or gusts != "none"):
@@ -107,11 +109,13 @@ def simulate(
         line.say("simulating (compiling takes longest the first time)")
         import swashplate as sp
 
+        coaxial = "motor_upper" in aircraft.input_names
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=sp.hover_hold if controller is None else from_file(controller),
+            controller=(sp.hover_hold if coaxial else sp.state_hold) if controller is None else from_file(controller),
             pilot=pilot,
+            speed=speed,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
             sag=sag,
             rate=rate,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from swashplate.cli import options
+from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
 
-FILES = ("report.html", "validation.json")
+FILES = ("report.html", "validation.json", "verification.json")
 
 
 def validate(
@@ -17,7 +18,10 @@ def validate(
     flight: options.Flights,
     out: options.OutFolder = None,
     published: Annotated[
-        str | None, typer.Option("--published", help="The card to compare with; by default the vehicle's own.")
+        str | None,
+        typer.Option(
+            "--published", help="The card (or state-space model) to compare with; by default the vehicle's own."
+        ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
     every: Annotated[float, typer.Option("--every", help="Seconds between start points.", min=0.01)] = 0.1,
@@ -32,20 +36,27 @@ def validate(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Predict flights from many start points and judge the predictions, next to the card and naive predictors."""
+    """Predict flights from many start points and judge the predictions, next to the card and naive predictors.
+
+    A state-space model (of `swash fit-ss` or `swash fit-tf`) is flown along each flight's inputs instead.
+    """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.cli.reading import check_disjoint, conditioned
     from swashplate.cli.tables import validation_table
     from swashplate.errors import SwashError
+    from swashplate.identification.state_space_file import is_state_space
     from swashplate.vehicles.catalogue import vehicle as find
 
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    if is_state_space(model):
+        _verify(model, published, flight, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet)
+        return
     ahead = tuple(options.numbers(horizons, option="--horizons"))
     if min(ahead) <= 0.0:
         raise SwashError(f"'{horizons}' are not all positive.", channel="--horizons")
     aircraft, card = find(model), None if published is None else find(published)
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     with progress(quiet=quiet or json) as line:
         line.say("reading flights")
         flights = conditioned(flight, rate=rate, cutoff=cutoff, how=how)
@@ -76,5 +87,50 @@ def validate(
         screen = console()
         screen.print(validation_table(validation, width=screen.width))
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")
+
+
+def _verify(
+    model: str,
+    other: str | None,
+    flights: list[str],
+    *,
+    out: Path | None,
+    rate: float,
+    cutoff: float,
+    how: Reading,
+    json: bool,
+    quiet: bool,
+) -> None:
+    """A linear model along recorded inputs, biases and shifts solved for."""
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.identification.state_space_file import structure
+    from swashplate.identification.verification import verify
+    from swashplate.reporting.response_report import response_report
+    from swashplate.reporting.sections_responses import ResponseMaterial
+
+    identified, compared = structure(model), None if other is None else structure(other)
+    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
+        line.say("flying the model along the inputs")
+        inputs, outputs = identified.inputs, identified.outputs
+        found = verify(identified, flying.flown(flights, inputs, rate=rate, cutoff=cutoff, how=how, also=outputs))
+        rival = None
+        if compared is not None:
+            channels = (compared.inputs, compared.outputs)
+            rival = verify(
+                compared, flying.flown(flights, channels[0], rate=rate, cutoff=cutoff, how=how, also=channels[1])
+            )
+        if folder is not None:
+            response_report(ResponseMaterial(verification=found, rival=rival), path=folder / "report.html")
+            write_text(folder / "verification.json", as_json(found.as_dict()) + "\n")
+    if json:
+        typer.echo(as_json(found.as_dict()))
+    elif not quiet:
+        typer.echo(repr(found))
+        if rival is not None:
+            typer.echo(f"\n{rival!r}")
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli import options
+from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.simulation.trim import Trim
 
 app = typer.Typer(help="The vehicles that come with swashplate, and cards.", rich_markup_mode=None)
+
+
+class Rotation(StrEnum):
+    CW = "cw"
+    CCW = "ccw"
 
 
 @app.callback(invoke_without_command=True)
@@ -33,6 +41,28 @@ def list_(json: options.Json = False) -> None:
         typer.echo(as_json({name: {"title": card.title, "trust": card.trust} for name, card in cards.items()}))
         return
     console().print(table(("name", "what it is"), [(name, card.title) for name, card in cards.items()], left=2))
+
+
+@app.command()
+def new(
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="The card to write, e.g. mine.toml.")],
+    mass: Annotated[float, typer.Option("--mass", help="With fuel or battery [kg].")],
+    radius: Annotated[float, typer.Option("--radius", help="Of the main rotor [m].")],
+    title: Annotated[str, typer.Option("--title", help="What the aircraft is.")] = "My helicopter",
+    rotation: Annotated[Rotation, typer.Option("--rotation", help="Main rotor seen from above.")] = Rotation.CW,
+    like: Annotated[str, typer.Option("--like", help="The packaged helicopter that is scaled.")] = "raptor50",
+) -> None:
+    """Write a commented card for your own single-rotor helicopter: guesses scaled to its size, to be measured."""
+    from swashplate.atomic import write_text
+    from swashplate.vehicles.catalogue import from_card
+    from swashplate.vehicles.new_card import commented, new_card
+
+    if out.exists():
+        raise SwashError("exists already; it is not overwritten.", where=out, hint="Choose another name.")
+    card = new_card(title, mass=mass, radius=radius, rotation=rotation.value, like=like)
+    from_card(card)
+    write_text(out, commented(card))
+    typer.echo(f"Written: {out}. Replace the guesses by measurements, then try: swash trim {out}")
 
 
 @app.command()

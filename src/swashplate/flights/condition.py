@@ -100,7 +100,7 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Flight], tuple[str, ...]]] = {
     "remove_outliers": (remove_outliers, ("threshold", "longest")),
     "trim_ground": (cut, ("start", "stop", "reasons")),
     "resample": (resample, ("rate", "max_gap", "shortest_piece", "method", "straighten")),
-    "lowpass": (lowpass, ("cutoff", "order")),
+    "lowpass": (lowpass, ("cutoff", "order", "zero_phase")),
     "derive": (derive_motion, ("gravity",)),
     "move_to_cg": (move_to_cg, ("lever_arm",)),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,23 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Event:
+    """Something that a log says happened.
+
+    Attributes:
+        time: [s], on the flight's clock.
+        kind: "message", "mode", "parameter", "sweep", "armed", "disarmed", "dropout".
+        text: in words.
+        details: its numbers (JSON types only).
+    """
+
+    time: float
+    kind: str
+    text: str
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Provenance:
     """Where a flight comes from.
 
@@ -30,6 +48,9 @@ class Provenance:
         simulated: True where no aircraft flew.
         vehicle: the vehicle as the log or the user names it.
         notes: what a reader found wrong and what the user must know.
+        damage: what is broken in the file itself (cut off, lost bytes, clock resets); the rest of it was read.
+        parameters: an autopilot's settings as the log begins; changes in flight are events.
+        events: what the log says happened, in order of time.
     """
 
     source: str = ""
@@ -39,6 +60,17 @@ class Provenance:
     simulated: bool = False
     vehicle: str = ""
     notes: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+
+    def parameter(self, name: str, *, at: float = math.inf) -> float | None:
+        """An autopilot's setting at a time [s], at the end of the log if none is given; None where it is not logged."""
+        value = self.parameters.get(name)
+        for event in self.events:
+            if event.kind == "parameter" and event.time <= at and event.details.get("name") == name:
+                value = float(event.details["value"])
+        return value
 
 
 @dataclass(frozen=True)
@@ -87,7 +119,7 @@ class Flight:
     """
 
     streams: Mapping[str, xr.Dataset]
-    provenance: Provenance = Provenance()
+    provenance: Provenance = field(default_factory=Provenance)
     history: tuple[Step, ...] = ()
     segments: tuple[tuple[float, float], ...] = ()
 

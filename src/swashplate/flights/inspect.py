@@ -10,7 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import CHANNELS, QUATERNION, channel
+from swashplate.flights.schema import QUATERNION, channel, is_known
+from swashplate.flights.sweeps import Sweep, sweeps
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -20,11 +21,15 @@ Array = NDArray[np.float64]
 _GAP = 3.0  # median steps; a step longer than this has lost at least two samples
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
+_NEAR = 25  # changes on each side that are its neighbours
+_UNUSUAL = 4.0  # robust standard deviations of the neighbours; a sweep's own changes reach one
+_ORDINARY = ("rcin_", "rcout_")  # switches and unused outputs hardly ever move
 _MAD_TO_SIGMA = 1.4826  # of a normal distribution: 1 / Phi^-1(3/4)
 _Q95_TO_SIGMA = 1.0 / 1.95996  # of a normal distribution: 1 / Phi^-1(0.975)
 _SLIGHT = 1e-3  # of the channel's span; a smaller change is no jump, however still the channel is otherwise
 _COMMANDS = {"motor_lower": (0, 1), "motor_upper": (0, 1), "servo_roll": (-1, 1), "servo_pitch": (-1, 1)}
 """Channels that may step, and their ranges."""
+_STEPPING = ("mixer_", "stick_", *_ORDINARY)  # commands of autopilots and pilots: they may step too
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,9 @@ class ChannelSummary:
         low, high, median: over the finite samples.
         missing: samples that are not finite.
         constant: never moves.
-        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them; for the four channels of
-            a quaternion, those of the rotation between samples; for a command, which may step, only those that the next
-            sample takes back.
+        outliers: sample-to-sample changes beyond 12 robust standard deviations of all of them (4 of their neighbours);
+            for the four channels of a quaternion, those of the rotation between samples; for a command, which may step,
+            only those that the next sample takes back.
         outside: samples of a command that lie outside its range (motors 0 to 1, servos -1 to 1).
     """
 
@@ -76,7 +81,13 @@ class ChannelSummary:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What `inspect` found; prints as tables in a terminal (rich) and as text."""
+    """What `inspect` found; prints as tables in a terminal (rich) and as text.
+
+    Attributes:
+        sweeps: frequency sweeps in the flight.
+        damage: what is broken in the file itself; it stands among the problems too.
+        vehicle: as the log names it.
+    """
 
     source: str
     simulated: bool
@@ -85,6 +96,9 @@ class Inspection:
     channels: tuple[ChannelSummary, ...]
     notes: tuple[str, ...]
     problems: tuple[str, ...]
+    sweeps: tuple[Sweep, ...] = ()
+    damage: tuple[str, ...] = ()
+    vehicle: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain JSON types (NaN becomes None)."""
@@ -116,20 +130,24 @@ class Inspection:
         rows = []
         for c in self.channels:
             remarks = ["never moves"] * c.constant + [f"{c.missing} missing"] * bool(c.missing)
-            remarks += ["not in the schema"] * (c.name not in CHANNELS)
+            remarks += ["not in the schema"] * (not is_known(c.name))
             numbers = (f"{c.low:.4g}", f"{c.median:.4g}", f"{c.high:.4g}", f"{c.outliers or '-'}")
             rows.append((c.name, c.unit, c.stream, *numbers, ", ".join(remarks)))
         return [head, *rows]
 
     def _title(self) -> str:
-        return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{', simulated' if self.simulated else ''}"
+        whose = f", {self.vehicle}" if self.vehicle else ""
+        return f"{self.source or '(unnamed)'}: {self.duration:.1f} s{whose}{', simulated' if self.simulated else ''}"
+
+    def _lists(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        return (("sweeps", tuple(map(str, self.sweeps))), ("problems", self.problems), ("notes", self.notes))
 
     def __str__(self) -> str:
         lines = [self._title()]
         for rows in (self.stream_rows(), self.channel_rows()):
             widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
             lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
-        for heading, texts in (("problems", self.problems), ("notes", self.notes)):
+        for heading, texts in self._lists():
             lines += ["", f"{heading}: {'' if texts else 'none'}".rstrip(), *(f"  - {text}" for text in texts)]
         return "\n".join(lines)
 
@@ -146,8 +164,8 @@ class Inspection:
             for row in rows:
                 table.add_row(*map(escape, row))
             parts += ["", table]
-        parts += ["", "[bold]problems[/bold]", *(f"  • {escape(text)}" for text in self.problems or ("none",))]
-        parts += ["", "[bold]notes[/bold]", *(f"  • {escape(text)}" for text in self.notes or ("none",))]
+        for title, texts in self._lists():
+            parts += ["", f"[bold]{title}[/bold]", *(f"  • {escape(text)}" for text in texts or ("none",))]
         return Group(*parts)
 
 
@@ -178,7 +196,8 @@ def _jumps(changes: Array) -> NDArray[np.bool_]:
 
     The scatter is the larger of what half and what 95 % of the changes give: a channel that is held between the updates
     of a slower clock (and moves there by rounding only) is judged by its updates. One that hardly ever moves is not
-    judged, and a change that is slight beside the channel's span is no jump.
+    judged, and a change that is slight beside the channel's span is no jump. Nor is one that is usual among its
+    neighbours: a sweep's changes grow with its frequency, all of them.
     """
     if not changes.size:
         return np.zeros(0, dtype=np.bool_)
@@ -187,7 +206,10 @@ def _jumps(changes: Array) -> NDArray[np.bool_]:
     span = float(np.ptp(np.cumsum(changes)))
     if not sigma > np.finfo(np.float64).eps * span:
         return np.zeros(changes.shape, dtype=np.bool_)
-    return np.asarray(off > max(_OUTLIER * sigma, _SLIGHT * span))
+    jumps = np.asarray(off > max(_OUTLIER * sigma, _SLIGHT * span))
+    for i in np.flatnonzero(jumps).tolist():
+        jumps[i] = off[i] > _UNUSUAL * _MAD_TO_SIGMA * np.median(off[max(0, i - _NEAR) : i + _NEAR + 1])
+    return jumps
 
 
 def _spikes(changes: Array) -> NDArray[np.bool_]:
@@ -224,7 +246,8 @@ def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
         outliers = _attitude_jumps(flight)
     else:
         changes = np.diff(values[np.isfinite(values)])
-        outliers = int(np.sum(_spikes(changes) if name in _COMMANDS else _jumps(changes)))
+        steps = name in _COMMANDS or name.startswith(_STEPPING) or name.endswith("_demand")
+        outliers = int(np.sum(_spikes(changes) if steps else _jumps(changes)))
     return ChannelSummary(
         name=name,
         stream=home,
@@ -257,7 +280,7 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
     problems = []
     if summary.missing:
         problems.append(f"{summary.name}: {summary.missing} samples are not finite")
-    if summary.constant:
+    if summary.constant and not summary.name.startswith(_ORDINARY):
         problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
     if summary.outside:
         low, high = _COMMANDS[summary.name]
@@ -271,13 +294,14 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
 
 
 def inspect(flight: Flight) -> Inspection:
-    """Summary of a flight: channels, units, rates, gaps, jitter, constant channels, jumps, and the problems in words.
+    """Summary of a flight: channels, units, rates, gaps, jitter, constants, jumps, sweeps, the problems in words.
 
     Nothing is repaired; conditioning does that.
     """
     streams = tuple(_summarise_stream(name, data) for name, data in flight.streams.items())
     channels = tuple(_summarise_channel(flight, name, flight.stream_of(name)) for name in flight.channels)
-    problems = [text for stream in streams for text in _stream_problems(stream)]
+    damage = flight.provenance.damage
+    problems = [*damage, *(text for stream in streams for text in _stream_problems(stream))]
     problems += [text for summary in channels for text in _channel_problems(summary)]
     return Inspection(
         source=flight.provenance.source,
@@ -287,4 +311,7 @@ def inspect(flight: Flight) -> Inspection:
         channels=channels,
         notes=flight.provenance.notes,
         problems=tuple(dict.fromkeys(problems)),  # the attitude's jumps stand at each of its four channels
+        sweeps=sweeps(flight),
+        damage=damage,
+        vehicle=flight.provenance.vehicle,
     )

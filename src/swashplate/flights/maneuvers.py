@@ -1,4 +1,4 @@
-"""Maneuvers for identification: sweep, doublet, step, 3-2-1-1, pulse and multisine, as series to add on trim inputs.
+"""Maneuvers for identification: sweep, multisine, sine, doublet, step, 3-2-1-1, pulse, as series to add on trim inputs.
 
 A maneuver is described in one line, `kind:axis,...`, e.g. "sweep:pitch,0.5-8Hz,60s" or "doublet:roll,0.5s,0.2".
 """
@@ -13,16 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import ManeuverError
+from swashplate.flights import multisine
 
 Array = NDArray[np.float64]
 
-AXES: Mapping[str, Mapping[str, float]] = {
-    "roll": {"servo_roll": 1.0},
-    "pitch": {"servo_pitch": 1.0},
-    "yaw": {"motor_upper": 1.0, "motor_lower": -1.0},
-    "heave": {"motor_upper": 1.0, "motor_lower": 1.0},
+AXES: Mapping[str, tuple[Mapping[str, float], ...]] = {
+    "roll": ({"servo_roll": 1.0}, {"A1": 1.0}),
+    "pitch": ({"servo_pitch": 1.0}, {"B1": 1.0}),
+    "yaw": ({"motor_upper": 1.0, "motor_lower": -1.0}, {"theta0T": 1.0}),
+    "heave": ({"motor_upper": 1.0, "motor_lower": 1.0}, {"theta0": 1.0}),
 }
-"""Which inputs an axis moves, in the sense of the commands (servo_pitch positive is nose down, yaw nose right)."""
+"""Which inputs an axis moves, in the sense of the commands, coaxial or single rotor: the first set that a vehicle has.
+
+servo_pitch and B1 positive are nose down; yaw is nose right, of theta0T with a clockwise rotor.
+"""
 
 DEFAULT_AMPLITUDE: Mapping[str, float] = {"roll": 0.2, "pitch": 0.2, "yaw": 0.005, "heave": 0.03}
 """Largest deflection [of the command's unit 1] where none is given."""
@@ -42,7 +46,7 @@ class Maneuver:
         axes: the axes (or input names) that it moves; only a multisine moves several at once.
         duration: length [s]; of a doublet, 3-2-1-1, step or pulse the unit's length times its number of units.
         amplitude: largest deflection, in the unit of the command.
-        band: lowest and highest frequency [Hz], for sweep and multisine.
+        band: lowest and highest frequency [Hz], for sweep and multisine; twice the same for a sine.
     """
 
     kind: str
@@ -71,7 +75,9 @@ class Maneuver:
         for axis, signal in self.signals(time).items():
             if axis in without:
                 continue
-            for name, share in AXES.get(axis, {axis: 1.0}).items():
+            sets = AXES.get(axis, ({axis: 1.0},))
+            moved = next((chosen for chosen in sets if chosen.keys() <= added.keys()), sets[0])
+            for name, share in moved.items():
                 if name not in added:
                     raise ManeuverError(
                         f"axis '{axis}' moves '{name}', which the vehicle does not have.",
@@ -94,33 +100,20 @@ def _sweep(maneuver: Maneuver, time: Array) -> list[Array]:
 
 
 def _multisine(maneuver: Maneuver, time: Array) -> list[Array]:
-    """Orthogonal multisines: the harmonics of the record are dealt out to the axes in turn, with Schroeder's phases.
-
-    Schroeder (1970) phases keep the peak low; harmonics that no other axis has keep the axes uncorrelated over the
-    whole record (Morelli 2003). Scaled to a largest value of one. Not faded: a whole period repeats without a jump.
-    """
+    """Orthogonal multisines of least peak; not faded: a whole period repeats without a jump."""
     low, high = _band(maneuver)
-    harmonics = np.arange(int(np.ceil(low * maneuver.duration - 1e-9)), int(high * maneuver.duration + 1e-9) + 1)
-    harmonics = harmonics[harmonics > 0]
-    if harmonics.size < 2 * len(maneuver.axes):
+    harmonics = multisine.dealt(low, high, maneuver.duration, axes=len(maneuver.axes))
+    if min(own.size for own in harmonics) < 2:
         raise ManeuverError(
-            f"has {harmonics.size} harmonics in {low:g}-{high:g} Hz for {len(maneuver.axes)} axes.",
+            f"has {sum(own.size for own in harmonics)} harmonics in {low:g}-{high:g} Hz for {len(maneuver.axes)} axes.",
             hint="Make it longer or the band wider.",
         )
-    fine = np.arange(max(1000, 20 * int(harmonics[-1]))) * maneuver.duration
-    fine = fine / fine.size
-    shapes = []
-    for i in range(len(maneuver.axes)):
-        own = np.asarray(harmonics[i :: len(maneuver.axes)], dtype=np.float64)
-        number = np.arange(1.0, own.size + 1.0)
-        phases = -np.pi * number * (number - 1) / own.size
+    return [multisine.wave(own, time, duration=maneuver.duration) for own in harmonics]
 
-        def shape(t: Array, own: Array = own, phases: Array = phases) -> Array:
-            angles = 2.0 * np.pi * np.multiply.outer(t, own) / maneuver.duration + phases
-            return np.asarray(np.cos(angles).sum(axis=-1))
 
-        shapes.append(shape(time) / np.max(np.abs(shape(fine))))
-    return shapes
+def _sine(maneuver: Maneuver, time: Array) -> list[Array]:
+    """One frequency, from zero."""
+    return [np.sin(2.0 * np.pi * _band(maneuver)[0] * time)]
 
 
 def _units(*signs: float) -> Callable[[Maneuver, Array], list[Array]]:
@@ -138,6 +131,7 @@ def _units(*signs: float) -> Callable[[Maneuver, Array], list[Array]]:
 KINDS: Mapping[str, Callable[[Maneuver, Array], list[Array]]] = {
     "sweep": _sweep,
     "multisine": _multisine,
+    "sine": _sine,
     "doublet": _units(1.0, -1.0),
     "step": _units(1.0),
     "pulse": _units(1.0),
@@ -160,6 +154,7 @@ def _band(maneuver: Maneuver) -> tuple[float, float]:
 
 _NUMBER = r"(\d+(?:\.\d*)?|\.\d+)"
 _BAND = re.compile(rf"{_NUMBER}-{_NUMBER}\s*Hz", re.IGNORECASE)
+_TONE = re.compile(rf"{_NUMBER}\s*Hz", re.IGNORECASE)
 _SECONDS = re.compile(rf"{_NUMBER}\s*s", re.IGNORECASE)
 _AMPLITUDE = re.compile(_NUMBER)
 _EXAMPLE = 'Examples: "sweep:pitch,0.5-8Hz,60s", "doublet:roll,0.5s,0.2", "multisine:roll+pitch,0.2-8Hz,30s,0.15".'
@@ -168,9 +163,9 @@ _EXAMPLE = 'Examples: "sweep:pitch,0.5-8Hz,60s", "doublet:roll,0.5s,0.2", "multi
 def parse(text: str) -> Maneuver:
     """A maneuver from its description `kind:axes,items`.
 
-    Items, in any order: a band "0.5-8Hz" (sweep, multisine), a time "60s" (the record of a sweep or multisine, one
-    unit of a doublet or 3-2-1-1, the length of a step or pulse), an amplitude "0.3" (optional). Several axes of a
-    multisine are joined by "+".
+    Items, in any order: a band "0.5-8Hz" (sweep, multisine) or a frequency "2Hz" (sine), a time "60s" (the record of
+    these three, one unit of a doublet or 3-2-1-1, the length of a step or pulse), an amplitude "0.3" (optional).
+    Several axes of a multisine are joined by "+".
 
     Raises:
         ManeuverError: saying which word was not understood or is missing, with examples.
@@ -190,6 +185,8 @@ def parse(text: str) -> Maneuver:
     for item in items:
         if found := _BAND.fullmatch(item):
             band = (float(found[1]), float(found[2]))
+        elif found := _TONE.fullmatch(item):
+            band = (float(found[1]), float(found[1]))
         elif found := _SECONDS.fullmatch(item):
             seconds = float(found[1])
         elif found := _AMPLITUDE.fullmatch(item):
@@ -214,13 +211,19 @@ def _checked(
         raise ManeuverError(f"'{text}' says no time.", hint="Add it, e.g. 60s.")
     if not amplitude > 0.0:
         raise ManeuverError(f"'{text}' has an amplitude of {amplitude:g}.", hint="Give a positive one or none.")
-    banded = kind in ("sweep", "multisine")
+    banded = kind in ("sweep", "multisine", "sine")
     if banded != (band is not None):
-        expected = "needs a band, e.g. 0.5-8Hz." if banded else "has no band; give the length of one unit, e.g. 0.5s."
+        expected = (
+            "needs a band, e.g. 0.5-8Hz (a sine: one frequency, 2Hz)."
+            if banded
+            else "has no band; give the length of one unit, e.g. 0.5s."
+        )
         raise ManeuverError(f"a {kind} {expected}", hint=_EXAMPLE)
     if band is not None:
         low, high = band
-        if not 0.0 < low < high:
+        if kind == "sine" and not 0.0 < low == high:
+            raise ManeuverError(f"a sine has one frequency above zero, found {low:g}-{high:g} Hz.", hint=_EXAMPLE)
+        if kind != "sine" and not 0.0 < low < high:
             raise ManeuverError(f"the band {low:g}-{high:g} Hz does not rise from above zero.", hint=_EXAMPLE)
         if kind == "sweep" and seconds * low < 4.0:
             raise ManeuverError(

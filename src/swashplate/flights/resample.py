@@ -18,6 +18,7 @@ from swashplate.flights.schema import QUATERNION
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
+_FASTER = 1.02  # how much faster than the new rate a stream is that needs a filter: more than its stamps' jitter
 ANTI_ALIAS = 0.4  # of the new rate: leaves the filter a tenth of the rate to fall before half the rate
 
 
@@ -93,6 +94,10 @@ def _at(data: xr.Dataset, grid: Array, method: str) -> dict[str, Array]:
     return out
 
 
+def _rate(data: xr.Dataset) -> float:
+    return 1.0 / float(np.median(np.diff(data["time"].values)))
+
+
 def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
     pieces: list[Interval] | None = [] if not flight.streams else None
     for data in flight.streams.values():
@@ -150,8 +155,8 @@ def resample(
         flight = flight.with_streams(
             {n: d.assign_coords(time=straightened(np.asarray(d["time"].values))) for n, d in flight.streams.items()}
         )
-    native = max(1.0 / float(np.median(np.diff(data["time"].values))) for data in flight.streams.values())
-    factor = max(1, int(np.ceil(native / rate - 1e-6)))
+    native = max(_rate(data) for data in flight.streams.values())
+    factor = int(np.ceil(native / rate - 1e-6)) if native > _FASTER * rate else 1
     fine = rate * factor
     needed = max(shortest_piece, shortest(4) / fine if factor > 1 else 0.0)
     pieces = _pieces(flight, max_gap)
@@ -175,11 +180,15 @@ def resample(
         grid = coarse[0] + np.arange((k.size - 1) * factor + 1) / fine
         here: dict[str, Array] = {}
         for data in flight.streams.values():
-            here.update(_at(data, grid, method))
-        if factor > 1:
-            here = {name: filtered(v, rate=fine, cutoff=ANTI_ALIAS * rate, order=4) for name, v in here.items()}
+            if _rate(data) > _FASTER * rate:
+                raw = _at(data, grid, method)
+                here |= {n: filtered(v, rate=fine, cutoff=ANTI_ALIAS * rate, order=4)[::factor] for n, v in raw.items()}
+            else:
+                # Lines between slow samples are no signal of the fine grid: a filter would take them for one and shrink
+                # what is real (measured: 1.6 % of an input at 8 Hz, for 100 Hz commands beside 200 Hz motion).
+                here |= _at(data, coarse, method)
         times.append(coarse)
-        columns.append({name: v[::factor] for name, v in here.items()})
+        columns.append(here)
         segments.append((float(coarse[0]), float(coarse[-1])))
     units = {str(n): str(v.attrs.get("units", "")) for d in flight.streams.values() for n, v in d.data_vars.items()}
     uniform = stream(

@@ -6,7 +6,8 @@ quaternions scalar first, from body to local. Readers convert to this and nothin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,7 +39,9 @@ class Channel:
     @property
     def shown_factor(self) -> float:
         """What an inside value is multiplied by to be shown."""
-        return 180.0 / np.pi if self.shown_unit.startswith("deg") else 1.0
+        if self.shown_unit.startswith("deg"):
+            return 180.0 / np.pi
+        return 1e6 if (self.unit, self.shown_unit) == ("s", "us") else 1.0
 
 
 _CHANNELS = (
@@ -74,7 +77,14 @@ _CHANNELS = (
     Channel("motor_upper", "1", "upper motor command, 0 to 1"),
     Channel("servo_roll", "1", "roll servo command, -1 to 1, positive rolls right"),
     Channel("servo_pitch", "1", "pitch servo command, -1 to 1, positive pitches nose down"),
+    Channel("mixer_roll", "1", "roll command into the mixer, -1 to 1, positive rolls right"),
+    Channel("mixer_pitch", "1", "pitch command into the mixer, -1 to 1, positive pitches nose up"),
+    Channel("mixer_yaw", "1", "yaw command into the mixer, -1 to 1, positive turns the nose right"),
+    Channel("mixer_collective", "1", "collective (or thrust) command into the mixer, 0 to 1, positive climbs"),
+    Channel("omega_rotor", "rad/s", "main rotor speed"),
+    Channel("airspeed", "m/s", "true airspeed"),
     Channel("voltage", "V", "battery voltage"),
+    Channel("current", "A", "battery current"),
     Channel("wind_north", "m/s", "wind towards north", "NED"),
     Channel("wind_east", "m/s", "wind towards east", "NED"),
     Channel("wind_down", "m/s", "wind downwards", "NED"),
@@ -88,6 +98,46 @@ RATES = ("p", "q", "r")
 QUATERNION = ("qw", "qx", "qy", "qz")
 
 
+# Second opinions on a channel, as an autopilot logs them: the same quantity in the same unit.
+_VARIANTS = {
+    "demand": "as demanded by the autopilot",
+    "slow": "from the slower of two messages",
+    "imu": "from the first inertial sensor",
+    "imu2": "from the second inertial sensor",
+    "imu3": "from the third inertial sensor",
+    "sid": "from the system-identification message",
+}
+_VARIED = (*ATTITUDE, *RATES, "ax", "ay", "az", "vx", "vy", "vz")
+_PULSES = {"rcin": "pulse width received from the pilot", "rcout": "pulse width sent to a servo or motor"}
+_LOGGED = {
+    entry.name: entry
+    for entry in (
+        Channel("sid_target", "", "what ArduPilot's System ID mode adds, in the unit of its axis"),
+        Channel("sid_frequency", "Hz", "frequency of ArduPilot's chirp"),
+        Channel("altitude_baro", "m", "barometric altitude above the start, up positive"),
+    )
+}
+_NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")
+
+
+def _family(name: str) -> Channel | None:
+    """The entry of a name that stands for a family: `p_imu2`, `phi_demand`, `rcin_3`, `rcout_12`."""
+    if _NUMBERED.fullmatch(name):
+        return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us")
+    if name in _LOGGED:
+        return _LOGGED[name]
+    base, _, variant = name.partition("_")
+    if base in _VARIED and variant in _VARIANTS:
+        plain = CHANNELS[base]
+        return replace(plain, name=name, description=f"{plain.description}, {_VARIANTS[variant]}")
+    return None
+
+
+def is_known(name: str) -> bool:
+    """Whether the schema says what `name` is."""
+    return name in CHANNELS or _family(name) is not None
+
+
 def channel(name: str) -> Channel:
     """The schema's entry for `name`; an unknown name becomes a channel without a promise about its frame."""
-    return CHANNELS.get(name, Channel(name, "", "not in the schema"))
+    return CHANNELS.get(name) or _family(name) or Channel(name, "", "not in the schema")

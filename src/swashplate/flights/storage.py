@@ -18,7 +18,7 @@ import xarray as xr
 
 from swashplate.atomic import replaced_when_complete
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Flight, Provenance, Step
+from swashplate.flights.flight import Event, Flight, Provenance, Step
 from swashplate.flights.readers.source import refuse_oversized
 from swashplate.flights.schema import SCHEMA_VERSION
 
@@ -130,7 +130,8 @@ def _check_stream(name: str, data: xr.Dataset, place: Path) -> None:
 
 def _provenance(entry: Mapping[str, Any]) -> Provenance:
     known = {name: value for name, value in entry.items() if name in Provenance.__dataclass_fields__}
-    return Provenance(**(known | {"notes": tuple(known.get("notes", ()))}))
+    texts = {name: tuple(known.get(name, ())) for name in ("notes", "damage")}
+    return Provenance(**(known | texts | {"events": tuple(Event(**event) for event in known.get("events", ()))}))
 
 
 def load(path: str | Path) -> Flight:

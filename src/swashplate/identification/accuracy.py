@@ -47,7 +47,7 @@ def covariance(row: Row, information: Array, prior: Array) -> Array:
 
 
 def corrected_covariance(
-    plain: Array, prior: Array, whitened: Sequence[Array], sensitivities: Sequence[Array], *, lags: int
+    plain: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array], *, lags: int
 ) -> Array:
     """Bound that allows for coloured residuals (Morelli and Klein 1997; Klein and Morelli 2006, sec. 6.1).
 
@@ -60,7 +60,7 @@ def corrected_covariance(
 
     Args:
         plain: M^-1, scaled, shape (p, p).
-        prior: prior information on the diagonal (p,), which is not coloured.
+        rest: information that no residual carries (priors, the covariance's own), shape (p, p); it is not coloured.
         whitened: per record, residuals (n, m) divided by their standard deviation.
         sensitivities: per record, their derivatives (p, n, m).
         lags: how many samples of correlation to allow for.
@@ -73,7 +73,7 @@ def corrected_covariance(
     ]
     taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
     correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
-    middle = np.diag(prior).astype(np.float64)
+    middle = np.array(rest, dtype=np.float64)
     for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
         middle[np.ix_(own, own)] += _spread(correlation, piece)
     return np.asarray(plain @ middle @ plain)

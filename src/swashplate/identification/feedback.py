@@ -66,6 +66,8 @@ def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExc
     motion["lateral"] = -np.sin(heading) * motion["x"] + np.cos(heading) * motion["y"]
     found = []
     for axis in AXES:
+        if not set(axis.weights) <= set(vehicle.input_names):
+            continue
         command = np.zeros(record.time.size)
         for name, weight in axis.weights.items():
             command = command + weight * record.inputs[:, vehicle.input_names.index(name)]

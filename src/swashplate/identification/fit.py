@@ -45,7 +45,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RecordEstimate:
-    """One number that belongs to a record: a delay [s], a trim [1], a lever arm [m] or a level error [rad]."""
+    """One number of a flight (the log `record`): a delay [s], a trim [1], a lever arm [m] or a level [rad]."""
 
     record: str
     name: str
@@ -132,7 +132,7 @@ class Fit:
         method: "prediction-error", "output-error" or "nelder-mead".
         choice: the ready choice or "given".
         parameters: estimates, free ones first, then tied ones.
-        record_estimates: delays, trims and lever arms by record.
+        record_estimates: delays, trims and lever arms by flight.
         noise: process and measurement noise (None where the method has none).
         nuisance: the records' mean nuisance, what a prediction on another flight uses.
         names: free parameters in the order of the matrices below.

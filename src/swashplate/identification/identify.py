@@ -84,6 +84,7 @@ def identify(
         table, notes = _hold_unexcited(table, axes)
     likelihood = PredictionError(table, pieces) if method == "prediction-error" else OutputError(table, pieces)
     where = ", ".join(piece.name for piece in pieces)
+    likelihood.refresh(likelihood.row.starts())
     accuracy.refuse_unseen(likelihood.row, likelihood.scores(likelihood.row.starts())[2], where=where)
     if method == "nelder-mead":
         assert isinstance(likelihood, OutputError)
@@ -99,7 +100,7 @@ def identify(
         method=method,
         choice=free if isinstance(free, str) else "given",
         parameters=parameters,
-        record_estimates=_record_estimates(found, pieces),
+        record_estimates=_record_estimates(found),
         noise=_noise(found),
         nuisance=_mean_nuisance(found),
         names=table.names,
@@ -189,9 +190,9 @@ class _Found:
 def _found(table: Parameterization, likelihood: PredictionError | OutputError, optimum: Optimum) -> _Found:
     prior = likelihood.row.prior(optimum.row)[2]
     plain = accuracy.covariance(likelihood.row, optimum.information, prior)
-    white, sensitivities = likelihood.whitened(optimum.row)
+    white, sensitivities, rest = likelihood.whitened(optimum.row)
     lags = round(_LAGS / likelihood.model.dt)
-    corrected = accuracy.corrected_covariance(plain, prior, white, sensitivities, lags=lags)
+    corrected = accuracy.corrected_covariance(plain, rest + np.diag(prior), white, sensitivities, lags=lags)
     return _Found(table, likelihood, optimum, prior, plain, corrected)
 
 
@@ -252,14 +253,14 @@ def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> fl
     return float((high - low) / (2.0 * step[place]))
 
 
-def _record_estimates(found: _Found, pieces: Sequence[Record]) -> tuple[RecordEstimate, ...]:
+def _record_estimates(found: _Found) -> tuple[RecordEstimate, ...]:
     row = found.likelihood.row
     sigma = np.sqrt(np.maximum(np.diag(found.plain), 0.0)) * row.scale
     estimates = []
     for i in row.places("nuisance"):
         name, _, number = row.names[i].partition("[")
         unit = _RECORD_UNITS[name.split("_")[0]]
-        record = pieces[int(number[:-1])].name
+        record = found.likelihood.logs[int(number[:-1])]
         estimates.append(RecordEstimate(record, name, unit, float(found.numbers[i]), float(sigma[i])))
     return tuple(estimates)
 

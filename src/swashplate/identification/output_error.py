@@ -21,7 +21,7 @@ from swashplate.flights.flight import Array
 from swashplate.identification import robust
 from swashplate.identification.parameters import Layout, Parameterization
 from swashplate.identification.prediction_error import parameter_entries, stack_records
-from swashplate.identification.records import Record
+from swashplate.identification.records import Record, logs
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.start_states import slopes, start_state
 from swashplate.identification.stochastic import (
@@ -58,6 +58,8 @@ _INITIAL = {
     **dict.fromkeys(("eta_bar", "zeta_bar"), (0.02, 0.5)),
     **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
 }
+_HIDDEN = (0.02, 0.1)
+"""The same for inner states that have no entry: flapping, stabilizer bar."""
 
 _DRIFTING = {"trim_motor_lower": (0.002, 0.002), "trim_motor_upper": (0.002, 0.002)}
 """Scale and prior sigma of what moves slowly between windows: with the battery, by the error of its voltage.
@@ -100,10 +102,14 @@ class OutputError:
                 f"the longest record has {longest:.1f} s, expected more than one window of {window:g} s.",
                 hint="Choose a shorter window.",
             )
-        drifting = tuple(name for name in _DRIFTING if name in nuisances)
-        self._own = {name: {**_INITIAL, **_DRIFTING}[name] for name in (*table.vehicle.state_names, *drifting)}
+        coaxial = "motor_upper" in table.vehicle.input_names
+        self.nuisances = tuple(name for name in self.nuisances if coaxial or not name.startswith("trim_"))
+        drifting = tuple(name for name in _DRIFTING if name in self.nuisances)
+        spread = {**_INITIAL, **_DRIFTING}
+        self._own = {name: spread.get(name, _HIDDEN) for name in (*table.vehicle.state_names, *drifting)}
+        self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
-        for number in range(len(pieces)):
+        for number in range(len(self.logs)):
             for name in self.nuisances:
                 scale, sigma = _NUISANCE[name]
                 low = -0.02 if name.startswith("delay") else -np.inf
@@ -114,7 +120,9 @@ class OutputError:
             for name, (scale, sigma) in self._own.items():
                 entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
         self.row = Row(tuple(entries))
-        self._plan = _Plan(self.model, table.layout, len(pieces), self.nuisances, drifting, self.length, self._shared)
+        self._plan = _Plan(
+            self.model, table.layout, len(self.logs), self.nuisances, drifting, self.length, self._shared
+        )
         self._data = self._windows()
         self._L = np.eye(len(pieces[0].output_names))
 
@@ -136,6 +144,7 @@ class OutputError:
             "inputs": jnp.asarray(stacked["inputs"]),
             "voltage": jnp.asarray(stacked["voltage"]),
             "card": jnp.asarray(self.table.card_row),
+            "log": jnp.asarray(self._log),
             "scale": jnp.asarray(self.row.scale[: self._shared]),
             "initial_scale": jnp.asarray([scale for scale, _ in self._own.values()]),
         }
@@ -194,8 +203,8 @@ class OutputError:
         return residual, gradient, information, d_white
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
-    def whitened(self, row: Array) -> tuple[list[Array], list[Array]]:
-        """Per window: whitened residuals (n, outputs) and their sensitivities (p, n, outputs)."""
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per window: whitened residuals (n, outputs), their sensitivities (p, n, outputs); no other information."""
         residual, _, _, d_white = self._accumulate(row)
         Li = np.linalg.inv(self._L)
         p, s, n = len(self.row), self._shared, len(self._own)
@@ -206,7 +215,7 @@ class OutputError:
             full[s + place * n : s + (place + 1) * n] = d_white[place, s:]
             white.append(residual[place] @ Li.T)
             sensitivities.append(full)
-        return white, sensitivities
+        return white, sensitivities, np.zeros((p, p))
 
     @property
     def covariance(self) -> Array:
@@ -224,7 +233,7 @@ class _Plan:
 
     model: StochasticModel
     layout: Layout
-    records: int
+    logs: int
     nuisances: tuple[str, ...]
     drifting: tuple[str, ...]
     length: int
@@ -233,9 +242,9 @@ class _Plan:
 
 def _unpack(plan: _Plan, data: Any, shared: Any) -> tuple[Any, Nuisance]:
     numbers = shared * data["scale"]
-    k, r, m = len(plan.layout.free), plan.records, len(plan.nuisances)
-    block = numbers[k : k + r * m].reshape(r, m)
-    nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+    k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
+    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
+    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
         **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
     )
     return plan.layout.values(data["card"], numbers[:k]), nuisance

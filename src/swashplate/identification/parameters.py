@@ -202,6 +202,12 @@ def parameterize(
     held = dict(fixed or {})
     if isinstance(free, str) and free in CHOICES:
         choice = CHOICES[free]
+        if not {item.name for item in choice.free} <= set(vehicle.parameter_names):
+            raise IdentificationError(
+                f"the ready choice '{free}' is for another kind of vehicle.",
+                where=vehicle.name,
+                hint="Name the free parameters, e.g. --free hub_stiffness,blade_inertia,wake_distortion.",
+            )
         given = {parse_tie(text)[0] for text in ties} | held.keys()
         wanted = list(choice.free)
         texts = [*(text for text in choice.ties if parse_tie(text)[0] not in given), *ties]

@@ -20,7 +20,7 @@ import numpy as np
 from swashplate.flights.flight import Array
 from swashplate.identification import robust
 from swashplate.identification.parameters import Layout, Parameterization
-from swashplate.identification.records import Record
+from swashplate.identification.records import Record, logs
 from swashplate.identification.rows import Entry, Row
 from swashplate.identification.start_states import hover, slopes, start_state
 from swashplate.identification.stochastic import (
@@ -48,6 +48,7 @@ _NUISANCE = {
     "lever_x": (0.0, 0.05, 0.1),
     "lever_y": (0.0, 0.05, 0.1),
     "lever_z": (0.0, 0.05, 0.1),
+    "level_psi": (0.0, 0.1, 0.2),
 }
 
 
@@ -113,8 +114,9 @@ class PredictionError:
         self.noise = noise or Noise()
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
+        self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
-        for number in range(len(pieces)):
+        for number in range(len(self.logs)):
             for name, (usual, scale, sigma) in _NUISANCE.items():
                 start = usual if nuisance is None else float(getattr(nuisance, name))
                 low = 0.0 if name.startswith("delay") else -np.inf
@@ -131,12 +133,13 @@ class PredictionError:
         self.row = Row(tuple(entries))
         stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
-        self._plan = _Plan(self.model, table.layout, len(pieces), estimate_noise)
+        self._plan = _Plan(self.model, table.layout, len(self.logs), estimate_noise)
         self._data = {
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
             "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
             "rate": jnp.asarray(np.stack([rate[0] for _, rate in first])),
             "card": jnp.asarray(table.card_row),
+            "log": jnp.asarray(self._log),
             "scale": jnp.asarray(self.row.scale),
             "noise": jnp.asarray([float(value) for value in self.noise]),
         }
@@ -197,7 +200,7 @@ class PredictionError:
             # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
             information += (flat * weight.ravel()) @ flat.T
-            information += 0.5 * nu.shape[0] * dM.reshape(p, -1) @ dM.reshape(p, -1).T
+            information += _by_covariance(dM, nu.shape[0])
         return gradient, information, values, tangents
 
     def refresh(self, row: Array) -> None:
@@ -216,15 +219,25 @@ class PredictionError:
         return turned
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
-    def whitened(self, row: Array) -> tuple[list[Array], list[Array]]:
-        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs)."""
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
+
+        The last is the information (p, p) that lies in the innovations' covariance instead.
+        """
         _, _, values, tangents = self._accumulate(row)
-        white, sensitivities = [], []
+        white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
         for r, counted in enumerate(self.counted):
             Li = np.linalg.inv(np.linalg.cholesky(values[1][r]))
             white.append(values[0][r][counted] @ Li.T)
             sensitivities.append(tangents[0][:, r][:, counted] @ Li.T)
-        return white, sensitivities
+            rest += _by_covariance(Li @ tangents[1][:, r] @ Li.T, int(counted.sum()))
+        return white, sensitivities, rest
+
+
+def _by_covariance(dM: Array, n: int) -> Array:
+    """Information of n innovations about entries that change their covariance, dM = L^-1 dS L^-T (p, m, m)."""
+    flat = dM.reshape(len(dM), -1)
+    return np.asarray(0.5 * n * flat @ flat.T)
 
 
 @dataclass(frozen=True)
@@ -233,18 +246,18 @@ class _Plan:
 
     model: StochasticModel
     layout: Layout
-    records: int
+    logs: int
     estimate_noise: bool
 
 
 def _unpack(plan: _Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
     numbers = row * data["scale"]
-    k, r, m = len(plan.layout.free), plan.records, len(_NUISANCE)
-    block = numbers[k : k + r * m].reshape(r, m)
-    nuisance = Nuisance(**{name: jnp.zeros(r) for name in Nuisance._fields})._replace(
+    k, n, m = len(plan.layout.free), plan.logs, len(_NUISANCE)
+    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
+    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
         **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
     )
-    noise = Noise(*(jnp.exp(numbers[k + r * m :]) if plan.estimate_noise else data["noise"]))
+    noise = Noise(*(jnp.exp(numbers[k + n * m :]) if plan.estimate_noise else data["noise"]))
     return plan.layout.values(data["card"], numbers[:k]), nuisance, noise
 
 
@@ -302,7 +315,7 @@ def filter_record(
         nuisance,
         value=value,
         rate=rate,
-        inputs=jnp.mean(u[:settled], axis=0),
+        inputs=jnp.mean(reaching[0][:settled], axis=0),
         voltage=voltage[0],
     )
     start = FilterState(x, jnp.zeros(N_DISTURBANCES), jnp.zeros(N_DISTURBANCES))

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.physics.environment import Environment
 from swashplate.vehicles.vehicle import Vehicle
 
 POSE = (*POSITION, *ATTITUDE)
@@ -29,6 +31,7 @@ class Record:
         voltage: battery voltage [V], shape (n,).
         output_names: names of the measured channels.
         voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
+        log: the flight it is a piece of; the pieces of one log share their delays, trims and lever arm.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Record:
     voltage: Array
     output_names: tuple[str, ...]
     voltage_known: bool
+    log: str = ""
 
     @property
     def dt(self) -> float:
@@ -50,10 +54,13 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
     Raises:
         FlightError: where a flight lacks a channel, is not on a uniform grid or holds NaN, or where no input moves.
     """
-    pieces = []
+    pieces: list[Record] = []
     for flight in [flights] if isinstance(flights, Flight) else list(flights):
+        source = flight.provenance.source or "flight"
+        again = sum(1 for name in logs(pieces)[0] if name.split(" #")[0] == source)
+        log = f"{source} #{again + 1}" if again else source
         for piece in flight.split():
-            pieces.append(_record(piece, vehicle, tuple(outputs)))
+            pieces.append(_record(piece, vehicle, tuple(outputs), log=log))
     if not pieces:
         raise FlightError("there is no flight to work on.")
     steps = {round(piece.dt, 9) for piece in pieces}
@@ -72,13 +79,28 @@ def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Se
     return pieces
 
 
-def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Record:
+def logs(pieces: Sequence[Record]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of the logs, in order, and which of them each piece comes from."""
+    names = tuple(dict.fromkeys(piece.log for piece in pieces))
+    return names, np.array([names.index(piece.log) for piece in pieces], dtype=np.intp)
+
+
+def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[Array, Array]:
+    """Time (n,) and channels (n, len(wanted)) of an unbroken flight on a uniform grid.
+
+    Args:
+        flight: one unbroken piece.
+        wanted: channels, in order.
+        who: what needs them, for the message.
+
+    Raises:
+        FlightError: where a channel is missing, on another time base, not finite, or the grid is not uniform.
+    """
     source = flight.provenance.source or "flight"
-    wanted = (*vehicle.input_names, *outputs)
     missing = [name for name in wanted if name not in flight]
     if missing:
         raise FlightError(
-            f"lacks what '{vehicle.name}' needs; it has {', '.join(flight.channels) or 'nothing'}.",
+            f"lacks what {who} needs; it has {', '.join(flight.channels) or 'nothing'}.",
             where=source,
             channel=", ".join(missing),
             hint="Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
@@ -97,7 +119,14 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
     for column, name in enumerate(wanted):
         if not np.all(np.isfinite(table[:, column])):
             raise FlightError("holds values that are not finite.", where=source, channel=name)
-    nominal = vehicle.card.values()["voltage_nominal"]
+    return time, table
+
+
+def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:
+    wanted = (*vehicle.input_names, *outputs)
+    time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
+    source = flight.provenance.source or "flight"
+    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
     return Record(
@@ -105,9 +134,12 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...]) -> Recor
         time=time,
         inputs=table[:, :n_inputs],
         outputs=table[:, n_inputs:],
-        voltage=_slow(flight.values("voltage"), float(np.mean(steps))) if known else np.full(time.size, nominal),
+        voltage=_slow(flight.values("voltage"), float(np.mean(np.diff(time))))
+        if known
+        else np.full(time.size, nominal),
         output_names=outputs,
         voltage_known=known,
+        log=log,
     )
 
 

@@ -62,6 +62,9 @@ class Optimum:
 _HOPELESS = 1e8
 """Damping at which a step is so short that no descent is left."""
 
+_NEWTON = 1e-3
+"""Damping below which a step goes nearly all the way to the model's optimum."""
+
 _STILL = 1e4
 """Damping at which a kinked entry hardly moves."""
 
@@ -83,7 +86,7 @@ def minimise(
         likelihood: what to minimise, with the row's priors added.
         start: scaled first guess (None: the entries' starts).
         iterations: at most this many.
-        tolerance: stop when an iteration and its prediction gain less than this in log-likelihood.
+        tolerance: a gain in log-likelihood that is too small to go on for.
         progress: told about every iteration.
 
     Raises:
@@ -100,6 +103,7 @@ def minimise(
             hint="Check units and signs with 'swash inspect', or start from a card that flies.",
         )
     history, damping, caution, converged = [cost], 1e-2, 1e-2, False
+    small = 0
     kinked = row_of.column("kinked") > 0.0
     reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
     for iteration in range(iterations):
@@ -128,7 +132,9 @@ def minimise(
         history.append(cost)
         if progress is not None:
             progress(iteration + 1, cost)
-        if gained < tolerance:
+        # One small gain may only mean a short, damped step; three in a row mean that nothing is left.
+        small = small + 1 if gained < tolerance else 0
+        if small and (damping <= _NEWTON or small == 3):
             converged = True
             break
     touching = (row <= low + 1e-9) | (row >= high - 1e-9)

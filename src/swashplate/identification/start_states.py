@@ -12,7 +12,7 @@ from swashplate.identification.records import Record
 from swashplate.identification.stochastic import Nuisance
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.environment import LABORATORY_GRAVITY
-from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body
+from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
 from swashplate.simulation.dynamics import jax_backend
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -71,16 +71,19 @@ def start_state(
 
     Args:
         value, rate: measured channels and their time derivatives at the start.
-        inputs: commands around the start.
+        inputs: commands that reach the vehicle around the start, trims included.
     """
     xp = jax_backend()
     here = {name: value[i] for i, name in enumerate(output_names)}
     moving = {name: rate[i] for i, name in enumerate(output_names)}
-    phi, theta = here["phi"] - nuisance.level_phi, here["theta"] - nuisance.level_theta
-    attitude = Euler(phi, theta, here["psi"])
+    tracked = Euler(here["phi"] - nuisance.level_phi, here["theta"] - nuisance.level_theta, here["psi"])
+    attitude = turned_about_z(tracked, -nuisance.level_psi, xp)
+    phi, theta = tracked.phi, tracked.theta
     phi_dot, theta_dot, psi_dot = moving["phi"], moving["theta"], moving["psi"]
-    p = phi_dot - psi_dot * jnp.sin(theta)
-    q = theta_dot * jnp.cos(phi) + psi_dot * jnp.cos(theta) * jnp.sin(phi)
+    forward = phi_dot - psi_dot * jnp.sin(theta)
+    right = theta_dot * jnp.cos(phi) + psi_dot * jnp.cos(theta) * jnp.sin(phi)
+    c, s = jnp.cos(nuisance.level_psi), jnp.sin(nuisance.level_psi)
+    p, q = c * forward - s * right, s * forward + c * right
     r = -theta_dot * jnp.sin(phi) + psi_dot * jnp.cos(theta) * jnp.cos(phi)
     arm = Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z)
     offset = body_to_local(arm, attitude, xp)
@@ -93,18 +96,20 @@ def start_state(
         "u": velocity.x - swing.x,
         "v": velocity.y - swing.y,
         "w": velocity.z - swing.z,
-        "phi": phi,
-        "theta": theta,
-        "psi": here["psi"],
+        "phi": attitude.phi,
+        "theta": attitude.theta,
+        "psi": attitude.psi,
         "p": p,
         "q": q,
         "r": r,
-        "eta_bar": phi,
-        "zeta_bar": theta,
+        "eta_bar": attitude.phi,
+        "zeta_bar": attitude.theta,
     }
     for side in ("lower", "upper"):
+        if f"motor_{side}" not in vehicle.input_names:
+            continue
         known[f"omega_{side}"] = steady_speed(
-            inputs[vehicle.input_names.index(f"motor_{side}")] + getattr(nuisance, f"trim_motor_{side}"),
+            inputs[vehicle.input_names.index(f"motor_{side}")],
             voltage,
             k=getattr(parameters, f"k_drive_{side}"),
             o=getattr(parameters, f"o_drive_{side}"),

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 
 from swashplate.identification.riccati import kalman_gain
 from swashplate.physics.environment import Environment
-from swashplate.physics.frames import Euler, Vector, body_to_local
+from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.dynamics import (
     CONSTANTS,
     Equations,
@@ -59,7 +59,8 @@ class Nuisance(NamedTuple):
     """What belongs to one record and not to the vehicle.
 
     `delay_*`: time by which the motion lags the logged commands [s]; `trim_*`: zeros of the commands; `lever_*`: from
-    the centre of gravity to the tracked point in body axes [m]; `level_*`: error of the tracked body's level [rad].
+    the centre of gravity to the tracked point in body axes [m]; `level_phi`, `level_theta`: error of the tracked body's
+    level, `level_psi`: its heading against the nose [rad].
     """
 
     delay_servo: Any = 0.0
@@ -73,6 +74,7 @@ class Nuisance(NamedTuple):
     lever_z: Any = 0.0
     level_phi: Any = 0.0
     level_theta: Any = 0.0
+    level_psi: Any = 0.0
 
 
 class Gain(NamedTuple):
@@ -133,16 +135,20 @@ class StochasticModel:
 
     def measure(self, x: Any, nuisance: Nuisance) -> Any:
         """The measured channels of a state row."""
+        xp = jax_backend()
+        here = {name: x[self.vehicle.index(name)] for name in self.output_names}
         attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
-        lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, jax_backend())
-        offsets = {
-            "x": lever.x,
-            "y": lever.y,
-            "z": lever.z,
-            "phi": nuisance.level_phi,
-            "theta": nuisance.level_theta,
+        lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
+        tracked = turned_about_z(attitude, nuisance.level_psi, xp)
+        seen = {
+            "x": x[self.vehicle.index("x")] + lever.x,
+            "y": x[self.vehicle.index("y")] + lever.y,
+            "z": x[self.vehicle.index("z")] + lever.z,
+            "phi": tracked.phi + nuisance.level_phi,
+            "theta": tracked.theta + nuisance.level_theta,
+            "psi": tracked.psi,
         }
-        return jnp.stack([x[self.vehicle.index(name)] + offsets.get(name, 0.0) for name in self.output_names])
+        return jnp.stack([seen.get(name, here[name]) for name in self.output_names])
 
     @property
     def _disturbed(self) -> Any:
@@ -274,7 +280,9 @@ def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, he
     A smooth curve through the samples; before the first and after the last sample the nearest one holds.
     """
     n = inputs.shape[0]
-    trims = jnp.stack([jnp.asarray(getattr(nuisance, f"trim_{name}"), dtype=float) for name in vehicle.input_names])
+    trims = jnp.stack(
+        [jnp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names]
+    )
     motor = [name.startswith("motor") for name in vehicle.input_names]
     delay = jnp.where(jnp.array(motor), nuisance.delay_motor, nuisance.delay_servo)
     trimmed = inputs + trims

@@ -26,6 +26,7 @@ class Backend(Protocol):
     def where(self, condition: Scalar, x: Scalar, y: Scalar, /) -> Scalar: ...
     def minimum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
     def maximum(self, x: Scalar, y: Scalar, /) -> Scalar: ...
+    def detached(self, x: Scalar, /) -> Scalar: ...
 
 
 class FloatBackend:
@@ -44,16 +45,22 @@ class FloatBackend:
     def where(condition: bool, x: float, y: float) -> float:
         return x if condition else y
 
+    @staticmethod
+    def detached(x: float) -> float:
+        return x
+
 
 class JaxBackend:
     """JAX arrays and tracers: simulation, fitting, batches."""
 
     def __init__(self) -> None:
+        import jax
         import jax.numpy as jnp
 
         self.sin, self.cos, self.tan, self.sqrt = jnp.sin, jnp.cos, jnp.tan, jnp.sqrt
         self.atan2, self.abs, self.where = jnp.arctan2, jnp.abs, jnp.where
         self.minimum, self.maximum = jnp.minimum, jnp.maximum
+        self.detached = jax.lax.stop_gradient
 
 
 class CasadiBackend:
@@ -65,18 +72,33 @@ class CasadiBackend:
         self.sin, self.cos, self.tan, self.sqrt = casadi.sin, casadi.cos, casadi.tan, casadi.sqrt
         self.atan2, self.abs, self.where = casadi.atan2, casadi.fabs, casadi.if_else
         self.minimum, self.maximum = casadi.fmin, casadi.fmax
+        self.detached = _same
 
 
-def newton(residual: Callable[[Scalar], tuple[Scalar, Scalar]], start: Scalar, *, steps: int) -> Scalar:
+def _same(x: Scalar) -> Scalar:
+    return x
+
+
+_DIFFERENTIATED = 2
+"""Newton steps that derivatives go through: one makes first derivatives exact, two second ones."""
+
+
+def newton(residual: Callable[[Scalar], tuple[Scalar, Scalar]], start: Scalar, *, steps: int, xp: Backend) -> Scalar:
     """A fixed number of Newton steps, unrolled so that every backend can trace them.
+
+    Automatic differentiation sees the last two only: at the solution they carry what the implicit function theorem
+    says, and the others nothing (`xp.detached` hides a value's origin from differentiation).
 
     Args:
         residual: returns the residual and its derivative at a point.
         start: first guess.
-        steps: how many steps; choose it so that the last one no longer moves the answer.
+        steps: how many steps; choose it so that the last two no longer move the answer.
+        xp: the operations.
     """
     x = start
-    for _ in range(steps):
+    for step in range(steps):
+        if step == steps - _DIFFERENTIATED:
+            x = xp.detached(x)
         value, slope = residual(x)
         x = x - value / slope
     return x

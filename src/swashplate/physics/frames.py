@@ -62,6 +62,19 @@ def local_to_body(vector: Vector, attitude: Euler, xp: Backend) -> Vector:
     )
 
 
+def turned_about_z(attitude: Euler, angle: Scalar, xp: Backend) -> Euler:
+    """Euler angles of a frame that is turned by `angle` [rad] about the z axis of a body with this attitude: R Rz."""
+    cf, sf = xp.cos(attitude.phi), xp.sin(attitude.phi)
+    ct, st = xp.cos(attitude.theta), xp.sin(attitude.theta)
+    c, s = xp.cos(angle), xp.sin(angle)
+    down_x, down_y, down_z = -st * c + ct * sf * s, st * s + ct * sf * c, ct * cf
+    return Euler(
+        xp.atan2(down_y, down_z),
+        xp.atan2(-down_x, xp.sqrt(down_y * down_y + down_z * down_z)),
+        attitude.psi + xp.atan2(cf * s, ct * c + st * sf * s),
+    )
+
+
 def euler_rates(rates: Vector, attitude: Euler, xp: Backend) -> Euler:
     """Rates of the Euler angles [rad/s] from body rates; singular at theta = +-90 deg."""
     p, q, r = rates

@@ -25,3 +25,15 @@ def yaw_damping_moment(r: Scalar, damping_r: Scalar) -> Vector:
     gives 2 (k_Q,up Omega_up + k_Q,lw Omega_lw), the value to start from.
     """
     return Vector(0.0, 0.0, -damping_r * r)
+
+
+def flat_plate_drag(air_velocity: Vector, downwash: Scalar, *, areas: Vector, density: Scalar, xp: Backend) -> Vector:
+    """Drag [N] of a fuselage by its equivalent flat plates [m^2], in the main rotor's wake (Gavrilets et al. 2001).
+
+    `downwash` [m/s] is the rotor's induced velocity; the force acts at the CG.
+    """
+    u, v, w = air_velocity
+    through = w - downwash
+    speed = xp.sqrt(u * u + v * v + through * through + 1e-9)
+    pressure = -0.5 * density * speed
+    return Vector(pressure * areas.x * u, pressure * areas.y * v, pressure * areas.z * through)

@@ -38,12 +38,13 @@ class RigidBody(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Mass [kg] and principal moments of inertia [kg m^2]."""
+    """Mass [kg] and moments of inertia [kg m^2]; `xz` is None where the axes are principal ones."""
 
     mass: Scalar
     xx: Scalar
     yy: Scalar
     zz: Scalar
+    xz: Scalar | None = None
 
 
 def gravity(mass: Scalar, g: Scalar, attitude: Euler, xp: Backend) -> Vector:
@@ -57,12 +58,26 @@ def gravity(mass: Scalar, g: Scalar, attitude: Euler, xp: Backend) -> Vector:
 
 
 def rigid_body_rates(body: RigidBody, force: Vector, moment: Vector, inertia: Inertia, xp: Backend) -> RigidBody:
-    """Time derivative of the rigid-body state under a force [N] and a moment [N m] in body axes at the CG."""
-    m, Ixx, Iyy, Izz = inertia
+    """Time derivative of the rigid-body state under a force [N] and a moment [N m] in body axes at the CG.
+
+    With `inertia.xz`: Bhandari et al. (2005), eqs 1 to 6, solved for the angular accelerations.
+    """
+    m, Ixx, Iyy, Izz, Ixz = inertia
     p, q, r = body.rates
     u, v, w = body.velocity
     position = body_to_local(body.velocity, body.attitude, xp)
     attitude = euler_rates(body.rates, body.attitude, xp)
+    roll = moment.x - (Izz - Iyy) * q * r
+    pitch = moment.y - (Ixx - Izz) * p * r
+    yaw = moment.z - (Iyy - Ixx) * p * q
+    if Ixz is None:
+        pdot, qdot, rdot = roll / Ixx, pitch / Iyy, yaw / Izz
+    else:
+        roll, yaw = roll + Ixz * p * q, yaw - Ixz * q * r
+        determinant = Ixx * Izz - Ixz * Ixz
+        pdot = (Izz * roll + Ixz * yaw) / determinant
+        qdot = (pitch - Ixz * (p * p - r * r)) / Iyy
+        rdot = (Ixz * roll + Ixx * yaw) / determinant
     return RigidBody(
         position.x,
         position.y,
@@ -73,7 +88,7 @@ def rigid_body_rates(body: RigidBody, force: Vector, moment: Vector, inertia: In
         attitude.phi,
         attitude.theta,
         attitude.psi,
-        (moment.x - (Izz - Iyy) * q * r) / Ixx,
-        (moment.y - (Ixx - Izz) * p * r) / Iyy,
-        (moment.z - (Iyy - Ixx) * p * q) / Izz,
+        pdot,
+        qdot,
+        rdot,
     )

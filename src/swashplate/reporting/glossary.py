@@ -67,6 +67,7 @@ PARAMETERS: dict[str, str] = {
     "lever_z": "from the centre of gravity down to the tracked point",
     "level_phi": "roll error of the tracked body's level",
     "level_theta": "pitch error of the tracked body's level",
+    "level_psi": "heading of the tracked body against the helicopter's nose",
 }
 
 

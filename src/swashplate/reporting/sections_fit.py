@@ -54,8 +54,8 @@ def parameters(fit: Fit) -> Section:
     if fit.record_estimates:
         blocks.append(
             Table(
-                "What belongs to the records and not to the vehicle",
-                ("quantity", "record", "unit", "estimate", "±σ"),
+                "What belongs to the flights and not to the vehicle",
+                ("quantity", "flight", "unit", "estimate", "±σ"),
                 tuple(
                     (
                         Cell(e.name, link=f"meaning-{e.name}"),
@@ -175,7 +175,7 @@ def _series(fit: Fit, pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
         if {"x", "y", "z", "phi", "theta", "psi"} <= set(record.output_names) and piece.states.shape[1] == len(
             PREDICTED
         ):
-            motion = measured_states(record, _nuisance(fit, record.name))
+            motion = measured_states(record, _nuisance(fit, record.log))
             for j, name in enumerate(PREDICTED):
                 if name not in record.output_names:
                     found.setdefault(name, []).append(
@@ -184,9 +184,9 @@ def _series(fit: Fit, pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
     return found
 
 
-def _nuisance(fit: Fit, record: str) -> Nuisance:
-    """The record's own delays, trims, lever and level, the mean ones where it has none."""
-    own = {e.name: e.value for e in fit.record_estimates if e.record == record and e.name in Nuisance._fields}
+def _nuisance(fit: Fit, log: str) -> Nuisance:
+    """The log's own delays, trims, lever and level, the mean ones where it has none."""
+    own = {e.name: e.value for e in fit.record_estimates if e.record == log and e.name in Nuisance._fields}
     return fit.nuisance._replace(**own)
 
 
@@ -235,7 +235,7 @@ def meanings(fit: Fit, words: Mapping[str, str]) -> Section:
             Cell(name, anchor=f"meaning-{name}"),
             Cell(words.get(name, "") or "–"),
             Cell(unit_words(units[name]) or "1"),
-            Cell("estimated for each record"),
+            Cell("estimated for each flight"),
             Cell("–"),
             Cell(""),
         )

@@ -177,11 +177,12 @@ def simulate_maneuver(
     pilot: bool = False,
     voltage: float | None = None,
     sag: float = 0.0,
+    speed: float = 0.0,
     rate: float = 100.0,
     wind: Mapping[str, ArrayLike] | None = None,
     environment: Environment | None = None,
 ) -> Flight:
-    """A maneuver flown from hover with a controller that keeps the vehicle around.
+    """A maneuver flown from hover or steady flight with a controller that keeps the vehicle there.
 
     Args:
         vehicle: what flies.
@@ -192,13 +193,14 @@ def simulate_maneuver(
             the controller commands.
         voltage: battery voltage at the start [V].
         sag: how much the voltage falls per second [V/s].
+        speed: speed ahead that it begins at [m/s].
         rate: samples per second [Hz].
         wind, environment: as in `simulate_closed_loop`.
     """
     excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
-    start = trim(vehicle, voltage=voltage, environment=environment)
+    start = trim(vehicle, speed=speed, voltage=voltage, environment=environment)
     commanded = [axis for axis in excitation.axes if pilot and axis in REFERENCES]
     signals = excitation.signals(time - lead)
     return simulate_closed_loop(

@@ -10,6 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -143,6 +144,6 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
     )
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _jacobians(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
     return jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))(x, w, p)  # type: ignore[no-any-return]

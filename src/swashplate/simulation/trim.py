@@ -16,6 +16,7 @@ from swashplate.errors import TrimError
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -25,6 +26,7 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.vehicles.structure import leaves
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -47,6 +49,7 @@ class Trim:
         environment: wind, air, gravity and voltage that it holds for.
         speed, lateral, climb: velocity ahead, to the right (both level, in the direction of heading) and up [m/s].
         residual: the largest rate of change left [SI units].
+        turn: rate of turn to the right [rad/s].
     """
 
     state: Array
@@ -58,6 +61,7 @@ class Trim:
     lateral: float
     climb: float
     residual: float
+    turn: float = 0.0
 
     def states(self) -> dict[str, float]:
         """The states by name."""
@@ -69,7 +73,10 @@ class Trim:
 
     def __repr__(self) -> str:
         head = f"Trim at {self.speed:g} m/s ahead, {self.lateral:g} m/s right, {self.climb:g} m/s up, "
-        head += f"{float(self.environment.voltage):g} V (residual {self.residual:.1e})"
+        head += f"turning {np.degrees(self.turn):g} deg/s, " if self.turn else ""
+        if any(name.startswith("motor") for name in self.input_names):
+            head += f"{float(self.environment.voltage):g} V "
+        head = head.rstrip(", ") + f" (residual {self.residual:.1e})"
         lines = [
             f"  {name:<14}{round(value, 5) + 0.0: .5f}" for name, value in {**self.commands(), **self.states()}.items()
         ]
@@ -82,11 +89,14 @@ def trim(
     speed: float = 0.0,
     lateral: float = 0.0,
     climb: float = 0.0,
+    turn: float = 0.0,
     heading: float = 0.0,
+    height: float = 0.0,
     voltage: float | None = None,
     environment: Environment | None = None,
+    near: Trim | None = None,
 ) -> Trim:
-    """The steady straight flight of a vehicle at a given ground velocity, by Newton's method with exact derivatives.
+    """The steady flight of a vehicle at a given ground velocity, by Newton's method with exact derivatives.
 
     Attitude, inputs and inner states (disc tilt, bar, rotor speeds) are solved for so that every rate but that of
     the position vanishes.
@@ -94,9 +104,12 @@ def trim(
     Args:
         vehicle: whose state begins with a `RigidBody`.
         speed, lateral, climb: velocity ahead and to the right in the level plane of the heading, and up [m/s].
+        turn: rate of turn to the right [rad/s]; the velocity turns with the heading.
         heading: psi [rad].
+        height: above the local origin [m]; it matters only to a vehicle that can touch the ground.
         voltage: battery voltage [V], instead of the environment's.
         environment: surroundings; wind enters as it should (a trim in wind is not a trim in calm air).
+        near: a trim of the same vehicle to start from, e.g. at the speed before on a trim curve.
 
     Raises:
         TrimError: naming the input whose limit prevents it, or the state that does not come to rest.
@@ -108,7 +121,11 @@ def trim(
     if vehicle.state_names[:_BODY] != RigidBody._fields:
         raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
     equations = equations_of(vehicle)
-    course = np.array([speed, lateral, -climb, heading])
+    if turn and (surroundings.wind_north or surroundings.wind_east):
+        raise TrimError(
+            "a turn in wind is no steady flight.", where=vehicle.name, hint="Ask for the turn in calm air, or no turn."
+        )
+    course = np.array([speed, lateral, -climb, heading, turn, -height])
     row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
     p = parameter_row(vehicle, surroundings)
 
@@ -116,11 +133,16 @@ def trim(
         value, slope = _residual(equations, z, course, row, p)
         return np.asarray(value), np.asarray(slope)
 
-    z = _first_guess(vehicle, residual)
+    z = _first_guess(vehicle, residual) if near is None else _unknowns(vehicle, near)
     z, value = _newton(z, residual)
     state, inputs = (np.asarray(part) for part in _assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
-    where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up at {float(surroundings.voltage):g} V"
+    where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
+    battery = "voltage_nominal" in vehicle.parameter_names
+    if battery:
+        where += f" at {float(surroundings.voltage):g} V"
+    if turn:
+        where += f", turning {np.degrees(turn):g} deg/s"
     if not largest < _TOLERANCE:
         worst = _residual_names(vehicle)[int(np.argmax(np.nan_to_num(np.abs(value), nan=np.inf)))]
         raise TrimError(
@@ -130,22 +152,31 @@ def trim(
             hint="Ask for a slower flight, or check the card.",
         )
     _check_limits(vehicle, inputs, where)
-    return Trim(state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest)
+    return Trim(
+        state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest, turn
+    )
 
 
 def _assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
     """State and input rows from the unknowns: roll, pitch, inputs, inner states."""
-    n_inputs = len(equations.vehicle.input_names)
+    vehicle = equations.vehicle
+    held = dict(vehicle.trim_held)
+    n_inputs = len(vehicle.input_names) - len(held)
     attitude = Euler(z[0], z[1], course[3])
     c, s = jnp.cos(course[3]), jnp.sin(course[3])
     local = Vector(c * course[0] - s * course[1], s * course[0] + c * course[1], course[2])
     velocity = local_to_body(local, attitude, jax_backend())
-    zero = jnp.zeros(3)
-    state = jnp.concatenate([zero, jnp.stack(velocity), jnp.stack(attitude), zero, z[2 + n_inputs :]])
-    return state, z[2 : 2 + n_inputs]
+    # A steady turn about the vertical (Stevens, Lewis and Johnson 2016, sec. 3.6).
+    rates = local_to_body(Vector(0.0, 0.0, course[4]), attitude, jax_backend())
+    place = jnp.zeros(3).at[2].set(course[5])
+    state = jnp.concatenate([place, jnp.stack(velocity), jnp.stack(attitude), jnp.stack(rates), z[2 + n_inputs :]])
+    free = iter(range(2, 2 + n_inputs))
+    return state, jnp.stack(
+        [jnp.asarray(held[name]) if name in held else z[next(free)] for name in vehicle.input_names]
+    )
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _residual(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple[Any, Any]:
     """What should vanish, and its derivatives by the unknowns."""
 
@@ -166,13 +197,24 @@ def _residual_names(vehicle: Vehicle) -> tuple[str, ...]:
 
 def _first_guess(vehicle: Vehicle, residual: Any) -> Array:
     """Level, inputs in the middle of their ranges, and the inner states where these inputs hold them."""
-    middle = [0.5 * (low + high) for low, high in vehicle.input_limits]
-    inner = len(vehicle.state_names) - _BODY
-    z = np.array([0.0, 0.0, *middle, *np.zeros(inner)])
+    held = dict(vehicle.trim_held)
+    limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
+    middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
+    inside = list(leaves(vehicle.state))[_BODY:]
+    inner = len(inside)
+    z = np.array([0.0, 0.0, *middle, *inside])
     for _ in range(5):
         value, slope = residual(z)
         z[z.size - inner :] -= np.linalg.lstsq(slope[6:, z.size - inner :], value[6:], rcond=None)[0]
     return z
+
+
+def _unknowns(vehicle: Vehicle, known: Trim) -> Array:
+    """The unknowns of `_assemble` at a known trim."""
+    held = dict(vehicle.trim_held)
+    inputs = [value for name, value in known.commands().items() if name not in held]
+    attitude = [known.states()["phi"], known.states()["theta"]]
+    return np.array([*attitude, *inputs, *known.state[_BODY:]])
 
 
 def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
@@ -193,6 +235,7 @@ def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
 
 
 def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
+    battery = "voltage_nominal" in vehicle.parameter_names
     for name, value, (low, high) in zip(vehicle.input_names, inputs, vehicle.input_limits, strict=True):
         if not low <= value <= high:
             limit = high if value > high else low
@@ -200,7 +243,9 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
                 f"{where} needs {name} = {value:.3f}, but its limit is {limit:g}.",
                 where=vehicle.name,
                 channel=name,
-                hint="Ask for a slower flight, less payload or a fuller battery.",
+                hint="Ask for a slower flight, less payload or a fuller battery."
+                if battery
+                else "Ask for a slower flight or less weight.",
             )
 
 

@@ -113,7 +113,7 @@ def validate(
         measured.append(truth)
         for horizon in horizons:
             if horizon <= ahead:
-                for name, part in _at_horizon(piece, rivals, truth, horizon).items():
+                for name, part in _at_horizon(piece, rivals, horizon).items():
                     parts.setdefault((name, horizon), []).append(part)
         examples.extend(_examples(piece, own, noise, min(2.0, ahead)))
         settled = round(calibration / piece.dt)
@@ -166,18 +166,22 @@ def _filled(usual: _T, given: Mapping[str, float]) -> _T:
     return usual._replace(**known)
 
 
-def _at_horizon(
-    piece: Record, rivals: Mapping[str, _Rival], truth: Array, horizon: float
-) -> dict[str, tuple[Array, Array, Array]]:
-    """Predicted, true and starting states of every predictor at one horizon."""
+def _at_horizon(piece: Record, rivals: Mapping[str, _Rival], horizon: float) -> dict[str, tuple[Array, Array, Array]]:
+    """Predicted, true and starting states of every predictor at one horizon.
+
+    What was measured is carried to the centre of gravity by each vehicle's own lever arm; without a vehicle, by the
+    model's.
+    """
     ahead = round(horizon / piece.dt)
     starts = rivals["model"].predictions.starts
     counted = starts + ahead < piece.time.size - round(_EDGE / piece.dt)
     first = starts[counted]
+    truths = {name: measured_states(piece, r.nuisance) for name, r in rivals.items()}
     made = {
-        name: (r.predictions.states[counted, ahead - 1], truth[first + ahead], truth[first])
+        name: (r.predictions.states[counted, ahead - 1], truths[name][first + ahead], truths[name][first])
         for name, r in rivals.items()
     }
+    truth = truths["model"]
     for name, kind in (("hold", "hold"), ("constant rates", "rates")):
         made[name] = (naive(truth, first, ahead, piece.dt, kind=kind), truth[first + ahead], truth[first])
     return made

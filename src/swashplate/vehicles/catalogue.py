@@ -10,9 +10,10 @@ from typing import Any
 from swashplate.errors import CardError
 from swashplate.vehicles.card import Card, packaged_cards, read_card
 from swashplate.vehicles.coax import coax
+from swashplate.vehicles.conventional import conventional
 from swashplate.vehicles.vehicle import Vehicle
 
-_EQUATIONS: Mapping[str, Callable[[Card], Vehicle]] = {"coax": coax}
+_EQUATIONS: Mapping[str, Callable[[Card], Vehicle]] = {"coax": coax, "conventional": conventional}
 
 
 def from_card(card: Card) -> Vehicle:

@@ -29,6 +29,7 @@ class Vehicle:
         input_names, input_limits: the inputs and their (lower, upper).
         derivatives: `derivatives(state, inputs, parameters, environment, xp)` in nested form.
         specific_force: what accelerometers at the CG read [m/s^2], same arguments, returns three scalars.
+        trim_held: inputs that a trim does not solve for, with their values (a throttle that a governor stands behind).
     """
 
     card: Card
@@ -41,6 +42,7 @@ class Vehicle:
     input_limits: tuple[tuple[float, float], ...]
     derivatives: Derivatives
     specific_force: Derivatives
+    trim_held: tuple[tuple[str, float], ...] = ()
 
     @property
     def name(self) -> str:

@@ -12,7 +12,18 @@ from typing import Any, Protocol, cast
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import coax56, delimited, netcdf, optitrack, vicon
+from swashplate.flights.readers import (
+    analogue,
+    ardupilot,
+    coax56,
+    delimited,
+    netcdf,
+    optitrack,
+    px4log,
+    rosbag,
+    ulog,
+    vicon,
+)
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
 
@@ -29,7 +40,7 @@ class Reader(Protocol):
 
 
 # Asked in this order; the plain table comes last because nearly any text looks like one.
-READERS = cast(tuple[Reader, ...], (coax56, netcdf, optitrack, vicon, delimited))
+READERS = cast(tuple[Reader, ...], (ardupilot, px4log, ulog, rosbag, coax56, netcdf, optitrack, vicon, delimited))
 
 
 def read(
@@ -43,18 +54,22 @@ def read(
     world_axes: str | None = None,
     bad_stamps: str = "error",
 ) -> Flight:
-    """Reads a flight log: a CoaX-56 `.mat` record, a swashplate netCDF or CSV file, a Vicon or OptiTrack CSV export.
+    """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, a ROS bag (1 or 2), a
+    CoaX-56 `.mat` record, a swashplate netCDF or CSV file, a Vicon or OptiTrack CSV export.
+
+    ULog files and ROS bags need `pip install swashplate[logs]`.
 
     Args:
-        path: the file.
+        path: the file, or the folder of a rosbag2.
         units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
             or the wrong ones.
         mapping: a TOML file, or its content as a dictionary, that says which columns of a CSV file are which channels
-            (`readers/delimited.py`); its table `[mocap]` may hold the next four.
+            (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a table `[recorder]` it is the
+            calibration of an analogue recorder (`readers/analogue.py`).
         body: the tracked body, where a motion capture file has several.
         rotation: how three logged angles are meant: "helical" or "euler_xyz", where the file does not say.
-        body_axes: where the tracked body's logged axes point, for example "forward-left-up".
-        world_axes: where the room's logged axes point, for example "north-west-up".
+        body_axes: where the tracked body's logged axes point, for example "forward-left-up" (a bag's default).
+        world_axes: where the room's logged axes point, for example "north-west-up" (a bag's default: "east-north-up").
         bad_stamps: "error", or "drop" to leave out samples whose time repeats or goes backwards.
 
     Returns:
@@ -73,13 +88,16 @@ def read(
         world_axes=world_axes,
         bad_stamps=bad_stamps,
     )
+    if analogue.is_calibration(options.mapping):
+        return analogue.read(source, options)
     for reader in READERS:
         if reader.recognises(source):
             return reader.read(source, options)
     raise FlightError(
         f"is no flight log that is known; it starts with {source.content[:8]!r}.",
         where=source.path,
-        hint="Known are CoaX-56 .mat, swashplate netCDF (.nc), CSV, and the CSV exports of Vicon and OptiTrack.",
+        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), ROS bags, CoaX-56 .mat, swashplate netCDF (.nc), "
+        "CSV, and the CSV exports of Vicon and OptiTrack.",
     )
 
 

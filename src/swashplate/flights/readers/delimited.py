@@ -2,6 +2,7 @@
 
 A mapping file is TOML; with one, only the channels it names are read:
 
+    rate = 50                # optional: Hz, where the table has no time column
     delimiter = ","          # optional: comma, semicolon and tab are told apart without it
     header = true            # false where the first line is data already; then columns are numbers from 1
 
@@ -30,7 +31,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
-from swashplate.flights.schema import CHANNELS, channel
+from swashplate.flights.schema import channel, is_known
 
 NAME = "csv"
 VERSION = "1"
@@ -39,7 +40,7 @@ Array = NDArray[np.float64]
 
 _HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?$", re.DOTALL)
 _COLUMN_KEYS = {"column", "unit", "factor", "offset"}
-_MAPPING_KEYS = {"delimiter", "header", "channels", "mocap"}
+_MAPPING_KEYS = {"delimiter", "header", "channels", "mocap", "rate"}
 
 
 @dataclass(frozen=True)
@@ -190,7 +191,10 @@ def read(source: Source, options: Options) -> Flight:
             hint="Add a header such as 'time [s],phi [deg]', or use a mapping file with header = false.",
         )
     columns = _from_mapping(options.mapping, header, source) if options.mapping else _from_header(header or [], source)
-    if "time" not in columns:
+    rate = options.mapping.get("rate")
+    if rate is not None and (isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf):
+        raise FlightError(f"rate = {rate!r} in the mapping is not a positive number.", where=source.name)
+    if "time" not in columns and rate is None:
         raise FlightError(
             f"there is no time column; found {', '.join(columns) or 'nothing'}.",
             where=source.name,
@@ -219,12 +223,12 @@ def read(source: Source, options: Options) -> Flight:
             scaled = raw if (place.factor, place.offset) == (1.0, 0.0) else raw * place.factor + place.offset
         channels[name], labels[name] = _inside(scaled, name, options.units.get(name, place.unit), source)
         checks.finite(channels[name], channel=name, where=source.name)  # a factor can overflow
-    time = channels.pop("time")
+    time = channels.pop("time") if "time" in channels else np.arange(len(rows)) / float(rate or 1.0)
     if not channels:
         raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
     keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
     channels = {name: values[keep] for name, values in channels.items()}
-    foreign = {name: labels[name] for name in channels if name not in CHANNELS}
+    foreign = {name: labels[name] for name in channels if not is_known(name)}
     notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
     return Flight(
         streams={"log": stream(time[keep], channels, foreign)},

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Provenance
@@ -17,6 +18,7 @@ LARGEST_CONTENT = 2 << 30
 # numbers hardly shrink; beyond this ratio the sizes in the header are nonsense.
 _FREE_CONTENT = 16 << 20
 _LARGEST_RATIO = 40
+_FOLDER_MARK = "metadata.yaml"  # of a rosbag2 folder
 
 
 @dataclass(frozen=True)
@@ -55,14 +57,14 @@ class Source:
             control = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in self.content[:4096])
             return None if control else self.content.decode("latin-1")
 
-    def provenance(self, reader: str, version: str, *, vehicle: str = "", notes: tuple[str, ...] = ()) -> Provenance:
+    def provenance(self, reader: str, version: str, **found: Any) -> Provenance:
+        """The file's name and hash, the reader's, and what it `found` (vehicle, notes, damage, parameters, events)."""
         return Provenance(
             source=self.path.name,
             sha256=self.sha256,
             reader=reader,
             reader_version=version,
-            vehicle=vehicle,
-            notes=notes,
+            **found,
         )
 
 
@@ -83,24 +85,33 @@ def refuse_oversized(claimed: int, *, size: int, where: str, what: str) -> None:
         )
 
 
+def _files(place: Path) -> list[Path]:
+    """The files of a log: itself, or those of a rosbag2 folder, its metadata first."""
+    if not place.is_dir():
+        return [place]
+    metadata = place / _FOLDER_MARK
+    if not metadata.is_file():
+        raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
+    return [metadata, *sorted(file for file in place.iterdir() if file.is_file() and file != metadata)]
+
+
 def open_source(path: str | Path) -> Source:
-    """Reads a file's bytes.
+    """Reads a log's bytes: those of a file, or of all files of a rosbag2 folder.
 
     Raises:
         FlightError: where it is missing, a folder, unreadable, empty or too large.
     """
     place = Path(path)
     try:
-        if place.is_dir():
-            raise FlightError("is a folder, expected a flight log.", where=place, hint="Name one file in it.")
-        size = place.stat().st_size
+        files = _files(place)
+        size = sum(file.stat().st_size for file in files)
         if size > LARGEST_FILE:
             raise FlightError(
                 f"has {size:,} bytes; the largest file that is read has {LARGEST_FILE:,}.",
                 where=place,
                 hint="Split it into shorter flights.",
             )
-        content = place.read_bytes()
+        content = b"".join(file.read_bytes() for file in files)
     except FileNotFoundError:
         raise FlightError("there is no such file.", where=place, hint="Check the path.") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte

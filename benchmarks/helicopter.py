@@ -1,0 +1,62 @@
+"""The single-rotor helicopter: compiled simulation, trims and derivatives over speed, LPV as printed."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+
+from benchmarks.timing import Result, best_rate
+from swashplate.simulation.derivatives import derivative_table
+from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
+from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.lpv import simulate_lpv
+from swashplate.simulation.reduction import PAPER_INPUTS
+from swashplate.simulation.speeds import trims_over_speed
+from swashplate.simulation.trim import trim
+from swashplate.vehicles.catalogue import vehicle
+
+SCAN_TARGET = 100_000.0
+SPEEDS_TARGET = 50.0
+LPV_TARGET = 100_000.0
+"""Steps per second; trims with derivatives per second; steps per second (100 times real time at 1 kHz)."""
+
+
+def scan(*, steps: int, repeats: int) -> Result:
+    """The compiled loop with flapping, bar and dynamic inflow (19 states), Runge-Kutta at 1 kHz."""
+    flown = vehicle("raptor50", bar=True, inflow="pitt-peters")
+    hover = trim(flown)
+    row = np.array([*hover.inputs, *(getattr(hover.environment, name) for name in SURROUNDINGS)])
+    p = parameter_row(flown, hover.environment)
+    arguments = jax.device_put((np.array(hover.state), np.tile(row, (steps + 1, 1)), p, 0.001))
+
+    def run() -> None:
+        jax.block_until_ready(trajectory(equations_of(flown), *arguments, substeps=1, held=True))
+
+    return Result(
+        "helicopter, compiled scan", best_rate(run, steps, repeats=repeats), SCAN_TARGET, "19 states, float64"
+    )
+
+
+def speeds(*, repeats: int) -> Result:
+    """Trim and all 60 derivatives by contributor at 50 speeds, warm."""
+    flown = vehicle("raptor50")
+    wanted = np.linspace(0.0, 15.0, 50)
+
+    def run() -> None:
+        for at in trims_over_speed(flown, wanted):
+            derivative_table(flown, at)
+
+    return Result("trims with derivatives", best_rate(run, 50, repeats=repeats), SPEEDS_TARGET, "per second, 0-15 m/s")
+
+
+def lpv(*, steps: int, repeats: int) -> Result:
+    """The LPV scheme as printed: A and B anew at each step."""
+    flown = vehicle("raptor50")
+    hover = trim(flown)
+    controls = {name: np.full(steps, hover.commands()[name]) for name in PAPER_INPUTS}
+
+    def run() -> None:
+        simulate_lpv(flown, controls, start=hover, scheme="as-printed", rate=1000.0)
+
+    rate = best_rate(run, steps, repeats=repeats)
+    return Result("LPV as printed", rate, LPV_TARGET, f"{rate / 1000.0:.0f} times real time at 1 kHz")

@@ -1,0 +1,124 @@
+"""What a vehicle is asked to fly, as three verbs share it: card, changes to it, speed, climb, turn, wind, altitude."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from swashplate.cli import options
+from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.physics.environment import Environment
+    from swashplate.simulation.trim import Trim
+    from swashplate.vehicles.vehicle import Vehicle
+
+_RANGE_POINTS = 11
+
+Name = Annotated[str, typer.Argument(metavar="VEHICLE", help="A vehicle's name, or a card or model file.")]
+Speed = Annotated[
+    str, typer.Option("--speed", metavar="V", help='Speed ahead [m/s]: "5", or a range "0-15" or "0-15/2.5".')
+]
+Climb = Annotated[float, typer.Option("--climb", help="Climb rate [m/s], negative sinks.")]
+Lateral = Annotated[float, typer.Option("--lateral", help="Speed to the right [m/s].")]
+Turn = Annotated[float, typer.Option("--turn", help="Rate of turn to the right [deg/s].")]
+Wind = Annotated[str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")]
+Altitude = Annotated[float, typer.Option("--altitude", help="Altitude in the standard atmosphere [m].")]
+Mass = Annotated[float | None, typer.Option("--mass", help="Mass instead of the card's [kg].")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Another number of the card; may be repeated.")
+]
+Switch = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Another option of the card, e.g. bar=true; may be repeated."),
+]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """A vehicle and what it flies: speeds [m/s] and the rest of the course, in an environment."""
+
+    vehicle: Vehicle
+    speeds: tuple[float, ...]
+    climb: float
+    lateral: float
+    turn: float
+    environment: Environment
+
+    def trims(self) -> tuple[Trim, ...]:
+        """A trim at every speed."""
+        from swashplate.simulation.speeds import trims_over_speed
+
+        return trims_over_speed(
+            self.vehicle,
+            self.speeds,
+            climb=self.climb,
+            lateral=self.lateral,
+            turn=self.turn,
+            environment=self.environment,
+        )
+
+
+def speeds(text: str) -> tuple[float, ...]:
+    """One speed, or a range A-B or A-B/STEP, ascending."""
+    number = r"\d+(?:\.\d*)?|\.\d+"
+    if found := re.fullmatch(rf"({number})-({number})(?:/({number}))?", text.strip()):
+        low, high = float(found[1]), float(found[2])
+        step = float(found[3]) if found[3] else (high - low) / (_RANGE_POINTS - 1)
+        if not (low < high and step > 0.0 and (high - low) / step <= 500):
+            raise SwashError(f"'{text}' is no ascending range of at most 500 speeds.", channel="--speed")
+        return tuple(low + i * step for i in range(int((high - low) / step + 1e-9) + 1))
+    return (options.numbers(text, option="--speed", count=1)[0],)
+
+
+def _switch(text: str) -> Any:
+    return {"true": True, "false": False}.get(text.lower(), text)
+
+
+def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None, mass: float | None = None) -> Vehicle:
+    """A vehicle with other numbers and options."""
+    from swashplate.vehicles.catalogue import from_card
+    from swashplate.vehicles.catalogue import vehicle as find
+
+    switches = options.assignments(switched, option="--option")
+    made = find(name, **{key: _switch(value) for key, value in switches.items()})
+    numbers = {
+        key: options.numbers(value, option="--set", count=1)[0]
+        for key, value in options.assignments(changed, option="--set").items()
+    }
+    if mass is not None:
+        numbers["mass"] = mass
+    return from_card(made.card.with_values(numbers, source="the command line", status="assumed")) if numbers else made
+
+
+def conditions(
+    name: str,
+    *,
+    speed: str,
+    climb: float = 0.0,
+    lateral: float = 0.0,
+    turn: float = 0.0,
+    wind: str = "0,0,0",
+    altitude: float = 0.0,
+    mass: float | None = None,
+    changed: list[str] | None = None,
+    switched: list[str] | None = None,
+) -> Conditions:
+    """The conditions that the options describe; JAX is set up by this."""
+    from swashplate.physics.atmosphere import air_density
+    from swashplate.physics.environment import Environment
+    from swashplate.simulation.compilation import enable_compilation_cache
+
+    made = vehicle_of(name, changed, switched, mass)
+    enable_compilation_cache()
+    if not -500.0 <= altitude <= 11_000.0:
+        raise SwashError(f"is {altitude:g} m, expected -500 to 11000.", channel="--altitude")
+    north, east, down = options.numbers(wind, option="--wind", count=3)
+    around = Environment(north, east, down, air_density(altitude))
+    if "voltage_nominal" in made.parameter_names:
+        around = around._replace(voltage=made.card.values()["voltage_nominal"])
+    return Conditions(made, speeds(speed), climb, lateral, math.radians(turn), around)

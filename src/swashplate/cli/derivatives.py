@@ -1,0 +1,144 @@
+"""`swash derivatives`: stability and control derivatives of a single-rotor helicopter, by contributor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from swashplate.cli import conditions as given
+from swashplate.cli import options
+from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.vehicles.derivatives import DerivativeTable
+
+
+def derivatives(
+    vehicle: given.Name,
+    speed: given.Speed = "0",
+    climb: given.Climb = 0.0,
+    lateral: given.Lateral = 0.0,
+    turn: given.Turn = 0.0,
+    wind: given.Wind = "0,0,0",
+    altitude: given.Altitude = 0.0,
+    mass: given.Mass = None,
+    changed: given.Set = None,
+    switched: given.Switch = None,
+    imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as Bhandari et al. have them.")] = False,
+    uncertainty: Annotated[
+        bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
+    ] = False,
+    draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Stability and control derivatives: force per mass and moment per inertia, split by what contributes to them."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.simulation.derivatives import derivative_table
+    from swashplate.simulation.uncertainty import spread
+    from swashplate.vehicles.derivatives import factor_to_feet, split_name, unit
+
+    asked = given.conditions(
+        vehicle,
+        speed=speed,
+        climb=climb,
+        lateral=lateral,
+        turn=turn,
+        wind=wind,
+        altitude=altitude,
+        mass=mass,
+        changed=changed,
+        switched=switched,
+    )
+    if uncertainty and len(asked.speeds) > 1:
+        raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
+    found = asked.trims()
+    tables = [derivative_table(asked.vehicle, at) for at in found]
+    wide = spread(asked.vehicle, found[0], draws=draws, seed=seed) if uncertainty else None
+    if plot is not None:
+        from swashplate.reporting.speed_page import speed_page
+
+        speed_page(asked.vehicle, found, path=plot, tables=tables)
+    factors = {name: factor_to_feet(*split_name(name)) if imperial else 1.0 for name in tables[0].names()}
+    if json:
+        document = [
+            {
+                "speed": at.speed,
+                "derivatives": {
+                    name: {
+                        "value": table[name] * factors[name],
+                        "unit": unit(name, imperial=imperial),
+                        "by": {part: value * factors[name] for part, value in _parts(table, name).items()},
+                        **({"5 %": low, "95 %": high} if (low := _bound(wide, name, 1)) is not None else {}),
+                    }
+                    for name in table.names()
+                    for high in (_bound(wide, name, 2),)
+                },
+            }
+            for at, table in zip(found, tables, strict=True)
+        ]
+        typer.echo(as_json({"vehicle": vehicle, "tables": document}))
+        return
+    for at, table in zip(found, tables, strict=True):
+        typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
+        console().print(_shown(table, factors, imperial=imperial, wide=wide))
+    if wide is not None:
+        typer.echo(f"\n5 % and 95 % bounds of {wide.draws} samples of the card ({wide.refused} could not be trimmed).")
+        _modes(wide)
+    if plot is not None:
+        typer.echo(f"Written: {plot}")
+
+
+def _parts(table: DerivativeTable, name: str) -> dict[str, float]:
+    from swashplate.vehicles.derivatives import split_name
+
+    row, column = split_name(name)
+    return {part: float(block[row, column]) for part, block in table.parts.items()}
+
+
+def _bound(wide: Any, name: str, place: int) -> float | None:
+    return None if wide is None else float(wide.derivatives[name][place])
+
+
+def _shown(table: DerivativeTable, factors: dict[str, float], *, imperial: bool, wide: Any) -> Any:
+    from swashplate.cli.tables import table as tabulate
+    from swashplate.vehicles.derivatives import unit
+
+    head = ["derivative", "unit", "total", *(part.replace("_", " ") for part in table.parts)]
+    if wide is not None:
+        head += ["5 %", "95 %"]
+    rows = []
+    for name in table.names():
+        total = table[name] * factors[name]
+        if abs(total) < 1e-9:
+            continue
+        row = [name, unit(name, imperial=imperial), f"{total:.4g}"]
+        for value in _parts(table, name).values():
+            row.append(f"{value * factors[name]:.3g}" if abs(value) > 1e-9 else "-")
+        if wide is not None:
+            row += [f"{wide.derivatives[name][place] * factors[name]:.4g}" for place in (1, 2)]
+        rows.append(row)
+    return tabulate(head, rows, left=2)
+
+
+def _modes(wide: Any) -> None:
+    import numpy as np
+
+    from swashplate.cli.console import console
+    from swashplate.cli.tables import table as tabulate
+
+    rows = []
+    for i in np.argsort(-np.abs(wide.eigenvalues), kind="stable"):
+        value = wide.eigenvalues[i]
+        if value.imag < 0.0 or abs(value) < 1e-6:
+            continue
+        real = np.quantile(wide.samples[:, i].real, [0.05, 0.95])
+        imag = np.quantile(np.abs(wide.samples[:, i].imag), [0.05, 0.95])
+        shown = f"{value.real:+.3f}" + (f" +/- {value.imag:.3f}j" if value.imag else "")
+        rows.append((shown, f"{real[0]:+.3f} .. {real[1]:+.3f}", f"{imag[0]:.3f} .. {imag[1]:.3f}"))
+    console().print(tabulate(("mode [1/s]", "real part", "frequency"), rows))

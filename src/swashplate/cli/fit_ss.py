@@ -1,0 +1,126 @@
+"""`swash fit-ss`: state-space models from frequency responses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli import flying, options
+from swashplate.cli.reading import Reading
+
+if TYPE_CHECKING:
+    from swashplate.control.ardupilot_gains import Suggestion
+
+FILES = ("report.html", "fit.json", "model.toml", "verification.json")
+
+
+def fit_ss(
+    structure: Annotated[
+        str,
+        typer.Argument(
+            metavar="STRUCTURE",
+            help="A model file, or a ready structure: six_dof, hybrid, thirteen_state, coaxial, rotor_body, heave.",
+        ),
+    ],
+    responses: flying.Responses,
+    out: options.OutFolder = None,
+    start: Annotated[
+        list[str] | None, typer.Option("--start", metavar="NAME=VALUE", help="Start value of a parameter.")
+    ] = None,
+    start_from: Annotated[
+        str | None,
+        typer.Option("--start-from", metavar="VEHICLE", help="Start from a vehicle's linearisation in hover."),
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")
+    ] = None,
+    band: flying.BandOption = None,
+    coherence: flying.Coherence = 0.6,
+    reduce: Annotated[bool, typer.Option("--reduce", help="Take out what the responses do not tell.")] = False,
+    starts: Annotated[int, typer.Option("--starts", help="Starting points that are followed.", min=1)] = 4,
+    seed: Annotated[int, typer.Option("--seed", help="Of the starting points.", min=0)] = 0,
+    gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
+    hold_out: options.HoldOut = None,
+    rate: options.Rate = 100.0,
+    cutoff: options.Cutoff = 0.0,
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fit a state-space model, with accuracy figures, and verify it in time on flights that the fit has not seen.
+
+    Writes report.html, model.toml, fit.json and (with --hold-out) verification.json to --out.
+    """
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.control.ardupilot_gains import suggest_gains
+    from swashplate.identification.reduction import reduce as reduced
+    from swashplate.identification.state_space_file import structure as find
+    from swashplate.identification.state_space_file import to_toml
+    from swashplate.identification.state_space_fit import fit_state_space
+    from swashplate.identification.verification import verify
+    from swashplate.reporting.response_report import response_report
+    from swashplate.reporting.sections_responses import ResponseMaterial
+
+    model = find(structure)
+    found, limits = flying.load_responses(responses), flying.band(band)
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
+        if start_from is not None:
+            line.say("linearising the vehicle")
+            import swashplate as sp
+            from swashplate.identification.start_values import from_linear_model
+
+            model = from_linear_model(model, sp.linearize(sp.vehicle(start_from)))
+        values = {
+            n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
+        }
+        model = model.with_values(values).with_values(options.fixed_values(fix), free=False)
+        line.say("fitting")
+        fit = fit_state_space(
+            model,
+            found,
+            band=limits,
+            least_coherence=coherence,
+            starts=starts,
+            seed=seed,
+            progress=lambda i, cost: line.say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
+        )
+        if reduce:
+            fit = reduced(fit, progress=lambda i, cost: line.say("reducing", note=f"step {i}, J_ave {cost:.4g}"))
+        verification = None
+        if hold_out:
+            line.say("flying the model along what the fit has not seen")
+            channels = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
+            flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
+            verification = flying.seen_before(verify(fit.model, flights), found.sources)
+        suggested = suggest_gains(fit.model) if gains else ()
+        if folder is not None:
+            line.say("writing the report")
+            material = ResponseMaterial(found, fit=fit, verification=verification, gains=suggested)
+            response_report(material, path=folder / "report.html")
+            write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+            write_text(folder / "model.toml", to_toml(fit.model))
+            if verification is not None:
+                write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
+    if json:
+        document = {"fit": fit.as_dict(), "verification": verification and verification.as_dict()}
+        typer.echo(as_json({**document, "gains": [vars(s) for s in suggested]}))
+    elif not quiet:
+        typer.echo(repr(fit))
+        if verification is not None:
+            typer.echo(f"\n{verification!r}")
+        typer.echo("".join(_gain_words(s) for s in suggested), nl=False)
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(fit.problems)
+
+
+def _gain_words(s: Suggestion) -> str:
+    rows = "".join(f"  {name:<18}{value:>10.4f}\n" for name, value in s.parameters.items())
+    m = s.margins
+    return f"\n{s.axis}: phase margin {m.phase_margin!r} deg, gain margin {m.gain_margin!r} dB\n{rows}"

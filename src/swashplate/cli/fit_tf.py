@@ -1,0 +1,105 @@
+"""`swash fit-tf`: transfer functions from frequency responses."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import flying, options
+from swashplate.cli.reading import Reading
+
+FILES = ("report.html", "fit.json", "model.toml", "verification.json")
+
+
+def fit_tf(
+    responses: flying.Responses,
+    input: Annotated[str, typer.Option("--input", help="The input channel.")],
+    outputs: Annotated[
+        str | None, typer.Option("--outputs", help="Output channels with shared poles; all where not given.")
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--form", help='Zeros/poles: "1/2", "0/1+1s" (integrator), "0/0" (gain and delay); else tried.'),
+    ] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter, for example tau=0.05.")
+    ] = None,
+    band: flying.BandOption = None,
+    coherence: flying.Coherence = 0.6,
+    hold_out: options.HoldOut = None,
+    out: options.OutFolder = None,
+    rate: options.Rate = 100.0,
+    cutoff: options.Cutoff = 0.0,
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fit transfer functions with a delay; without --form the usual structures are tried and one is suggested.
+
+    Writes report.html, fit.json and (where it can be flown) model.toml to --out; --hold-out verifies it in time.
+    """
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.errors import IdentificationError
+    from swashplate.identification.state_space_file import to_toml
+    from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
+    from swashplate.identification.verification import verify
+    from swashplate.reporting.response_report import response_report
+    from swashplate.reporting.sections_responses import ResponseMaterial
+
+    found = flying.load_responses(responses)
+    limits, wanted = flying.band(band), flying.names(outputs) or None
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
+        line.say("fitting")
+        trials: tuple = ()  # type: ignore[type-arg]
+        if form is None and not fix:
+            best, trials = suggest(found, input=input, outputs=wanted, band=limits, least_coherence=coherence)
+            fit = best.fit
+        else:
+            fit = fit_transfer_function(
+                found,
+                form or "1/2",
+                input=input,
+                outputs=wanted,
+                band=limits,
+                fixed=options.fixed_values(fix),
+                least_coherence=coherence,
+            )
+        model = verification = None
+        try:
+            model = as_state_space(fit)
+        except IdentificationError as error:
+            if hold_out:
+                raise
+            line.say(str(error))
+        if hold_out and model is not None:
+            line.say("flying the model along what the fit has not seen")
+            channels = (*model.inputs, *model.outputs)
+            flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
+            verification = flying.seen_before(verify(model, flights), found.sources)
+        if folder is not None:
+            pairs = tuple(m.output for m in fit.models)
+            material = ResponseMaterial(found.select(pairs, (input,)), (fit,), trials, verification=verification)
+            response_report(material, path=folder / "report.html")
+            write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+            if model is not None:
+                write_text(folder / "model.toml", to_toml(model))
+            if verification is not None:
+                write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
+    if json:
+        document = {"fit": fit.as_dict(), "verification": verification and verification.as_dict()}
+        typer.echo(as_json({**document, "tried": [{"form": t.form.text, "J": t.cost} for t in trials]}))
+    elif not quiet:
+        if trials:
+            lines = [f"  {t.form.text:<10}{t.parameters:>3} parameters   J = {t.cost:8.1f}" for t in trials]
+            typer.echo("Structures tried (zeros/poles):\n" + "\n".join(lines) + "\n")
+        typer.echo(repr(fit))
+        if verification is not None:
+            typer.echo(f"\n{verification!r}")
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")

@@ -1,0 +1,80 @@
+"""`swash respond`: frequency responses from the logs of sweeps."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import flying, options
+from swashplate.cli.reading import Reading
+
+FILES = (flying.RESPONSES, "responses.json", "report.html")
+
+
+def respond(
+    log: Annotated[
+        list[str], typer.Argument(metavar="LOG...", help="Logs of sweeps; FILE@5-30 takes seconds 5 to 30.")
+    ],
+    inputs: Annotated[str, typer.Option("--inputs", help="Input channels, separated by commas: all that moved.")],
+    outputs: Annotated[
+        str, typer.Option("--outputs", help="Output channels, separated by commas; NAME=CHANNEL renames, as az=az_sid.")
+    ],
+    out: options.OutFolder = None,
+    references: Annotated[
+        str,
+        typer.Option(
+            "--references", help="Injected excitation, for logs flown in a loop: the joint input-output estimate."
+        ),
+    ] = "",
+    band: flying.BandOption = None,
+    windows: Annotated[
+        str | None, typer.Option("--windows", help="Window lengths in s, separated by commas; by the book's rules.")
+    ] = None,
+    rate: options.Rate = 100.0,
+    cutoff: options.Cutoff = 0.0,
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Frequency responses of outputs to inputs: conditioned on all inputs, composite over windows, with errors.
+
+    Writes responses.nc, responses.json and report.html to --out. What could not be computed is named with exit code 2;
+    the rest is written and marked.
+    """
+    from swashplate.atomic import write_text
+    from swashplate.cli.console import as_json, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.identification.respond import respond as answer
+    from swashplate.reporting.response_report import response_report
+    from swashplate.reporting.sections_responses import ResponseMaterial
+
+    ins, outs = flying.renamed(inputs, option="--inputs"), flying.renamed(outputs, option="--outputs")
+    refs = flying.names(references)
+    limits = flying.band(band)
+    lengths = None if windows is None else options.numbers(windows, option="--windows")
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    with progress(quiet=quiet or json) as line:
+        line.say("reading logs")
+        channels = (*ins.values(), *outs.values(), *refs)
+        flights = flying.flown(log, channels, rate=rate, cutoff=cutoff, how=how)
+        flights = flying.with_names(flights, ins | outs)
+        with folder_when_complete(out, ours=FILES) as folder:
+            line.say("computing responses")
+            found = answer(
+                flights, inputs=tuple(ins), outputs=tuple(outs), references=refs, band=limits, windows=lengths
+            )
+            if folder is not None:
+                line.say("writing the report")
+                found.save(folder / flying.RESPONSES)
+                write_text(folder / "responses.json", as_json(found.as_dict()) + "\n")
+                response_report(ResponseMaterial(found), path=folder / "report.html")
+    if json:
+        typer.echo(as_json(found.as_dict()))
+    elif not quiet:
+        typer.echo(repr(found))
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(found.problems)

@@ -1,0 +1,163 @@
+"""`swash trim` and `swash linearize`: steady flight and the motions about it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from swashplate.cli import conditions as given
+from swashplate.cli import options
+
+if TYPE_CHECKING:
+    from swashplate.simulation.linearize import LinearModel
+    from swashplate.simulation.trim import Trim
+
+Page = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
+]
+
+
+def trim(
+    vehicle: given.Name,
+    speed: given.Speed = "0",
+    climb: given.Climb = 0.0,
+    lateral: given.Lateral = 0.0,
+    turn: given.Turn = 0.0,
+    wind: given.Wind = "0,0,0",
+    altitude: given.Altitude = 0.0,
+    mass: given.Mass = None,
+    changed: given.Set = None,
+    switched: given.Switch = None,
+    plot: Page = None,
+    json: options.Json = False,
+) -> None:
+    """Find the steady flight of a vehicle: attitude and controls, at one speed or over a range."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table
+    from swashplate.vehicles.helicopter_limits import doubts
+
+    asked = given.conditions(
+        vehicle,
+        speed=speed,
+        climb=climb,
+        lateral=lateral,
+        turn=turn,
+        wind=wind,
+        altitude=altitude,
+        mass=mass,
+        changed=changed,
+        switched=switched,
+    )
+    found = asked.trims()
+    remarks = [
+        f"At {at.speed:g} m/s {words}."
+        for at in found
+        for words in doubts(asked.vehicle, at.state, at.inputs, at.environment)
+    ]
+    if plot is not None:
+        from swashplate.reporting.speed_page import speed_page
+
+        speed_page(asked.vehicle, found, path=plot, remarks=remarks)
+    if json:
+        typer.echo(as_json({"vehicle": vehicle, "trims": [_document(at) for at in found], "remarks": remarks}))
+        return
+    if len(found) == 1:
+        typer.echo(repr(found[0]))
+    else:
+        units = dict(zip(asked.vehicle.state_names, asked.vehicle.state_units, strict=True))
+        angles = [name for name in ("phi", "theta", "a1", "b1") if name in units]
+        controls = asked.vehicle.input_names
+        head = ("speed [m/s]", *(f"{name} [{_unit(asked.vehicle, name)}]" for name in (*controls, *angles)))
+        rows = [
+            (f"{at.speed:g}", *(f"{_shown(asked.vehicle, name, at):.3f}" for name in (*controls, *angles)))
+            for at in found
+        ]
+        console().print(table(head, rows, left=0))
+    for remark in remarks:
+        typer.echo(f"Careful: {remark}", err=True)
+    if plot is not None:
+        typer.echo(f"Written: {plot}")
+
+
+def _unit(vehicle: Any, name: str) -> str:
+    return "1" if (name in vehicle.input_names and vehicle.name == "coax") or name == "throttle" else "deg"
+
+
+def _shown(vehicle: Any, name: str, at: Trim) -> float:
+    value = {**at.states(), **at.commands()}[name]
+    return math.degrees(value) if _unit(vehicle, name) == "deg" else value
+
+
+def _document(at: Trim) -> dict[str, Any]:
+    return {
+        "speed": at.speed,
+        "climb": at.climb,
+        "lateral": at.lateral,
+        "turn": at.turn,
+        "inputs": at.commands(),
+        "states": at.states(),
+        "residual": at.residual,
+    }
+
+
+def linearize(
+    vehicle: given.Name,
+    speed: given.Speed = "0",
+    climb: given.Climb = 0.0,
+    lateral: given.Lateral = 0.0,
+    turn: given.Turn = 0.0,
+    wind: given.Wind = "0,0,0",
+    altitude: given.Altitude = 0.0,
+    mass: given.Mass = None,
+    changed: given.Set = None,
+    switched: given.Switch = None,
+    plot: Page = None,
+    json: options.Json = False,
+) -> None:
+    """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
+    from swashplate.cli.console import as_json
+    from swashplate.simulation.linearize import linearize as about
+
+    asked = given.conditions(
+        vehicle,
+        speed=speed,
+        climb=climb,
+        lateral=lateral,
+        turn=turn,
+        wind=wind,
+        altitude=altitude,
+        mass=mass,
+        changed=changed,
+        switched=switched,
+    )
+    found = asked.trims()
+    models = [about(asked.vehicle, at) for at in found]
+    if plot is not None:
+        from swashplate.reporting.speed_page import speed_page
+
+        speed_page(asked.vehicle, found, path=plot)
+    if json:
+        typer.echo(as_json({"vehicle": vehicle, "models": [_matrices(model) for model in models]}))
+        return
+    for at, model in zip(found, models, strict=True):
+        typer.echo(f"At {at.speed:g} m/s\n{model!r}\n")
+    if plot is not None:
+        typer.echo(f"Written: {plot}")
+
+
+def _matrices(model: LinearModel) -> dict[str, Any]:
+    modes = [
+        {"real": m.eigenvalue.real, "imag": m.eigenvalue.imag, "damping": m.damping, "states": dict(m.states)}
+        for m in model.modes()
+    ]
+    return {
+        "speed": model.trim.speed,
+        "states": list(model.states),
+        "inputs": list(model.inputs),
+        "A": model.A,
+        "B": model.B,
+        "modes": modes,
+    }

@@ -1,0 +1,222 @@
+"""ArduPilot logs, binary (`.bin`) and text (`.log`): what was measured, commanded, received and set.
+
+Each message becomes a stream at its own rate. Quantities that several messages carry get the schema's plain name from
+the first in `_MESSAGES` that the log has (the fast ANG before ATT, the controller's RATE before the inertial sensor)
+and a suffix from the others (`phi_slow`, `p_imu`, `az_sid`). Times are the log's own: seconds since the autopilot's
+start.
+
+Source: ArduPilot's documentation of its log messages; units as given there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from swashplate.errors import FlightError
+from swashplate.flights import ardupilot_chirp
+from swashplate.flights.flight import Event, Flight
+from swashplate.flights.readers import checks, clocked, dataflash, dataflash_text
+from swashplate.flights.readers.ardupilot_events import seconds, story
+from swashplate.flights.readers.dataflash import Messages, Table
+from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.source import Source
+from swashplate.flights.schema import is_known
+
+NAME = "ardupilot"
+VERSION = "1"
+
+
+@dataclass(frozen=True)
+class _Message:
+    """How a message is read.
+
+    Attributes:
+        name: in the log; stream: ours.
+        fields: field -> (channel, unit in the log).
+        suffix: of channels that an earlier message has taken.
+        instance: (field, number) where the message carries several sensors.
+    """
+
+    name: str
+    stream: str
+    fields: Mapping[str, tuple[str, str]]
+    suffix: str = ""
+    instance: tuple[tuple[str, ...], int] | None = None
+
+
+_INSTANCE = ("I", "Inst", "Instance", "C")
+_INERTIAL = {
+    "GyrX": ("p", "rad/s"), "GyrY": ("q", "rad/s"), "GyrZ": ("r", "rad/s"),
+    "AccX": ("ax", "m/s^2"), "AccY": ("ay", "m/s^2"), "AccZ": ("az", "m/s^2"),
+}  # fmt: skip
+_ANGLES = {
+    "Roll": ("phi", "deg"), "Pitch": ("theta", "deg"), "Yaw": ("psi", "deg"),
+    "DesRoll": ("phi_demand", "deg"), "DesPitch": ("theta_demand", "deg"), "DesYaw": ("psi_demand", "deg"),
+}  # fmt: skip
+_ESTIMATE = {
+    "PN": ("x", "m"), "PE": ("y", "m"), "PD": ("z", "m"), "VN": ("vx", "m/s"), "VE": ("vy", "m/s"), "VD": ("vz", "m/s"),
+}  # fmt: skip
+
+_MESSAGES = (
+    _Message("RATE", "rates", {
+        "R": ("p", "deg/s"), "P": ("q", "deg/s"), "Y": ("r", "deg/s"),
+        "RDes": ("p_demand", "deg/s"), "PDes": ("q_demand", "deg/s"), "YDes": ("r_demand", "deg/s"),
+        "ROut": ("mixer_roll", "1"), "POut": ("mixer_pitch", "1"), "YOut": ("mixer_yaw", "1"),
+        "AOut": ("mixer_collective", "1"),
+    }),
+    _Message("ANG", "angles", _ANGLES),
+    _Message("ATT", "attitude", _ANGLES, "slow"),
+    _Message("IMU", "inertial", _INERTIAL, "imu", (_INSTANCE, 0)),
+    _Message("IMU", "inertial_2", _INERTIAL, "imu2", (_INSTANCE, 1)),
+    _Message("IMU", "inertial_3", _INERTIAL, "imu3", (_INSTANCE, 2)),
+    _Message("IMU2", "inertial_2", _INERTIAL, "imu2"),
+    _Message("IMU3", "inertial_3", _INERTIAL, "imu3"),
+    _Message("SIDD", "system_identification", {
+        "Targ": ("sid_target", ""), "F": ("sid_frequency", "Hz"),
+        "Gx": ("p", "deg/s"), "Gy": ("q", "deg/s"), "Gz": ("r", "deg/s"),
+        "Ax": ("ax", "m/s^2"), "Ay": ("ay", "m/s^2"), "Az": ("az", "m/s^2"),
+    }, "sid"),
+    _Message("RCIN", "received", {f"C{i}": (f"rcin_{i}", "us") for i in range(1, 17)}),
+    _Message("RCOU", "sent", {f"C{i}": (f"rcout_{i}", "us") for i in range(1, 17)}),
+    _Message("RPM", "rotor", {"RPM": ("omega_rotor", "rpm"), "rpm1": ("omega_rotor", "rpm")}, "", (_INSTANCE, 0)),
+    _Message("XKF1", "estimate", _ESTIMATE, "", (_INSTANCE, 0)),
+    _Message("NKF1", "estimate", _ESTIMATE, "", (_INSTANCE, 0)),
+    _Message("BARO", "barometer", {"Alt": ("altitude_baro", "m")}, "", (_INSTANCE, 0)),
+    _Message("ARSP", "airspeed", {"Airspeed": ("airspeed", "m/s")}, "", (_INSTANCE, 0)),
+    _Message("BAT", "battery", {"Volt": ("voltage", "V"), "Curr": ("current", "A")}, "", (_INSTANCE, 0)),
+)  # fmt: skip
+_STORIES = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "MODE", "EV", "ARM", "SIDS")
+
+
+def recognises(source: Source) -> bool:
+    """A DataFlash file, binary or text, with ArduPilot's stamps (each message carries its own)."""
+    if source.content[:2] == dataflash.HEAD or source.path.suffix.lower() == ".bin":
+        return dataflash.is_dataflash(source.content) and not is_px4(source.content)
+    return dataflash_text.is_dataflash_text(source.text)
+
+
+def is_px4(content: bytes) -> bool:
+    """Whether a DataFlash file is one of PX4: its messages carry no time, a message TIME does."""
+    return b"TIMEQ" in content[: 1 << 16] and b"StartTime" in content[: 1 << 16]
+
+
+def read(source: Source, options: Options) -> Flight:
+    """An ArduPilot log as a flight: one stream a message, autopilot's parameters and events in the provenance.
+
+    What is damaged is left out and said: see `Provenance.damage` and `notes`. Where the clock starts anew, the longest
+    run is read.
+
+    Raises:
+        FlightError: where nothing in the log can be used, or units or a mapping are given.
+    """
+    if options.units or options.mapping:
+        raise FlightError(
+            "units and mappings have no meaning for an ArduPilot log: its units are known.",
+            where=source.name,
+            hint="Leave them out.",
+        )
+    text = source.text
+    found = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
+    found, end, said = _one_run(found)
+    told = story(found, end=end)
+    notes: list[str] = list(found.notes)
+    streams = _streams(found, told.events, notes)
+    if not streams:
+        raise FlightError(
+            f"holds no flight: no known message has two samples ({sum(map(len, found.tables.values()))} messages of "
+            f"{len(found.tables)} kinds found).",
+            where=source.name,
+            hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
+        )
+    notes += _remarks(found, streams)
+    damage = (*found.damage, *filter(None, (said,)), *told.damage)
+    provenance = source.provenance(
+        NAME,
+        VERSION,
+        vehicle=told.vehicle,
+        notes=tuple(notes),
+        damage=damage,
+        parameters=told.parameters,
+        events=told.events,
+    )
+    return Flight(streams, provenance)
+
+
+def _one_run(found: Messages) -> tuple[Messages, float, str]:
+    """The messages of the longest run between clock resets, its last stamp [s], and what was left out."""
+    timed = [(table.place, seconds(table)) for table in found.tables.values()]
+    timed = [(place[np.isfinite(t)], t[np.isfinite(t)]) for place, t in timed]
+    place = np.concatenate([p for p, _ in timed]) if timed else np.zeros(0, np.int64)
+    time = np.concatenate([t for _, t in timed]) if timed else np.zeros(0)
+    order = np.argsort(place, kind="stable")
+    (first, last), said = clocked.longest_run(place[order], time[order])
+    if said:
+        cut = {name: t.rows((t.place >= first) & (t.place < last)) for name, t in found.tables.items()}
+        found = Messages({name: t for name, t in cut.items() if len(t)}, found.notes, found.damage)
+    inside = time[(place >= first) & (place < last)]
+    # The largest of many stamps may be a damaged one.
+    return found, float(np.quantile(inside, 0.999)) if inside.size > 2000 else float(inside.max(initial=0.0)), said
+
+
+def _chosen(table: Table, wanted: tuple[tuple[str, ...], int] | None) -> Table:
+    """The messages of one sensor, where the message says which."""
+    if wanted is None:
+        return table
+    names, number = wanted
+    field = next((name for name in names if name in table.columns), None)
+    if field is None:
+        return table.rows(np.arange(len(table) if number == 0 else 0))
+    return table.rows(table.number(field) == number)
+
+
+def _streams(found: Messages, events: tuple[Event, ...], notes: list[str]) -> dict[str, xr.Dataset]:
+    streams: dict[str, xr.Dataset] = {}
+    taken: set[str] = set()
+    target_unit = next(
+        (ardupilot_chirp.AXES.get(e.details["axis"], ("", ""))[1] for e in events if e.kind == "sweep"), ""
+    )
+    for message in _MESSAGES:
+        table = found.get(message.name)
+        if table is None or message.stream in streams:
+            continue
+        table = _chosen(table, message.instance)
+        columns = {}
+        for field, (channel, unit) in message.fields.items():
+            name = channel if channel not in taken else _with_suffix(channel, message.suffix)
+            values = table.number(field)
+            if name is None or name in taken or field not in table.columns:
+                continue
+            if channel.startswith(("rcin", "rcout")) and not values.any():
+                continue  # a channel that nothing is connected to
+            columns[name] = (values, target_unit if channel == "sid_target" else unit)
+        made = clocked.made_stream(message.stream, seconds(table), columns, notes=notes)
+        if made is not None:
+            streams[message.stream] = made
+            taken |= set(map(str, made.data_vars))
+    return streams
+
+
+def _with_suffix(channel: str, suffix: str) -> str | None:
+    """A channel's name as a second opinion; demands have none."""
+    name = f"{channel}_{suffix}"
+    return name if suffix and is_known(name) else None
+
+
+def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
+    remarks = []
+    if "system_identification" in streams:
+        remarks.append("sid_target acts one loop of the controller after its stamp")
+    inputs = {
+        str(name): np.asarray(values.values, dtype=np.float64)
+        for data in streams.values()
+        for name, values in data.data_vars.items()
+        if str(name).startswith("mixer_")
+    }
+    remarks += checks.constant_notes(inputs)
+    counts = {name: len(table) for name, table in found.tables.items()}
+    remarks += clocked.unread(counts, (*_STORIES, *(message.name for message in _MESSAGES)))
+    return remarks

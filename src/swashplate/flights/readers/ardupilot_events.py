@@ -1,0 +1,191 @@
+"""What an ArduPilot log says beside its measurements: parameters, modes, messages, arming and sweeps, as events."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.flight import Event
+from swashplate.flights.readers.dataflash import Messages, Table
+
+Array = NDArray[np.float64]
+
+_STATISTICS = "STAT_"  # counters that ArduPilot keeps among its parameters
+_EV_ARMED, _EV_DISARMED = (10, 15), 11
+_MODES: Mapping[int, str] = {
+    0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 5: "LOITER", 6: "RTL", 7: "CIRCLE", 9: "LAND",
+    11: "DRIFT", 13: "SPORT", 14: "FLIP", 15: "AUTOTUNE", 16: "POSHOLD", 17: "BRAKE", 18: "THROW", 20: "GUIDED_NOGPS",
+    21: "SMART_RTL", 22: "FLOWHOLD", 23: "FOLLOW", 24: "ZIGZAG", 25: "SYSTEMID", 26: "AUTOROTATE", 27: "AUTO_RTL",
+    28: "TURTLE",
+}  # fmt: skip
+# SIDS: field of the message -> field of `Chirp`.
+_CHIRP = {
+    "Mag": "magnitude", "FSt": "start_hz", "FSp": "stop_hz", "TFin": "fade_in", "TC": "dwell", "TR": "record",
+    "TFout": "fade_out",
+}  # fmt: skip
+
+
+def seconds(table: Table) -> Array:
+    """Time stamps of a table since the autopilot's start [s], NaN where it has none."""
+    micro = table.number("TimeUS")
+    return micro / 1e6 if np.isfinite(micro).any() else table.number("TimeMS") / 1e3
+
+
+@dataclass(frozen=True)
+class Story:
+    """What the log says beside its measurements.
+
+    Attributes:
+        vehicle: firmware and frame, as the log names them ("" where it does not).
+        parameters: as first reported.
+        events: in order of time.
+        damage: what the story shows to be missing: a flight or a sweep that does not end.
+    """
+
+    vehicle: str
+    parameters: dict[str, float]
+    events: tuple[Event, ...]
+    damage: tuple[str, ...]
+
+
+def _parameters(messages: Messages) -> tuple[dict[str, float], list[Event]]:
+    table = messages.get("PARM")
+    first: dict[str, float] = {}
+    now: dict[str, float] = {}
+    changes = []
+    if table is not None:
+        rows = zip(seconds(table).tolist(), table.text("Name"), table.number("Value").tolist(), strict=True)
+        for time, name, value in rows:
+            if not (name and math.isfinite(value) and name.isprintable()):
+                continue
+            changed = name in now and value != now[name] and not name.startswith(_STATISTICS)
+            if changed and math.isfinite(time):
+                text = f"{name}: {now[name]:.6g} -> {value:.6g}"
+                changes.append(Event(time, "parameter", text, {"name": name, "value": value, "before": now[name]}))
+            first.setdefault(name, value)
+            now[name] = value
+    return first, changes
+
+
+def _texts(messages: Messages) -> list[Event]:
+    table = messages.get("MSG")
+    if table is None:
+        return []
+    said = [field for field in ("Message", "Msg") if field in table.columns][:1] or ["Message"]
+    rows = zip(seconds(table).tolist(), table.text(said[0]), strict=True)
+    return [Event(time, "message", text) for time, text in rows if math.isfinite(time) and text]
+
+
+def _modes(messages: Messages) -> list[Event]:
+    table = messages.get("MODE")
+    if table is None:
+        return []
+    number = table.number("ModeNum") if "ModeNum" in table.columns else table.number("Mode")
+    events: list[Event] = []
+    for time, mode, word in zip(seconds(table).tolist(), number.tolist(), table.text("Mode"), strict=True):
+        if math.isfinite(time):
+            name = _MODES.get(int(mode), f"mode {int(mode)}") if math.isfinite(mode) else word
+            if not events or events[-1].text != name:
+                events.append(Event(time, "mode", name))
+    return events
+
+
+def _arming(messages: Messages) -> list[Event]:
+    found: list[tuple[float, bool]] = []
+    if (table := messages.get("EV")) is not None:
+        number = table.number("Id")
+        found += [(t, True) for t in seconds(table)[np.isin(number, _EV_ARMED)].tolist()]
+        found += [(t, False) for t in seconds(table)[number == _EV_DISARMED].tolist()]
+    if (table := messages.get("ARM")) is not None:
+        found += list(zip(seconds(table).tolist(), (table.number("ArmState") == 1).tolist(), strict=True))
+    events: list[Event] = []
+    for time, armed in sorted((time, armed) for time, armed in found if math.isfinite(time)):
+        kind = "armed" if armed else "disarmed"
+        if not events or events[-1].kind != kind:
+            events.append(Event(time, kind, kind))
+    return events
+
+
+def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
+    """Sweeps of the System ID mode, with start and stop on the log's clock, and those that the log does not finish."""
+    settings, data = messages.get("SIDS"), messages.get("SIDD")
+    events: list[Event] = []
+    damage: list[str] = []
+    if settings is None:
+        return events, damage
+    begins = seconds(settings)
+    last = np.append(begins[1:], math.inf)
+    for i, axis in enumerate(settings.number("Ax").tolist()):
+        numbers = {ours: float(settings.number(theirs)[i]) for theirs, ours in _CHIRP.items()}
+        if not math.isfinite(numbers["dwell"]):
+            numbers["dwell"] = 0.0  # older firmware has none
+        if not all(map(math.isfinite, (axis, begins[i], *numbers.values()))) or numbers["start_hz"] <= 0.0:
+            continue
+        chirp = Chirp(axis=int(axis), **numbers)
+        start, stop = _on_the_clock(data, chirp, begins[i], last[i])
+        details: dict[str, Any] = {**chirp.as_details(), "start": start, "stop": stop, "seen": min(stop, end)}
+        words = f"{chirp.axis_name}, {chirp.start_hz:g}-{chirp.stop_hz:g} Hz in {chirp.record:g} s"
+        events.append(Event(float(begins[i]), "sweep", words, details))
+        reached = _reached(data, begins[i], last[i])
+        if reached is not None and reached < START_DELAY + chirp.record - 0.1:
+            details["seen"] = start + max(0.0, reached - START_DELAY)
+            why = "the log is cut off" if last[i] == math.inf and end - details["seen"] < 1.0 else "it was stopped"
+            damage.append(
+                f"the sweep at {start:.2f} s ({words}) ends after {max(0.0, reached - START_DELAY):.1f} s: {why}"
+            )
+    return events, damage
+
+
+def _between(data: Table | None, start: float, stop: float) -> tuple[Array, Array]:
+    """Stamps and the mode's own time [s] of the SIDD messages of one sweep."""
+    if data is None:
+        return np.zeros(0), np.zeros(0)
+    stamps, own = seconds(data), data.number("Time")
+    chosen = (stamps >= start) & (stamps < stop) & np.isfinite(own)
+    return stamps[chosen], own[chosen]
+
+
+def _on_the_clock(data: Table | None, chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
+    """Start and stop of the chirp on the log's clock: the mode's own time runs by loop counts, a little off it."""
+    stamps, own = _between(data, begin, until)
+    start, stop = begin + START_DELAY, begin + START_DELAY + chirp.record
+    if own.size > 1 and np.all(np.diff(own) > 0.0) and own[0] <= START_DELAY <= own[-1]:
+        start = float(np.interp(START_DELAY, own, stamps))
+        ends = START_DELAY + chirp.record
+        stop = float(np.interp(ends, own, stamps)) if own[-1] >= ends else start + chirp.record
+    return start, stop
+
+
+def _reached(data: Table | None, begin: float, until: float) -> float | None:
+    """How far the mode's own time came [s]; None where it is not logged."""
+    _, own = _between(data, begin, until)
+    return float(own.max()) if own.size else None
+
+
+def _vehicle(messages: Messages, texts: list[Event]) -> str:
+    firmware = next((e.text for e in texts if re.match(r"Ardu\w+ V|(AP|Ardu)\w* ?(Copter|Plane|Rover)", e.text)), "")
+    frame = next((e.text.partition(":")[2].strip() for e in texts if e.text.startswith("Frame:")), "")
+    return ", ".join(part for part in (firmware, frame) if part)
+
+
+def story(messages: Messages, *, end: float) -> Story:
+    """The story of a log.
+
+    Args:
+        messages: of one run of the autopilot.
+        end: its last time stamp [s].
+    """
+    parameters, changes = _parameters(messages)
+    texts, arming = _texts(messages), _arming(messages)
+    sweeps, damage = _sweeps(messages, end)
+    if arming and arming[-1].kind == "armed":
+        damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
+    events = sorted((*changes, *texts, *_modes(messages), *arming, *sweeps), key=lambda event: event.time)
+    return Story(_vehicle(messages, texts), parameters, tuple(events), tuple(damage))

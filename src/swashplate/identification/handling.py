@@ -1,0 +1,215 @@
+"""Handling qualities and loop margins read off a response of a flight or a model, with their random errors.
+
+Bandwidth and phase delay of the attitude response after ADS-33E-PRF (2000), sec. 3.3.2.1; its boundaries are for
+manned helicopters: for a small one scale frequencies with the square root of the size (Froude), and say so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Array
+from swashplate.identification.frequency_response import FrequencyResponse, decibel
+from swashplate.identification.spectra import Complex
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A number read off a response, with its standard deviation (NaN where unknown)."""
+
+    value: float
+    sigma: float = float("nan")
+
+    def __repr__(self) -> str:
+        return f"{self.value:.4g}" + (f" +- {self.sigma:.2g}" if np.isfinite(self.sigma) else "")
+
+
+@dataclass(frozen=True)
+class Handling:
+    """Bandwidth and phase delay of an attitude response.
+
+    Attributes:
+        bandwidth_phase: frequency of 45 degrees phase margin [rad/s].
+        bandwidth_gain: frequency of 6 dB gain margin [rad/s].
+        bandwidth: the lower of the two (rate command); the first for attitude command.
+        omega_180: frequency of -180 degrees [rad/s].
+        phase_delay: from the phase at twice omega_180 [s].
+        phase_delay_line: from a coherence-weighted line between omega_180 and twice of it [s].
+    """
+
+    bandwidth_phase: Reading
+    bandwidth_gain: Reading
+    bandwidth: Reading
+    omega_180: Reading
+    phase_delay: Reading
+    phase_delay_line: Reading
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Of a broken loop.
+
+    Attributes:
+        crossover: highest frequency of unit gain [rad/s]. phase_margin: there [deg].
+        omega_180: lowest frequency of -180 degrees [rad/s]. gain_margin: there [dB].
+    """
+
+    crossover: Reading
+    phase_margin: Reading
+    omega_180: Reading
+    gain_margin: Reading
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """A response along log frequency: dB, unwrapped degrees, random error and coherence."""
+
+    omega: Array
+    gain: Array
+    phase: Array
+    error: Array
+    coherence: Array
+
+    def crossing(self, values: Array, level: float, *, last: bool = False) -> float | None:
+        """Where a curve first (last) falls through a level [rad/s], straight in log frequency."""
+        down = np.flatnonzero((values[:-1] >= level) & (values[1:] < level))
+        if not down.size:
+            return None
+        k = int(down[-1] if last else down[0])
+        share = (values[k] - level) / (values[k] - values[k + 1])
+        return float(self.omega[k] * (self.omega[k + 1] / self.omega[k]) ** share)
+
+    def at(self, values: Array, omega: float) -> float:
+        return float(np.interp(np.log(omega), np.log(self.omega), values))
+
+    def slope(self, values: Array, omega: float) -> float:
+        """Derivative over omega, from a tenth of an octave either way."""
+        low, high = max(omega / 2**0.1, self.omega[0]), min(omega * 2**0.1, self.omega[-1])
+        return float((self.at(values, high) - self.at(values, low)) / (high - low))
+
+
+def _curve(omega: Array, h: Complex, error: Array | None, coherence: Array | None) -> _Curve:
+    known = np.isfinite(h)
+    if known.sum() < 4:
+        raise IdentificationError("the response has fewer than four points: nothing can be read off it.")
+    omega = np.asarray(omega, dtype=np.float64)[known]
+    nothing = np.zeros(omega.size)
+    return _Curve(
+        omega,
+        np.asarray(decibel(h[known])),
+        np.degrees(np.unwrap(np.angle(h[known]))),
+        nothing if error is None else error[known],
+        nothing + 1.0 if coherence is None else coherence[known],
+    )
+
+
+def _attitude_phase(curve: _Curve) -> _Curve:
+    """The phase shifted by whole turns so that the mid-band lies between -270 and 90 degrees; a sign costs 180."""
+    middle = float(np.median(curve.phase[: max(1, curve.phase.size // 3)]))
+    turn = 360.0 * np.ceil((middle - 90.0) / 360.0)
+    return _Curve(curve.omega, curve.gain, curve.phase - turn, curve.error, curve.coherence)
+
+
+def handling_qualities(
+    omega: Array,
+    attitude: Complex,
+    *,
+    error: Array | None = None,
+    coherence: Array | None = None,
+    command: str = "rate",
+) -> Handling:
+    """Bandwidth and phase delay of the response of an attitude to the pilot's command.
+
+    Args:
+        omega: [rad/s].
+        attitude: H; of a rate response, divide by 1j omega first (`attitude_of`). Its sign must be the pilot's: a
+            positive command gives a positive attitude.
+        error: random errors; coherence: weights of the line. None for a model.
+        command: "rate" or "attitude": which bandwidth counts.
+
+    Raises:
+        IdentificationError: where the response does not reach -180 degrees or is too short above it.
+    """
+    curve = _attitude_phase(_curve(omega, attitude, error, coherence))
+    w180 = curve.crossing(curve.phase, -180.0)
+    if w180 is None:
+        raise IdentificationError(
+            f"the phase does not fall through -180 degrees (it ends at {curve.phase[-1]:.0f} at "
+            f"{curve.omega[-1] / 2 / np.pi:.3g} Hz): no bandwidth can be read off.",
+            hint="Sweep to higher frequencies, or read it off the model.",
+        )
+    s180 = _frequency_sigma(curve, w180)
+    by_phase = curve.crossing(curve.phase, -135.0)
+    level = curve.at(curve.gain, w180) + 6.0
+    by_gain = curve.crossing(np.where(curve.omega <= w180, curve.gain, -np.inf), level, last=True)
+    phase_reading = Reading(by_phase, _frequency_sigma(curve, by_phase)) if by_phase else Reading(float("nan"))
+    gain_reading = Reading(by_gain, _frequency_sigma(curve, by_gain, gain=True)) if by_gain else Reading(float("nan"))
+    both = [r for r in (phase_reading, gain_reading) if np.isfinite(r.value)]
+    counted = phase_reading if command == "attitude" or not both else min(both, key=lambda r: r.value)
+    two_point, line = _phase_delays(curve, w180)
+    return Handling(phase_reading, gain_reading, counted, Reading(w180, s180), two_point, line)
+
+
+def _phase_delays(curve: _Curve, w180: float) -> tuple[Reading, Reading]:
+    nothing = Reading(float("nan"))
+    if curve.omega[-1] < 1.2 * w180:
+        return nothing, nothing
+    two_point = nothing
+    if curve.omega[-1] >= 2.0 * w180:
+        lag = -(curve.at(curve.phase, 2.0 * w180) + 180.0)
+        sigma = np.degrees(curve.at(curve.error, 2.0 * w180)) / (57.3 * 2.0 * w180)
+        two_point = Reading(lag / (57.3 * 2.0 * w180), float(sigma))
+    inside = (curve.omega >= w180) & (curve.omega <= 2.0 * w180)
+    if inside.sum() < 3:
+        return two_point, nothing
+    # Through (omega_180, -180): the slope is twice the phase delay of an integrator with that delay, as by two points.
+    x, y = curve.omega[inside] - w180, curve.phase[inside] + 180.0
+    weight = curve.coherence[inside] ** 2
+    total = float(weight @ x**2)
+    slope = float(weight @ (x * y)) / total
+    sigma = float(np.sqrt((weight * x) ** 2 @ np.degrees(curve.error[inside]) ** 2)) / total
+    return two_point, Reading(-slope / (57.3 * 2.0), sigma / (57.3 * 2.0))
+
+
+def _frequency_sigma(curve: _Curve, omega: float, *, gain: bool = False) -> float:
+    """Standard deviation of a crossing: the random error over the curve's slope."""
+    error = curve.at(curve.error, omega)
+    spread = 20.0 * np.log10(1.0 + error) if gain else np.degrees(error)
+    slope = abs(curve.slope(curve.gain if gain else curve.phase, omega))
+    return float(spread / slope) if slope > 0.0 else float("nan")
+
+
+def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Margins:
+    """Crossover, phase and gain margin of a broken loop L, negative feedback (unit gain at -180 degrees is the limit).
+
+    Args:
+        omega: [rad/s].
+        loop: L(j omega).
+        error: its random error.
+    """
+    curve = _attitude_phase(_curve(omega, loop, error, None))
+    crossover = curve.crossing(curve.gain, 0.0, last=True)
+    w180 = curve.crossing(curve.phase, -180.0)
+    nothing = Reading(float("nan"))
+    pm = gm = cross = phase_cross = nothing
+    if crossover is not None:
+        cross = Reading(crossover, _frequency_sigma(curve, crossover, gain=True))
+        pm = Reading(180.0 + curve.at(curve.phase, crossover), float(np.degrees(curve.at(curve.error, crossover))))
+    if w180 is not None:
+        phase_cross = Reading(w180, _frequency_sigma(curve, w180))
+        gm = Reading(-curve.at(curve.gain, w180), float(20.0 * np.log10(1.0 + curve.at(curve.error, w180))))
+    return Margins(cross, pm, phase_cross, gm)
+
+
+def attitude_of(responses: FrequencyResponse, rate: str, input: str) -> tuple[Array, Complex, Array, Array]:
+    """Frequencies, attitude response, error and coherence from a measured rate response, over its coherent band."""
+    h, coherence, error = responses.pair(rate, input)
+    band = responses.band(rate, input)
+    if band is None:
+        raise IdentificationError("has no coherent band.", channel=f"{rate} / {input}")
+    inside = (responses.omega >= band[0]) & (responses.omega <= band[1])
+    omega = responses.omega[inside]
+    return omega, np.asarray(h[inside] / (1j * omega)), error[inside], coherence[inside]

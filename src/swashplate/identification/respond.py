@@ -1,0 +1,300 @@
+"""`respond`: from conditioned flights to frequency responses, with everything a reader needs to trust them or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Array, Flight
+from swashplate.flights.schema import QUATERNION, channel
+from swashplate.identification import response_warnings
+from swashplate.identification.composite import composite
+from swashplate.identification.conditioning import (
+    Conditioned,
+    condition_spectra,
+    project_on_references,
+    random_error,
+)
+from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
+
+LINES_PER_DECADE = 50
+WINDOWS = 5
+OVERLAP = 0.75
+"""Hann windows that overlap so weigh every sample alike; less loses data, more only repeats."""
+INJECTED = ("sweep", "sid", "reference", "excitation")
+"""Names of signals that a program adds to a command: they are part of an input, not another one."""
+SHORTEST = 0.2
+"""Pieces shorter than this share of the longest are left out: they would shorten all windows."""
+PERIODS = 4.0
+"""Periods that a window must hold for it to count beside longer ones. The book trusts it from one period on; measured
+on an R-50 in hover, it is off by 3 dB at two periods and by 0.1 dB at four. Only the longest goes down to one."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Lengths [s] of the windows, longest first, with what was bent to get them."""
+
+    lengths: tuple[float, ...]
+    warnings: tuple[str, ...]
+
+
+def choose_windows(durations: Sequence[float], highest: float, *, count: int = WINDOWS) -> Windows:
+    """Window lengths by the book's rules (Tischler and Remple 2012, ch. 10).
+
+    The longest is at most half the shortest record and a fifth of all; the shortest holds at least 20 periods of the
+    highest frequency.
+
+    Args:
+        durations: of the records [s].
+        highest: highest frequency [Hz].
+        count: how many lengths, spread geometrically.
+    """
+    longest = min(min(durations) / 2.0, sum(durations) / 5.0)
+    shortest = min(20.0 / highest, longest)
+    warned: tuple[str, ...] = ()
+    if 20.0 / highest > longest:
+        warned = (
+            f"the records are short: a window of {longest:.3g} s holds {longest * highest:.0f} periods of the highest "
+            f"frequency ({highest:.3g} Hz), expected 20. Fly longer for a trustworthy response.",
+        )
+    shortest = max(shortest, longest / 10.0)
+    number = count if longest > 1.2 * shortest else 1
+    lengths = np.geomspace(longest, shortest, number) if number > 1 else np.array([longest])
+    return Windows(tuple(float(length) for length in lengths), warned)
+
+
+def respond(
+    flights: Flight | Sequence[Flight],
+    *,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    references: Sequence[str] = (),
+    band: tuple[float, float] | None = None,
+    windows: Sequence[float] | None = None,
+    overlap: float = OVERLAP,
+    bystanders: Sequence[str] | None = None,
+) -> FrequencyResponse:
+    """Frequency responses of outputs to inputs, all inputs conditioned on each other, composite over windows.
+
+    Args:
+        flights: conditioned to one rate; each unbroken piece is a record.
+        inputs, outputs: channel names.
+        references: excitations that no loop feeds back (an autopilot's injected sweep): the joint input-output estimate
+            is made, and compared with the direct one. One reference with as many flights as inputs counts as one
+            reference per flight (one log per swept axis).
+        band: lowest and highest frequency [Hz]; by default one period of the longest window to a tenth of the rate.
+        windows: lengths [s]; by the book's rules where None.
+        overlap: of neighbouring windows.
+        bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
+            in the flights. They only warn.
+
+    Raises:
+        FlightError: no channel or no record to work on; messages name them.
+    """
+    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    inputs, outputs = tuple(inputs), tuple(outputs)
+    doubled = set(inputs) & set(outputs)
+    if not inputs or not outputs or doubled:
+        raise FlightError(
+            f"inputs are {', '.join(inputs) or 'none'}, outputs {', '.join(outputs) or 'none'}.",
+            channel=", ".join(doubled) or None,
+            hint="Name at least one of each, and no channel twice.",
+        )
+    others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
+    pieces = signals(flights, (*inputs, *outputs, *references, *others))
+    owner = [number for number, flight in enumerate(flights) for _ in flight.split()]
+    longest = max(piece.duration for piece in pieces)
+    kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
+    scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
+    pieces, owner = [pieces[k] for k in kept], [owner[k] for k in kept]
+    n = len(inputs) + len(outputs)
+    own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
+    if references:
+        columns = _reference_columns(owner, pieces, n, len(references), inputs)
+        own = [
+            replace(piece, values=np.concatenate([piece.values, c], axis=1))
+            for piece, c in zip(own, columns, strict=True)
+        ]
+    rate = 1.0 / pieces[0].dt
+    highest = min(band[1], 0.499 * rate) if band else rate / 10.0
+    chosen = choose_windows([piece.duration for piece in pieces], highest)
+    if windows is not None:
+        chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
+    lowest = max(band[0] if band else 0.0, 1.0 / chosen.lengths[0])
+    if lowest >= highest:
+        raise FlightError(
+            f"the records tell nothing below {1.0 / chosen.lengths[0]:.3g} Hz, and {highest:.3g} Hz was asked as the "
+            f"highest frequency.",
+            where=", ".join(piece.name for piece in pieces),
+            hint="Give longer records or a higher band.",
+        )
+    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
+    question = _Question(inputs, outputs, own[0].values.shape[1] - n)
+    matrices, notes = _matrices(own, omega, chosen.lengths, overlap)
+    made = _composed(matrices, omega, question)
+    if scraps:
+        notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
+    warnings, problems = [*chosen.warnings, *notes], list(response_warnings.dead(flights, inputs, outputs))
+    if question.references:
+        direct = _composed(matrices, omega, replace(question, references=0))
+        warnings += response_warnings.bias_words(made, direct)
+    warnings += response_warnings.few_averages(matrices)
+    warnings += response_warnings.mixing_words(made)
+    warnings += response_warnings.lead_words(made)
+    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
+    problems += response_warnings.incoherent(made)
+    if others and not references:
+        warnings += response_warnings.bystander_words(
+            pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
+        )
+    return replace(
+        made,
+        input_units=tuple(_unit(flights[0], name) for name in inputs),
+        output_units=tuple(_unit(flights[0], name) for name in outputs),
+        windows=tuple(m.window for m in matrices),
+        sources=tuple(piece.name for piece in pieces),
+        warnings=tuple(warnings),
+        problems=tuple(problems),
+        settings={
+            "rate": rate,
+            "band_hz": [float(lowest), float(highest)],
+            "overlap": overlap,
+            "references": list(references),
+            "averages": [m.averages for m in matrices],
+        },
+    )
+
+
+def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
+    """Other commands (unit "1") on the same time base in all flights, which may have moved with the named inputs."""
+
+    def commands(flight: Flight) -> set[str]:
+        home = flight.stream_of(named[0])
+        data = flight.streams[home]
+        return {
+            str(name)
+            for name, values in data.data_vars.items()
+            if values.attrs.get("units") == "1" and np.all(np.isfinite(values.values)) and np.ptp(values.values) > 0.0
+        }
+
+    shared = set.intersection(*(commands(flight) for flight in flights))
+    return tuple(sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith(INJECTED)))
+
+
+@dataclass(frozen=True)
+class _Question:
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    references: int
+
+
+def _unit(flight: Flight, name: str) -> str:
+    return str(flight[name].attrs.get("units", "")) or channel(name).unit
+
+
+def _reference_columns(
+    owner: Sequence[int], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
+) -> list[Array]:
+    """The references of each piece; a single one is split by flight where that gives one per input."""
+    columns = [piece.values[:, first : first + count] for piece in pieces]
+    flown = sorted(set(owner))
+    if count == 1 and len(inputs) > 1 and len(flown) >= len(inputs):
+        columns = [column * (np.array(flown) == flight) for column, flight in zip(columns, owner, strict=True)]
+    if columns[0].shape[1] < len(inputs):
+        raise FlightError(
+            f"{columns[0].shape[1]} reference(s) cannot tell {len(inputs)} inputs apart.",
+            channel=", ".join(inputs),
+            hint="Give as many independent references as inputs, or one log per swept axis.",
+        )
+    return columns
+
+
+def _matrices(
+    pieces: Sequence[Signals], omega: Array, lengths: Sequence[float], overlap: float
+) -> tuple[list[SpectralMatrix], list[str]]:
+    found: list[SpectralMatrix] = []
+    notes: list[str] = []
+    for length in lengths:
+        periods = PERIODS if found else 1.0
+        matrix = spectral_matrix(pieces, omega, window=length, overlap=overlap, periods=periods)
+        if matrix is None:
+            notes.append(f"no record is as long as the window of {length:.3g} s; it was left out.")
+            continue
+        short = [piece.name for piece in pieces if piece.name not in matrix.used]
+        if short:
+            notes.append(f"shorter than the window of {length:.3g} s and left out of it: {', '.join(short)}.")
+        found.append(matrix)
+    if not found:
+        longest = max(piece.duration for piece in pieces)
+        raise FlightError(
+            f"the longest record has {longest:.3g} s, the shortest window {min(lengths):.3g} s.",
+            where=", ".join(piece.name for piece in pieces),
+            hint="Give shorter windows (--windows) or fly longer; a record should hold two of its longest windows.",
+        )
+    return found, notes
+
+
+def _composed(matrices: Sequence[SpectralMatrix], omega: Array, question: _Question) -> FrequencyResponse:
+    """The composite of the conditioned spectra of every window."""
+    n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
+    parts = []
+    for matrix in matrices:
+        values = matrix.values
+        if question.references:
+            values = project_on_references(values, n_in, question.references)
+        parts.append(condition_spectra(values[:, :n, :n], n_in, averages=matrix.averages))
+    response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
+    weight = np.stack([_window_weight(part, matrix) for part, matrix in zip(parts, matrices, strict=True)])
+    plain = [m.values for m in matrices]
+    auto = _mean(weight, np.stack([np.diagonal(v, axis1=1, axis2=2).real for v in plain]))
+    gxx = _mean(weight, np.stack([v[:, :n_in, :n_in] for v in plain]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = np.abs(gxx) ** 2 / (auto[:, :n_in, None] * auto[:, None, :n_in])
+    return FrequencyResponse(
+        omega=omega,
+        inputs=question.inputs,
+        outputs=question.outputs,
+        response=response,
+        coherence=coherence,
+        multiple=_mean(weight, np.stack([part.multiple for part in parts])),
+        error=error,
+        input_power=auto[:, :n_in],
+        output_power=auto[:, n_in:n],
+        input_coherence=between.real,
+        method="joint" if question.references else "direct",
+    )
+
+
+def _joined(parts: Sequence[Conditioned], averages: Sequence[float], inputs: int) -> tuple[Complex, Array, Array]:
+    if len(parts) == 1:
+        return parts[0].response, parts[0].coherence, parts[0].error
+    shape = parts[0].response.shape
+    powers = np.stack([np.broadcast_to(part.input_power[:, None, :], shape) for part in parts])
+    powers = np.where(np.isfinite(np.stack([part.response for part in parts])), powers, np.nan)
+    errors = np.stack([part.error for part in parts])
+    gxx, gyy, gxy = composite(
+        powers, np.stack([part.output_power for part in parts]), np.stack([part.cross for part in parts]), errors
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        response, coherence = gxy / gxx, np.abs(gxy) ** 2 / (gxx * gyy)
+        weight = np.where(np.isfinite(powers), np.maximum(errors, 1e-9) ** -4.0, 0.0)
+        many = np.sum(weight * np.reshape(averages, (-1, 1, 1, 1)), axis=0) / np.sum(weight, axis=0)
+    effective = np.maximum(many - (inputs - 1), 1.0)
+    return response, coherence, random_error(coherence, 1.0) / np.sqrt(effective)
+
+
+def _window_weight(part: Conditioned, matrix: SpectralMatrix) -> Array:
+    """How much one window's matrix counts for figures that belong to no pair, shape (n_f,)."""
+    known = np.isfinite(matrix.values[:, 0, 0])
+    return np.where(known, matrix.averages**2, 0.0)
+
+
+def _mean(weight: Array, values: Array) -> Array:
+    shaped = weight.reshape(weight.shape + (1,) * (values.ndim - 2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = np.sum(np.where(shaped > 0.0, shaped * np.nan_to_num(values), 0.0), axis=0)
+        return np.asarray(total / shaped.sum(axis=0))

@@ -1,0 +1,97 @@
+"""Start values of a state-space model: from a vehicle's linearisation, or from fitted transfer functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Array
+from swashplate.identification.response_cost import POINTS, Target
+from swashplate.identification.state_space import StateSpaceModel
+from swashplate.identification.state_space_fit import fit_targets
+from swashplate.identification.transfer_function_fit import TransferFunctionFit
+from swashplate.simulation.linearize import LinearModel
+
+_FAST = 1e-9
+
+
+def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpaceModel:
+    """The model with start values read off a linearised vehicle (`swashplate.linearize`).
+
+    An entry that is one parameter (or minus one) takes the linearisation's number at the same states and inputs, scaled
+    by the left side. States of the vehicle that the model does not have are residualised: they follow at once, as a
+    quasi-steady derivative supposes (Tischler and Remple 2012, ch. 13). What the vehicle lacks keeps its value.
+
+    Raises:
+        IdentificationError: where vehicle and model share no state or no input.
+    """
+    states = [name for name in model.states if name in linear.states]
+    inputs = [name for name in model.inputs if name in linear.inputs]
+    if not states or not inputs:
+        raise IdentificationError(
+            f"'{model.name}' shares no state or no input with the vehicle, which has states {', '.join(linear.states)} "
+            f"and inputs {', '.join(linear.inputs)}."
+        )
+    a, b = _residualised(linear, states)
+    values = model.numbers()
+    left = {
+        (e.row, e.column): float(e.expression(values)) for e in model.elements if e.matrix == "M" and e.row == e.column
+    }
+    found = {}
+    for e in model.elements:
+        if e.matrix not in ("F", "G") or model.states[e.row] not in states:
+            continue
+        names = states if e.matrix == "F" else inputs
+        column = (model.states if e.matrix == "F" else model.inputs)[e.column]
+        text = e.expression.text.replace(" ", "")
+        name, sign = text.lstrip("-"), -1.0 if text.startswith("-") else 1.0
+        if (
+            name not in model.parameters
+            or model.parameters[name].tie is not None
+            or column not in names
+            or name in found
+        ):
+            continue
+        row = states.index(model.states[e.row])
+        number = a[row, states.index(column)] if e.matrix == "F" else b[row, linear.inputs.index(column)]
+        parameter = model.parameters[name]
+        value = sign * float(number) * left.get((e.row, e.row), 1.0)
+        found[name] = float(np.clip(value, parameter.lower, parameter.upper))
+    return model.with_values(found)
+
+
+def _residualised(linear: LinearModel, states: Sequence[str]) -> tuple[Array, Array]:
+    """A and B of the kept states, the others following at once; integrators that nothing feeds back are left out."""
+    keep = [linear.states.index(name) for name in states]
+    others = [i for i in range(len(linear.states)) if i not in keep and abs(linear.A[i, i]) > _FAST]
+    a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
+    if others:
+        gain = linear.A[np.ix_(keep, others)] @ np.linalg.inv(linear.A[np.ix_(others, others)])
+        a, b = a - gain @ linear.A[np.ix_(others, keep)], b - gain @ linear.B[others]
+    return np.asarray(a), np.asarray(b)
+
+
+def from_transfer_functions(
+    model: StateSpaceModel, fits: Sequence[TransferFunctionFit], *, seed: int = 0
+) -> StateSpaceModel:
+    """The model with start values that answer as fitted transfer functions do, over the bands of their fits.
+
+    Transfer functions are smooth and quick to fit well; matching them from many starts leaves the model near enough for
+    the fit to the flight's own responses.
+
+    Raises:
+        IdentificationError: where none of them joins an output and an input of the model.
+    """
+    targets = []
+    for fit in fits:
+        for function, wanted in zip(fit.models, fit.targets, strict=True):
+            if function.output in model.outputs and function.input in model.inputs:
+                omega = np.geomspace(wanted.omega[0], wanted.omega[-1], POINTS)
+                h = function.response(omega)
+                targets.append(Target(function.output, function.input, omega, h, np.ones(POINTS)))
+    if not targets:
+        raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
+    found = fit_targets(model, targets, seed=seed, iterations=40)
+    return model.with_values({name: found.model.parameters[name].value for name in found.free})

@@ -1,0 +1,124 @@
+"""The tip-path plane of a rotor on teetering, sprung or offset hinges, as two first-order states.
+
+Blade flapping beta'' + lambda_b^2 beta = (aerodynamics), with beta = a0 - a1 cos - b1 sin and a1, b1 slow: their second
+derivatives, the advancing flap mode at about twice the rotor speed, are left out (Chen 1980; Mettler 2003, sec. 3.2).
+In that form the rates of the tip-path plane in space, q + da1/dt and p + db1/dt, follow from one two-by-two system.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.blade_element import FlapMoments
+
+
+class Flapping(NamedTuple):
+    """Tilt of the tip-path plane against the shaft [rad]: a1 aft, b1 right positive (right as seen, either sense)."""
+
+    a1: Scalar
+    b1: Scalar
+
+
+class Hinge(NamedTuple):
+    """How a blade is held: flap frequency above one per revolution, and what tilting the disc does to the hub.
+
+    Attributes:
+        excess: lambda_b^2 - 1.
+        lock: Lock number gamma = rho a c R^4 / I_b.
+        moment: hub moment per tilt [N m/rad].
+    """
+
+    excess: Scalar
+    lock: Scalar
+    moment: Scalar
+
+
+def hinge(
+    *,
+    blade_inertia: Scalar,
+    blades: Scalar,
+    hub_stiffness: Scalar,
+    hinge_offset: Scalar,
+    omega: Scalar,
+    density: Scalar,
+    lift_slope: Scalar,
+    chord: Scalar,
+    radius: Scalar,
+) -> Hinge:
+    """Flap frequency and hub stiffness from the blade and the hub (Bramwell 2001, eqs 1.9 and 3.60).
+
+    `hub_stiffness` is the whole hub's [N m/rad], N_b / 2 times a blade's spring; `hinge_offset` a fraction of R. Two
+    blades pass their moment on twice per revolution unevenly; the mean over a revolution is taken.
+    """
+    centrifugal = blade_inertia * omega * omega
+    offset = 1.5 * hinge_offset / (1.0 - hinge_offset)
+    half = 0.5 * blades
+    return Hinge(
+        hub_stiffness / (half * centrifugal) + offset,
+        density * lift_slope * chord * radius * radius * radius * radius / blade_inertia,
+        hub_stiffness + half * centrifugal * offset,
+    )
+
+
+def coning(moment: Scalar, held: Hinge, precone: Scalar, *, free: Scalar) -> Scalar:
+    """Steady coning angle a0 [rad]: the built-in one, or with `free` = 1 that of blades that cone by themselves."""
+    flying = 0.5 * held.lock * moment / (1.0 + held.excess)
+    return precone + free * (flying - precone)
+
+
+def plane_rates(
+    flapping: Flapping,
+    moments: FlapMoments,
+    held: Hinge,
+    *,
+    wake_distortion: Scalar,
+    phase_lag: tuple[Scalar, Scalar] | None,
+    deficiency: tuple[Scalar, Scalar, Scalar] | None,
+) -> tuple[Scalar, Scalar]:
+    """(p, q): rates of the tip-path plane in space over the rotor speed.
+
+    cos:  (1 - K_R) q + (16/gamma) p = -S a1 - 4 M_c,      sin:  (1 - K_R) p - (16/gamma) q = -S b1 - 4 M_s
+
+    Args:
+        flapping: its tilt (counter-clockwise rotor).
+        moments: `flap_moments` of the disc with p = q = 0.
+        held: the hinge; S = 8 (lambda_b^2 - 1) / gamma.
+        wake_distortion: K_R; the wake bends with the disc's turning and puts K_R (q cos + p sin) onto the inflow
+            (Keller 1996; Arnold, Keller, Curtiss and Reichert 1998).
+        phase_lag: (cos, sin) of the angle by which the air's moments come late (Mansur and Tischler 1998), or None.
+        deficiency: matrix (cc, cs, ss) on the aerodynamic moments by a static inflow gradient, or None.
+    """
+    m, inertia = 1.0 - wake_distortion, 16.0 / held.lock
+    stiffness = 8.0 * held.excess / held.lock
+    # aerodynamic moment times 4: D (4 M + m W), W = (q, p); rows cos and sin
+    c, s = 4.0 * moments.cos, 4.0 * moments.sin
+    w_cq, w_cp, w_sq, w_sp = m, 0.0, 0.0, m
+    if deficiency is not None:
+        cc, cs, ss = deficiency
+        c, s = cc * c + cs * s, cs * c + ss * s
+        w_cq, w_cp, w_sq, w_sp = cc * m, cs * m, cs * m, ss * m
+    if phase_lag is not None:
+        cosine, sine = phase_lag
+        c, s = cosine * c - sine * s, sine * c + cosine * s
+        w_cq, w_cp, w_sq, w_sp = (
+            cosine * w_cq - sine * w_sq,
+            cosine * w_cp - sine * w_sp,
+            sine * w_cq + cosine * w_sq,
+            sine * w_cp + cosine * w_sp,
+        )
+    w_cp, w_sq = w_cp + inertia, w_sq - inertia
+    right_c, right_s = -stiffness * flapping.a1 - c, -stiffness * flapping.b1 - s
+    determinant = w_cq * w_sp - w_cp * w_sq
+    q = (right_c * w_sp - right_s * w_cp) / determinant
+    p = (right_s * w_cq - right_c * w_sq) / determinant
+    return p, q
+
+
+def faded_wake_distortion(hover: Scalar, mu2: Scalar, fade: Scalar, xp: Backend) -> Scalar:
+    """K_R at an advance ratio squared: its hover value, falling smoothly to zero at the advance ratio `fade`.
+
+    A wake that is blown away no longer bends above the disc; by mu = 0.15 to 0.2 nothing of it is left.
+    """
+    rest = xp.maximum(0.0, 1.0 - mu2 / (fade * fade))
+    return hover * rest * rest

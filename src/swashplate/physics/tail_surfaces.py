@@ -1,0 +1,36 @@
+"""Horizontal and vertical tail in the wakes of the two rotors (Gavrilets, Mettler and Feron 2001, sec. 3.5, 3.6)."""
+
+from __future__ import annotations
+
+from swashplate.physics.backend import Backend, Scalar
+
+ROUNDED = 0.05
+"""m/s."""
+
+
+def wake_on_tailplane(
+    u: Scalar, w: Scalar, induced: Scalar, *, near: Scalar, far: Scalar, drop: Scalar, xp: Backend
+) -> Scalar:
+    """Downwash [m/s] of the main rotor at the tailplane: 0 to 1.5 times its induced velocity.
+
+    The wake's edges reach a tail at distances `near` (front edge) and `far` behind the hub's rim and `drop` below it
+    when the wake is swept back by u / (induced - w); in between the share rises linearly.
+    """
+    down = xp.maximum(induced - w, 1e-3)
+    swept = u / down
+    share = 1.5 * xp.minimum(1.0, xp.maximum(0.0, (swept * drop - near) / (far - near)))
+    return share * induced
+
+
+def lifting_force(
+    along: Scalar, across: Scalar, *, area: Scalar, lift_slope: Scalar, density: Scalar, xp: Backend
+) -> Scalar:
+    """Force [N] against the speed `across` a flat surface that moves `along` through the air, stalled as drag.
+
+    -rho/2 S (C_La |along| + |across|) across, and never more than the dynamic pressure times the area. |along| is
+    rounded off below `ROUNDED`, so that a hover, where it would have a kink, has derivatives.
+    """
+    ahead = xp.sqrt(along * along + ROUNDED * ROUNDED)
+    linear = (lift_slope * ahead + xp.abs(across)) * across
+    most = ahead * ahead + across * across
+    return -0.5 * density * area * xp.maximum(-most, xp.minimum(most, linear))

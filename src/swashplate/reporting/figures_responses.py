@@ -1,0 +1,224 @@
+"""Figures of frequency responses: Bode with coherence and error band, inputs, mismatch envelopes, verification."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from swashplate.flights.flight import Array
+from swashplate.flights.schema import channel
+from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse, decibel, unwrapped_degrees
+from swashplate.identification.mismatch import Mismatch, envelopes
+from swashplate.identification.spectra import Complex
+from swashplate.identification.verification import Trace
+from swashplate.reporting.downsample import kept
+from swashplate.reporting.structure import Figure, Key
+from swashplate.reporting.theme import (
+    BAND,
+    BLACK,
+    FLIGHT,
+    GREEN,
+    GREY,
+    INPUT_COLORS,
+    MODEL,
+    ORANGE,
+    PUBLISHED,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axis_title,
+    line,
+    shown,
+    stacked,
+)
+
+_ERROR = "rgba(0,0,0,0.15)"
+_COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+
+
+def _log_x(layout: dict[str, Any], panels: int, title: str = "frequency [Hz]") -> dict[str, Any]:
+    for k in range(panels):
+        axis = layout[f"xaxis{'' if k == 0 else k + 1}"]
+        axis["type"] = "log"
+        if k == panels - 1:
+            axis["title"] = {"text": title, "standoff": 4, "font": {"size": 12}}
+    return layout
+
+
+def bode(
+    responses: FrequencyResponse, output: str, input: str, *, model: tuple[Array, Complex] | None = None
+) -> Figure:
+    """Magnitude, phase and coherence of one pair, with +-2 random errors and the model where there is one.
+
+    Args:
+        responses: measured.
+        output, input: the pair.
+        model: frequencies [rad/s] and response of a model.
+    """
+    h, coherence, error = responses.pair(output, input)
+    hertz = responses.omega / TWO_PI
+    gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h)
+    spread = np.minimum(error, 3.0)
+    layout = _log_x(stacked([f"{output}/{input} [dB]", "phase [deg]", "coherence"], height=140), 3)
+    layout["yaxis3"]["range"] = [0, 1.02]
+    known = np.isfinite(gain)
+    both = np.concatenate([hertz[known], hertz[known][::-1]])
+    traces: list[dict[str, Any]] = []
+    up, down = 20.0 * np.log10(1.0 + 2.0 * spread), 20.0 * np.log10(np.maximum(1.0 - 2.0 * spread, 0.1))
+    for number, middle, above, below in (
+        ("", gain, up, down),
+        ("2", phase, np.degrees(2.0 * spread), -np.degrees(2.0 * spread)),
+    ):
+        edge = np.concatenate([(middle + above)[known], (middle + below)[known][::-1]])
+        band = line(both, edge, name="±2ε", color=_ERROR, width=0, axis=number)
+        traces.append({**band, "fill": "toself", "fillcolor": _ERROR, "hoverinfo": "skip", "hovertemplate": None})
+    hover = "%{x:.3g} Hz, %{y:.4g}"
+    traces += [
+        line(hertz, gain, name="flight", color=FLIGHT, hover=hover),
+        line(hertz, phase, name="flight", color=FLIGHT, hover=hover, axis="2"),
+        line(hertz, coherence, name="coherence", color=FLIGHT, hover=hover, axis="3"),
+        line(hertz[[0, -1]], [0.6, 0.6], name="0.6", color=GREY, dash="dot", axis="3"),
+    ]
+    keys = [Key("flight", FLIGHT), Key("±2 random errors", _ERROR, "band")]
+    if model is not None:
+        omega, answer = model
+        turned = unwrapped_degrees(answer)
+        # The model's count of turns is the flight's where they meet.
+        here = np.interp(omega, responses.omega[known], phase[known])
+        turned = turned + 360.0 * np.round(np.median(here - turned) / 360.0)
+        traces += [
+            line(omega / TWO_PI, decibel(answer), name="model", color=MODEL, dash="dash", width=2.0, hover=hover),
+            line(omega / TWO_PI, turned, name="model", color=MODEL, dash="dash", width=2.0, hover=hover, axis="2"),
+        ]
+        keys.insert(1, Key("model", MODEL, "dash"))
+    band_found = responses.band(output, input)
+    told = (
+        "no coherent band" if band_found is None else f"coherent from {_hz(band_found[0])} to {_hz(band_found[1])} Hz"
+    )
+    return Figure(
+        identifier=f"bode-{_plain(output)}-{_plain(input)}",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"Response of {output} to {input}: {told}. Below a coherence of 0.6 the response is not to be used.",
+        alt=f"Bode diagram of {output} over {input} with coherence; {told}.",
+        keys=tuple(keys),
+    )
+
+
+def _hz(omega: float) -> str:
+    return f"{omega / TWO_PI:.3g}"
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in name)
+
+
+def excitation(responses: FrequencyResponse) -> Figure:
+    """Spectra of the inputs, and how far they moved together."""
+    hertz = responses.omega / TWO_PI
+    layout = _log_x(stacked(["input power [dB]", "between inputs"], height=150), 2)
+    layout["yaxis2"]["range"] = [0, 1.02]
+    traces, keys = [], []
+    for i, name in enumerate(responses.inputs):
+        color = INPUT_COLORS[i % len(INPUT_COLORS)]
+        power = 10.0 * np.log10(np.maximum(responses.input_power[:, i], 1e-30))
+        traces.append(line(hertz, power, name=name, color=color, hover=f"{name}<br>%{{x:.3g}} Hz, %{{y:.1f}} dB"))
+        keys.append(Key(name, color))
+    styles = ("solid", "dash", "dot", "dashdot")
+    number = 0
+    for i, one in enumerate(responses.inputs):
+        for j, other in enumerate(responses.inputs[:i]):
+            style, color = styles[number % 4], _COLORS[number % len(_COLORS)]
+            words = f"{other} with {one}"
+            values = responses.input_coherence[:, i, j]
+            traces.append(line(hertz, values, name=words, color=color, dash=style, axis="2"))
+            keys.append(Key(words, color, style))
+            number += 1
+    return Figure(
+        identifier="excitation",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="What was excited (unit²/Hz in dB), and the coherence between inputs: above 0.5 the pilot or a loop "
+        "mixed them, and only the conditioned responses can tell their effects apart.",
+        alt=f"Input spectra of {', '.join(responses.inputs)} and the coherence between them.",
+        keys=tuple(keys),
+    )
+
+
+def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
+    """Model over flight of every fitted response inside the envelopes of unnoticeable added dynamics."""
+    low = min(m.target.omega[0] for m in found)
+    high = max(m.target.omega[-1] for m in found)
+    omega = np.geomspace(low, high, 80)
+    bound = envelopes(omega)
+    layout = _log_x(stacked(["model/flight [dB]", "model/flight [deg]"], height=170), 2)
+    layout["yaxis"]["range"], layout["yaxis2"]["range"] = [-15, 15], [-120, 120]
+    both = np.concatenate([omega, omega[::-1]]) / TWO_PI
+    traces, keys = [], [Key("not noticed by a pilot", BAND, "band")]
+    for number, kind in (("", "gain"), ("2", "phase")):
+        edge = np.concatenate([bound[f"{kind}_high"], bound[f"{kind}_low"][::-1]])
+        band = line(both, edge, name="envelope", color=BAND, width=0, axis=number)
+        traces.append({**band, "fill": "toself", "fillcolor": BAND, "hoverinfo": "skip", "hovertemplate": None})
+    for k, m in enumerate(found):
+        color, style = _COLORS[k % len(_COLORS)], ("solid", "dash", "dot")[(k // len(_COLORS)) % 3]
+        hertz = m.target.omega / TWO_PI
+        hover = f"{m.target.name}<br>%{{x:.3g}} Hz, %{{y:.3g}}"
+        traces.append(line(hertz, m.gain, name=m.target.name, color=color, dash=style, hover=hover))
+        traces.append(line(hertz, m.phase, name=m.target.name, color=color, dash=style, hover=hover, axis="2"))
+        keys.append(Key(m.target.name, color, style))
+    inside = float(np.mean([m.inside for m in found]))
+    return Figure(
+        identifier="mismatch",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"Mismatch, model over flight: {100 * inside:.0f} % of the points lie inside the envelopes of maximum "
+        "unnoticeable added dynamics (MIL-HDBK-1797, found for the pitch of fighters: a measure, not a requirement).",
+        alt=f"Mismatch of {len(found)} responses in gain and phase; {100 * inside:.0f} % inside the envelopes.",
+        keys=tuple(keys),
+    )
+
+
+def verification_figure(
+    trace: Trace,
+    outputs: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    number: int,
+    rival: tuple[str, Trace, Sequence[str]] | None = None,
+) -> Figure:
+    """Inputs, then flight and model of every output over time, as in Figs 6 to 9 of Bhandari et al. (2005).
+
+    Args:
+        trace: flight and model. outputs, inputs: their columns.
+        number: of the figure.
+        rival: another model's name, its trace of the same stretch and its outputs.
+    """
+    titles = ["inputs", *(axis_title(name) for name in outputs)]
+    layout = stacked(titles, height=104)
+    places = kept(trace.flight[:, 0])
+    time = trace.time[places]
+    traces, keys = [], [Key("flight", FLIGHT), Key("model", MODEL, "dash")]
+    for i, name in enumerate(inputs):
+        color = INPUT_COLORS[i % len(INPUT_COLORS)]
+        traces.append(line(time, trace.inputs[places, i], name=name, color=color))
+        keys.append(Key(name, color))
+    for k, name in enumerate(outputs):
+        axis = str(k + 2)
+        traces.append(line(time, shown(name, trace.flight[places, k]), name="flight", color=FLIGHT, axis=axis))
+        model = shown(name, trace.model[places, k])
+        traces.append(line(time, model, name="model", color=MODEL, dash="dash", axis=axis))
+        if rival is not None and name in rival[2]:
+            other = shown(name, rival[1].model[places, rival[2].index(name)])
+            traces.append(line(time, other, name=rival[0], color=PUBLISHED, dash="dot", axis=axis))
+    if rival is not None:
+        keys.append(Key(rival[0], PUBLISHED, "dot"))
+    return Figure(
+        identifier=f"verification-{number}",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"{trace.source}: flight and model along the recorded inputs, biases and shifts solved for.",
+        alt=f"{', '.join(channel(n).name for n in outputs)} of flight and model over time.",
+        keys=tuple(keys),
+    )

@@ -1,0 +1,128 @@
+"""Reports on frequency responses and on the models that were fitted to them, by the same page as every other report."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from swashplate.atomic import write_text
+from swashplate.errors import SwashError
+from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
+from swashplate.reporting import sections_responses
+from swashplate.reporting.html import render
+from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.structure import Report
+from swashplate.reporting.versions import date, versions
+from swashplate.reporting.words import listed
+
+
+def response_report(material: ResponseMaterial, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
+    """Write one self-contained HTML file; it appears by rename when it is complete.
+
+    Raises:
+        SwashError: nothing to report, or a place that cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(compose_responses(material, title=title)))
+    except OSError as error:
+        raise SwashError(
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
+
+
+def compose_responses(material: ResponseMaterial, *, title: str | None = None) -> Report:
+    """The report's structure."""
+    m = material
+    if not (m.responses or m.transfer_functions or m.fit or m.verification):
+        raise SwashError("there is nothing to report.")
+    parts = [
+        sections_responses.verification_section(m.verification, m.rival) if m.verification else None,
+        sections_responses.fit_parameters_section(m.fit) if m.fit else None,
+        sections_responses.fit_costs_section(m.fit) if m.fit else None,
+        sections_responses.transfer_functions_section(m) if m.transfer_functions else None,
+        sections_responses.bodes_section(m) if m.responses else None,
+        sections_responses.excitation_section(m.responses) if m.responses else None,
+        sections_responses.handling_section(m),
+        sections_responses.gains_section(m.gains) if m.gains else None,
+        sections_responses.made_section(),
+    ]
+    return Report(
+        title=title or _title(m),
+        banners=_banners(m),
+        summary=_summary(m),
+        picture=None,
+        sections=tuple(part for part in parts if part is not None),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def _title(m: ResponseMaterial) -> str:
+    if m.fit:
+        return f"{m.fit.model.name} identified from frequency responses"
+    if m.transfer_functions:
+        return "Transfer functions from frequency responses"
+    if m.responses:
+        return "Frequency responses"
+    assert m.verification is not None
+    return f"{m.verification.model.name} along unseen records"
+
+
+def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
+    found = []
+    if m.verification and any(f.provenance.simulated for f in m.verification.flights):
+        found.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))
+    if m.fit and m.fit.problems:
+        found.append(("bad", f"PROBLEM: {' '.join(m.fit.problems)}"))
+    if m.responses and m.responses.problems:
+        found.append(("bad", f"NOT COMPUTED: {' '.join(m.responses.problems)}"))
+    return tuple(found)
+
+
+def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
+    rows = []
+    if m.responses:
+        r = m.responses
+        pairs = [(o, i) for o in r.outputs for i in r.inputs if r.band(o, i) is not None]
+        words = f"{len(pairs)} of {len(r.outputs) * len(r.inputs)} responses have a coherent band ({r.method} estimate)"
+        rows.append(("Responses", f"{words}, from {listed(r.sources, most=4)}.", "plain"))
+    if m.transfer_functions:
+        words = "; ".join(
+            f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.models, f.costs, strict=True)
+        )
+        rows.append(("Model", words, sections_responses.tone(max(c for f in m.transfer_functions for c in f.costs))))
+    if m.fit:
+        f = m.fit
+        rows.append(
+            (
+                "Model",
+                f"{f.model.title}: J_ave {f.cost:.1f} over {len(f.targets)} responses.",
+                sections_responses.tone(f.cost),
+            )
+        )
+        weak = [p for p in f.parameters if not p.fixed and not p.tie and sections_responses.weak(p)]
+        text = "all within their targets" if not weak else f"outside: {listed([p.name for p in weak])}"
+        rows.append(
+            (
+                "Accuracy",
+                f"Cramér-Rao ≤ {CR_TARGET:g} %, insensitivity ≤ {I_TARGET:g} %: {text}.",
+                "caution" if weak else "good",
+            )
+        )
+    if m.verification:
+        v = m.verification
+        rows.append(
+            (
+                "In time",
+                f"J_rms {v.cost:.2f} on {listed([t.source for t in v.traces], most=3)}.",
+                "good" if v.good else "caution",
+            )
+        )
+    elif m.fit or m.transfer_functions:
+        rows.append(("In time", "not verified: give a flight that the fit has not seen.", "caution"))
+    told = [*(m.responses.warnings if m.responses else ()), *(m.fit.warnings if m.fit else ())]
+    rows.append(
+        ("Beware", " ".join(told[:3]) or "nothing that these flights could show.", "caution" if told else "plain")
+    )
+    return tuple(rows)

@@ -1,0 +1,364 @@
+"""Sections on frequency responses, the models fitted to them, their verification in time and suggested gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from swashplate.control.ardupilot_gains import Suggestion
+from swashplate.errors import IdentificationError
+from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.handling import Handling, attitude_of, handling_qualities
+from swashplate.identification.mismatch import mismatch
+from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
+from swashplate.identification.spectra import Complex
+from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
+from swashplate.identification.state_space_result import StateSpaceFit
+from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
+from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
+from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
+from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure, verification_figure
+from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.versions import versions
+from swashplate.reporting.words import value_words
+from swashplate.simulation.linearize import Mode
+
+_TRACES = 4
+"""Stretches of a verification that are drawn."""
+
+
+@dataclass(frozen=True)
+class ResponseMaterial:
+    """What a report is about; any part may be missing, not all.
+
+    Attributes:
+        responses: measured. transfer_functions: fits to them. trials: structures that were tried.
+        fit: a state-space fit. verification: in time. rival: another model on the same records.
+        gains: suggested for the autopilot.
+    """
+
+    responses: FrequencyResponse | None = None
+    transfer_functions: tuple[TransferFunctionFit, ...] = ()
+    trials: tuple[Trial, ...] = ()
+    fit: StateSpaceFit | None = None
+    verification: Verification | None = None
+    rival: Verification | None = None
+    gains: tuple[Suggestion, ...] = field(default=())
+
+
+def tone(cost: float) -> str:
+    return "good" if cost <= INDISTINGUISHABLE else "caution" if cost <= ACCEPTABLE else "bad"
+
+
+def weak(p: ParameterAccuracy) -> bool:
+    return p.cramer_rao_percent > CR_TARGET or p.insensitivity_percent > I_TARGET
+
+
+def _percent(value: float, limit: float) -> Cell:
+    words = f"{value:.1f} %" if value < 1000.0 else "not seen"
+    return Cell(words, number=True, tone="good" if value <= limit else "caution" if value <= 2 * limit else "bad")
+
+
+def parameter_table(parameters: Sequence[ParameterAccuracy]) -> Table:
+    """Every number with its Cramér-Rao bound and insensitivity, coloured by the targets."""
+    rows = []
+    for p in parameters:
+        moving = not p.fixed and not p.tie
+        remark = f"= {p.tie}" if p.tie else "held" if p.fixed else "at its bound" if p.at_bound else ""
+        rows.append(
+            (
+                Cell(p.name),
+                Cell(unit_words(p.unit)),
+                Cell(value_words(p.start), number=True),
+                Cell(value_words(p.value, p.cramer_rao if moving else None), number=True, strong=True),
+                _percent(p.cramer_rao_percent, CR_TARGET) if moving else Cell("", number=True),
+                _percent(p.insensitivity_percent, I_TARGET) if moving else Cell("", number=True),
+                Cell(remark, tone="bad" if p.at_bound else "plain"),
+            )
+        )
+    return Table(
+        "Parameters",
+        ("parameter", "unit", "start", "identified", "Cramér-Rao", "insensitivity", "remarks"),
+        tuple(rows),
+        note=f"Targets: Cramér-Rao {CR_TARGET:g} %, insensitivity {I_TARGET:g} % of the value; beyond twice of it a "
+        "number is not told by these responses. J is not a likelihood: the true scatter is about √2·σ (dB) times the "
+        "bound (see the proof page for what was measured).",
+    )
+
+
+def fit_parameters_section(fit: StateSpaceFit) -> Section:
+    blocks: list[Block] = [Text(text, tone="bad") for text in fit.problems]
+    if fit.warnings:
+        blocks.append(Points(fit.warnings, title="What to beware of"))
+    blocks.append(parameter_table(fit.parameters))
+    if fit.reduction:
+        blocks.append(
+            Table(
+                "Structure reduction",
+                ("parameter", "why", "J_ave before", "J_ave after", "verdict"),
+                tuple(
+                    (
+                        Cell(s.dropped),
+                        Cell(s.reason),
+                        Cell(f"{s.before:.1f}", number=True),
+                        Cell(f"{s.after:.1f}", number=True),
+                        Cell("dropped" if s.kept else "put back", tone="plain" if s.kept else "quiet"),
+                    )
+                    for s in fit.reduction
+                ),
+            )
+        )
+    modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
+    blocks.append(eigenvalues(modes))
+    if len(fit.free) > 1:
+        blocks.append(correlation_matrix(fit.free, fit.correlation))
+    if len(fit.history) > 1:
+        words = "Half the sum of J over all responses, after each iteration."
+        blocks.append(replace(cost_history(fit.history), caption=words))
+    return Section("parameters", "Parameters", tuple(blocks))
+
+
+def _modes(values: Complex) -> tuple[Mode, ...]:
+    return tuple(
+        Mode(complex(v), abs(v), float(-v.real / abs(v)) if abs(v) else 0.0, -1.0 / v.real if v.real else np.inf, ())
+        for v in values
+        if v.imag >= 0.0
+    )
+
+
+def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
+    return Table(
+        "Cost of each response",
+        ("response", "band [Hz]", "J"),
+        tuple(
+            (
+                Cell(t.name),
+                Cell(f"{t.omega[0] / TWO_PI:.3g} to {t.omega[-1] / TWO_PI:.3g}", number=True),
+                Cell(f"{cost:.1f}", number=True, tone=tone(cost)),
+            )
+            for t, cost in zip(targets, costs, strict=True)
+        ),
+        note=f"J up to {INDISTINGUISHABLE:g} is hardly to be told from the flight, up to {ACCEPTABLE:g} acceptable.",
+    )
+
+
+def fit_costs_section(fit: StateSpaceFit) -> Section:
+    pairs = [(fit.model.outputs.index(t.output), fit.model.inputs.index(t.input), t.omega) for t in fit.targets]
+    answers = [fit.model.response(omega)[:, o, i] for o, i, omega in pairs]
+    found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
+    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), mismatch_figure(found)]
+    if fit.left_out:
+        blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.left_out)}."))
+    return Section("costs", "Responses, flight against model", tuple(blocks))
+
+
+def transfer_functions_section(m: ResponseMaterial) -> Section:
+    blocks: list[Block] = []
+    for fit in m.transfer_functions:
+        blocks += [Text(f"{model!r}") for model in fit.models]
+        blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.parameters)]
+        blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
+        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.models, fit.targets, strict=True)]
+        blocks.append(mismatch_figure(found))
+    if m.trials:
+        chosen = m.transfer_functions[0].form if m.transfer_functions else None
+        blocks.append(
+            Table(
+                "Structures tried",
+                ("zeros / poles (+ integrators)", "parameters", "J"),
+                tuple(
+                    (
+                        Cell(t.form.text, tone="good" if t.form == chosen else "plain"),
+                        Cell(str(t.parameters), number=True),
+                        Cell(f"{t.cost:.1f}", number=True, tone=tone(t.cost), strong=t.form == chosen),
+                    )
+                    for t in m.trials
+                ),
+                note="The suggestion is the one with the fewest parameters that costs hardly more than the best.",
+            )
+        )
+    return Section("transfer-functions", "Transfer functions", tuple(blocks))
+
+
+def bodes_section(m: ResponseMaterial) -> Section:
+    r = m.responses
+    assert r is not None
+    rows, figures = [], []
+    by_pair = {(model.output, model.input): model for f in m.transfer_functions for model in f.models}
+    for output in r.outputs:
+        for name in r.inputs:
+            band = r.band(output, name)
+            h, coherence, error = r.pair(output, name)
+            if band is None:
+                best = float(np.nanmax(coherence)) if np.isfinite(coherence).any() else float("nan")
+                rows.append(
+                    (
+                        Cell(f"{output} / {name}"),
+                        Cell("none", tone="caution"),
+                        Cell(value_words(best), number=True),
+                        Cell("–", number=True),
+                    )
+                )
+                continue
+            inside = (r.omega >= band[0]) & (r.omega <= band[1]) & np.isfinite(h)
+            rows.append(
+                (
+                    Cell(f"{output} / {name}"),
+                    Cell(f"{band[0] / TWO_PI:.3g} to {band[1] / TWO_PI:.3g} Hz"),
+                    Cell(f"{np.median(coherence[inside]):.2f}", number=True),
+                    Cell(f"{20 * np.log10(1 + np.median(error[inside])):.2f}", number=True),
+                )
+            )
+            model = None
+            if m.fit and output in m.fit.model.outputs and name in m.fit.model.inputs:
+                o, i = m.fit.model.outputs.index(output), m.fit.model.inputs.index(name)
+                model = (r.omega, m.fit.model.response(r.omega)[:, o, i])
+            elif (output, name) in by_pair:
+                model = (r.omega, by_pair[output, name].response(r.omega))
+            figures.append(bode(r, output, name, model=model))
+    blocks: list[Block] = [Text(text, tone="bad") for text in r.problems]
+    blocks += [Points(r.warnings, title="What to beware of")] if r.warnings else []
+    blocks.append(
+        Table("Where the responses may be used", ("response", "coherent band", "coherence", "error [dB]"), tuple(rows))
+    )
+    return Section("responses", "Frequency responses", (*blocks, *figures))
+
+
+def excitation_section(r: FrequencyResponse) -> Section:
+    return Section("excitation", "What was excited", (excitation(r),), folded=True)
+
+
+def verification_section(v: Verification, rival: Verification | None = None) -> Section:
+    rows = tuple(
+        (
+            Cell(o.output),
+            Cell(unit_words(o.unit)),
+            Cell(value_words(o.rms), number=True),
+            Cell(f"{o.theil:.2f}", number=True, tone="good" if o.theil <= GOOD_TIC else "caution"),
+            Cell(f"{o.fit:.0f}", number=True),
+        )
+        for o in v.outputs
+    )
+    blocks: list[Block] = [Text(text, tone="caution") for text in v.warnings]
+    blocks.append(
+        Text(
+            f"J_rms = {v.cost:.2f} (1 deg, 1 deg/s, 1 ft/s and 1 ft/s² alike); up to {GOOD_J:g} is good.",
+            tone="good" if v.good else "caution",
+        )
+    )
+    blocks.append(
+        Table(
+            "Along unseen records",
+            ("output", "unit", "rms error", "Theil", "fit %"),
+            rows,
+            note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
+        )
+    )
+    if rival is not None:
+        theirs = tuple(
+            (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
+            for o in rival.outputs
+        )
+        blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
+    outputs = tuple(o.output for o in v.outputs)
+    for k, trace in enumerate(v.traces[:_TRACES]):
+        twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
+        other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
+        blocks.append(verification_figure(trace, outputs, v.model.inputs, number=k, rival=other))
+    return Section("verification", "Verification in time", tuple(blocks))
+
+
+def gains_section(gains: Sequence[Suggestion]) -> Section:
+    rows = tuple(
+        (
+            Cell(name),
+            Cell(f"{value:.4f}", number=True, strong=True),
+            Cell(
+                f"{g.margins.phase_margin.value:.0f}" if np.isfinite(g.margins.phase_margin.value) else "no crossing",
+                number=True,
+            ),
+            Cell(f"{g.margins.gain_margin.value:.1f}", number=True),
+            Cell(f"{g.peak:.2f}", number=True),
+        )
+        for g in gains
+        for name, value in g.parameters.items()
+    )
+    return Section(
+        "gains",
+        "Suggested rate-loop gains (ArduPilot)",
+        (
+            Table(
+                "Gains and the margins they give on the identified model",
+                ("parameter", "value", "phase margin [deg]", "gain margin [dB]", "peak sensitivity"),
+                rows,
+            ),
+            Text(gains[0].words, tone="caution"),
+        ),
+    )
+
+
+def made_section() -> Section:
+    rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
+    return Section("versions", "Versions", (Table("Versions", ("package", "version"), rows),), folded=True)
+
+
+def handling_section(m: ResponseMaterial) -> Section | None:
+    """Bandwidth and phase delay of every rate response that is strong enough, from the flight and from the model."""
+    r = m.responses
+    if r is None:
+        return None
+    rows = []
+    for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
+        if rate not in r.outputs:
+            continue
+        # The input that moves this axis best is its own.
+        coherent = {n: float(np.nansum(r.coherence[:, r.outputs.index(rate), i])) for i, n in enumerate(r.inputs)}
+        name = max(coherent, key=lambda n: coherent[n])
+        found = [("flight", _handling(r, rate, name))]
+        if m.fit and rate in m.fit.model.outputs and name in m.fit.model.inputs:
+            found.append(("model", _model_handling(m.fit, rate, name)))
+        for source, read in found:
+            if isinstance(read, str):
+                rows.append((Cell(f"{angle} / {name}"), Cell(source), Cell(read), *[Cell("–", number=True)] * 3))
+                continue
+            cells = (read.bandwidth, read.omega_180, read.phase_delay_line)
+            rows.append(
+                (Cell(f"{angle} / {name}"), Cell(source), Cell(""), *(Cell(repr(c), number=True) for c in cells))
+            )
+    if not rows:
+        return None
+    table = Table(
+        "Attitude responses (rates over jω)",
+        ("response", "from", "remark", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]"),
+        tuple(rows),
+        note="ADS-33E-PRF, rate command: the lower of the frequencies of 45° phase margin and 6 dB gain margin; phase "
+        "delay by a coherence-weighted line from ω180 to twice of it. Its boundaries are for manned helicopters: for a "
+        "small one scale frequencies with the square root of the size (Froude).",
+    )
+    return Section("handling", "Handling qualities", (table,), folded=True)
+
+
+def _handling(r: FrequencyResponse, rate: str, name: str) -> Handling | str:
+    try:
+        omega, attitude, error, coherence = attitude_of(r, rate, name)
+        return handling_qualities(omega, _pilots(attitude), error=error, coherence=coherence)
+    except IdentificationError as problem:
+        return problem.problem
+
+
+def _model_handling(fit: StateSpaceFit, rate: str, name: str) -> Handling | str:
+    omega = np.geomspace(0.3, 300.0, 800)
+    o, i = fit.model.outputs.index(rate), fit.model.inputs.index(name)
+    try:
+        return handling_qualities(omega, _pilots(fit.model.response(omega)[:, o, i] / (1j * omega)))
+    except IdentificationError as problem:
+        return problem.problem
+
+
+def _pilots(attitude: Complex) -> Complex:
+    """The response with the sign that a pilot expects: a positive command turns the aircraft positively."""
+    middle = attitude[len(attitude) // 4]
+    return -attitude if (1j * middle).real < 0.0 else attitude

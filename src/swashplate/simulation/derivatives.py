@@ -1,0 +1,88 @@
+"""The table of derivatives by automatic differentiation of the nonlinear equations."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.errors import SwashError
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    jax_backend,
+    parameter_row,
+    unpack_rows,
+)
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.conventional import CONTRIBUTORS, loads
+from swashplate.vehicles.derivatives import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
+from swashplate.vehicles.helicopter_options import HelicopterOptions
+from swashplate.vehicles.structure import leaves, rebuild
+from swashplate.vehicles.vehicle import Vehicle
+
+_FAST = ("a1", "b1", "lam0", "lam_c", "lam_s")
+"""States that follow without delay in a table of derivatives with six degrees of freedom."""
+
+
+def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
+    """All derivatives of forces and moments about a trim, by contributor, exactly.
+
+    Flapping and dynamic inflow are residualised (their rates set to zero); bar, servos, gyro and rotor speed are held.
+
+    Raises:
+        SwashError: for a vehicle that is no single-rotor helicopter.
+    """
+    if not isinstance(options_of(vehicle), HelicopterOptions):
+        raise SwashError("has no table of derivatives.", where=vehicle.name, hint="It needs a single-rotor card.")
+    enable_double_precision()
+    surroundings = [float(getattr(trim.environment, name)) for name in SURROUNDINGS]
+    w = np.array([*trim.inputs, *surroundings])
+    by_x, by_w = _slopes(equations_of(vehicle), np.asarray(trim.state), w, parameter_row(vehicle, trim.environment))
+    by_x, by_w = np.asarray(by_x), np.asarray(by_w)
+    fast = [vehicle.index(name) for name in _FAST if name in vehicle.state_names]
+    motions = [vehicle.index(name) for name in MOTIONS]
+    controls = [vehicle.input_names.index(name) for name in CONTROLS]
+    if "theta0_servo" in vehicle.state_names:
+        direct = by_x[:, [vehicle.index(f"{name}_servo") for name in CONTROLS]]
+    else:
+        direct = by_w[:, controls]
+    columns = np.concatenate([by_x[:, motions], direct], axis=1)
+    n = 6 * len(CONTRIBUTORS)
+    following = -np.linalg.solve(by_x[n:, fast], columns[n:])
+    columns = columns[:n] + by_x[:n, fast] @ following
+    par = vehicle.values()
+    scale = np.array([par.mass] * 3 + [par.inertia_xx, par.inertia_yy, par.inertia_zz])[:, None]
+    blocks = columns.reshape(len(CONTRIBUTORS), 6, len(COLUMNS)) / scale
+    parts = {name: block for name, block in zip(CONTRIBUTORS, blocks, strict=True) if name != "ground" or block.any()}
+    return DerivativeTable(parts, following[:2], "automatic differentiation")
+
+
+def options_of(vehicle: Vehicle) -> Any:
+    """The options of a single-rotor helicopter's equations; None for another vehicle."""
+    return vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _slopes(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    vehicle = equations.vehicle
+    options = options_of(vehicle)
+
+    def acting(x: Any, w: Any) -> Any:
+        inputs, parameters, environment = unpack_rows(equations, w, p)
+        state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
+        commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))
+        found = loads(state, commands, parameters, environment, jax_backend(), options=options)
+        rows = []
+        for name in CONTRIBUTORS:
+            part = getattr(found, name)
+            rows += [0.0] * 6 if part is None else [*part.force, *part.moment]
+        return jnp.stack([jnp.asarray(value, x.dtype) for value in (*rows, *leaves(found.disc), *leaves(found.inflow))])
+
+    return jax.jacfwd(acting, argnums=(0, 1))(x, w)  # type: ignore[no-any-return]

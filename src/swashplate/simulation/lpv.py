@@ -1,0 +1,231 @@
+"""Linear-parameter-varying flight of a single-rotor helicopter, three ways; the nonlinear equations judge them.
+
+All have the eight states of Bhandari et al. (2005), eq. 13, with flapping that follows without delay:
+
+* "as-printed": dx/dt = A(x) (x - x0) + B(x) (u - u0) with A and B computed anew at every step from the state there, and
+  everything counted from the first trim (their eq. 11). Away from that trim this is not the equations' tangent: a
+  tangent at x touches f(x), and f(x) is not A(x) (x - x0) + B(x) (u - u0). At a steady flight at another speed, where
+  nothing should move, it accelerates; the error grows with time.
+* "trim-term": dx/dt = A(rho) (x - x_trim(rho)) + B(rho) (u - u_trim(rho)) over a table of trims, rho the speed ahead.
+* "stitched": the same aerodynamics about the same trims, with the nonlinear gravity and rigid-body terms (Tobias and
+  Tischler 2016); the trims' gradients stand for the derivatives by speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    row_rates,
+)
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
+from swashplate.simulation.speeds import trims_over_speed
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Scheme = Literal["as-printed", "trim-term", "stitched"]
+
+_U, _W, _Q, _THETA, _V, _P, _PHI, _R = range(8)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Trims and linear models over speed, rows of PAPER_STATES and PAPER_INPUTS.
+
+    Attributes:
+        speeds: speed u ahead of each trim [m/s], shape (n,), ascending.
+        x, u: trims, shapes (n, 8) and (n, 4).
+        A, B: models, shapes (n, 8, 8) and (n, 8, 4).
+    """
+
+    speeds: Array
+    x: Array
+    u: Array
+    A: Array
+    B: Array
+
+
+def schedule(vehicle: Vehicle, speeds: Sequence[float], *, environment: Environment | None = None) -> Schedule:
+    """Trims and eight-state models of a single-rotor helicopter at ascending speeds [m/s]."""
+    trims = trims_over_speed(vehicle, speeds, environment=environment)
+    models = [paper_model(linearize(vehicle, at)) for at in trims]
+    x = np.array([[at.states()[name] for name in PAPER_STATES] for at in trims])
+    u = np.array([[at.commands()[name] for name in PAPER_INPUTS] for at in trims])
+    return Schedule(x[:, _U], x, u, np.array([m.A for m in models]), np.array([m.B for m in models]))
+
+
+def simulate_lpv(
+    vehicle: Vehicle,
+    inputs: Mapping[str, ArrayLike],
+    *,
+    start: Trim,
+    scheme: Scheme,
+    over: Schedule | None = None,
+    rate: float = 1000.0,
+) -> Flight:
+    """Fly given controls with an LPV model.
+
+    Args:
+        vehicle: a single-rotor helicopter without options that add states (14 states).
+        inputs: series (n,) of `PAPER_INPUTS` at `rate`.
+        start: the trim that it begins at (and that "as-printed" counts from).
+        scheme: "as-printed", "trim-term" or "stitched".
+        over: the table of the latter two.
+        rate: steps per second [Hz]; Runge-Kutta of order 4, matrices held over a step.
+
+    Returns:
+        A flight with the eight states and the inputs.
+
+    Raises:
+        FlightError: where an input is missing. SwashError: for another vehicle, scheme, or without the table it needs.
+    """
+    enable_double_precision()
+    names = ("a1", "b1")
+    if not set(PAPER_STATES) | set(names) <= set(vehicle.state_names) or len(vehicle.state_names) != 14:
+        raise SwashError(
+            "has other states than body and flapping.", where=vehicle.name, hint="Use a single-rotor card, options off."
+        )
+    missing = [name for name in PAPER_INPUTS if name not in inputs]
+    if missing:
+        raise FlightError("is missing.", channel=missing[0])
+    u = np.column_stack([np.asarray(inputs[name], dtype=np.float64) for name in PAPER_INPUTS])
+    x0 = np.array([start.states()[name] for name in PAPER_STATES])
+    u0 = np.array([start.commands()[name] for name in PAPER_INPUTS])
+    surroundings = start.environment
+    if scheme == "as-printed":
+        disc = np.array([start.states()[name] for name in names])
+        row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
+        p = parameter_row(vehicle, surroundings)
+        states = _printed(equations_of(vehicle), x0, u0, disc, u, row, p, 1.0 / rate)
+    elif scheme in ("trim-term", "stitched"):
+        if over is None:
+            raise SwashError(f"scheme '{scheme}' needs a schedule.", hint="Pass over=schedule(vehicle, speeds).")
+        tables = tuple(map(jnp.asarray, (over.speeds, over.x, over.u, over.A, over.B)))
+        g = float(surroundings.gravity)
+        states = _scheduled(tables, x0, u, 1.0 / rate, g, stitched=scheme == "stitched")
+    else:
+        raise SwashError(f"scheme is '{scheme}', expected 'as-printed', 'trim-term' or 'stitched'.")
+    time = np.arange(len(u)) / rate
+    columns = dict(zip((*PAPER_STATES, *PAPER_INPUTS), np.hstack([np.asarray(states), u]).T, strict=True))
+    provenance = Provenance(source=f"LPV {scheme} {vehicle.name}", simulated=True, vehicle=vehicle.name)
+    units = dict.fromkeys(PAPER_INPUTS, "rad")
+    return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate_lpv", scheme=scheme, rate=rate)
+
+
+def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
+    """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
+    k = A @ x + c
+    total, term = x + dt * k, k
+    for order in (2.0, 3.0, 4.0):
+        term = dt * (A @ term) / order
+        total = total + dt * term
+    return total
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _printed(equations: Equations, x0: Any, u0: Any, disc0: Any, u: Any, row: Any, p: Any, dt: Any) -> Any:
+    vehicle = equations.vehicle
+    rates = row_rates(equations, padded=False)
+    names = vehicle.state_names
+    ten = (*PAPER_STATES, "a1", "b1")
+    order = [10 + PAPER_INPUTS.index(name) for name in vehicle.input_names]
+
+    def moving(z: Any) -> Any:
+        """Rates of the eight states and the disc, from these ten and the controls."""
+        zero = jnp.zeros(())
+        # Stacks and slices only: XLA makes no function of a loop that gathers or scatters.
+        state = jnp.stack([z[ten.index(name)] if name in ten else zero for name in names])
+        found = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
+        return jnp.stack([found[names.index(name)] for name in ten])
+
+    def step(carry: tuple[Any, Any], command: Any) -> tuple[Any, Any]:
+        x, disc = carry
+        z = jnp.concatenate([x, disc, command])
+        # Eight directions at a time in a loop that XLA makes one function of (`compile_small_loops_whole`); the zero
+        # keeps it from moving what all directions share out of that loop, into hundreds of launches (8 times slower).
+        values, slopes = jax.lax.map(
+            lambda along: jax.vmap(lambda e: jax.jvp(moving, (z + 0.0 * along[0],), (e,)))(along),
+            jnp.eye(16)[:, :14].reshape(2, 8, 14),
+        )
+        value, J = values[0, 0], slopes.reshape(16, 10)[:14].T
+        # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
+        a, b, c, d = J[8, 8], J[8, 9], J[9, 8], J[9, 9]
+        inverse = jnp.array([[d, -b], [-c, a]]) / (a * d - b * c)
+        follow = -inverse @ jnp.concatenate([J[8:, :8], J[8:, 10:]], axis=1)
+        A = J[:8, :8] + J[:8, 8:10] @ follow[:, :8]
+        B = J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
+        after = _linear_step(A, B @ (command - u0) - A @ x0, x, dt)
+        return (after, disc - inverse @ value[8:]), x
+
+    _, states = jax.lax.scan(step, (jnp.asarray(x0), jnp.asarray(disc0)), jnp.asarray(u))
+    return states
+
+
+@partial(jax.jit, static_argnames=("stitched",))
+def _scheduled(tables: Any, x0: Any, u: Any, dt: Any, g: Any, *, stitched: bool) -> Any:
+    speeds = tables[0]
+
+    def between(speed: Any) -> tuple[Any, ...]:
+        i = jnp.clip(jnp.searchsorted(speeds, speed) - 1, 0, speeds.size - 2)
+        f = jnp.clip((speed - speeds[i]) / (speeds[i + 1] - speeds[i]), 0.0, 1.0)
+        return tuple(table[i] + f * (table[i + 1] - table[i]) for table in tables[1:])
+
+    def rates(x: Any, command: Any) -> Any:
+        xt, ut, A, B = between(x[_U])
+        if not stitched:
+            return A @ (x - xt) + B @ (command - ut)
+        # What the linear model has of gravity and rigid-body terms goes out, the terms themselves come in.
+        linear = _kinematic_slope(xt, g)
+        aerodynamic = (A - linear) @ (x - xt) + B @ (command - ut)
+        return aerodynamic + _kinematics(x, g) - _kinematics(xt, g)
+
+    def step(x: Any, command: Any) -> tuple[Any, Any]:
+        k1 = rates(x, command)
+        k2 = rates(x + 0.5 * dt * k1, command)
+        k3 = rates(x + 0.5 * dt * k2, command)
+        k4 = rates(x + dt * k3, command)
+        return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), x
+
+    _, states = jax.lax.scan(step, jnp.asarray(x0), jnp.asarray(u))
+    return states
+
+
+def _kinematics(x: Any, g: Any) -> Any:
+    """Gravity, Coriolis and Euler-angle terms of the eight states (the products of inertia's rates are left linear)."""
+    u, w, q, theta, v, p, phi, r = (x[i] for i in range(8))
+    sf, cf, st, ct = jnp.sin(phi), jnp.cos(phi), jnp.sin(theta), jnp.cos(theta)
+    return jnp.stack(
+        [
+            -q * w + r * v - g * st,
+            -p * v + q * u + g * cf * ct,
+            jnp.zeros(()),
+            q * cf - r * sf,
+            -r * u + p * w + g * sf * ct,
+            jnp.zeros(()),
+            p + (q * sf + r * cf) * st / ct,
+            jnp.zeros(()),
+        ]
+    )
+
+
+def _kinematic_slope(x: Any, g: Any) -> Any:
+    return jax.jacfwd(_kinematics)(x, g)

@@ -1,0 +1,354 @@
+"""The single-rotor helicopter: main rotor with tip-path plane, tail rotor, tails, fuselage, and what drives them.
+
+After Bhandari et al. (2005), with what that paper leaves for later: the nonlinear equations behind its stability
+derivatives, the stabilizer bar and forward flight. Signs and symbols: `physics.blade_element`. A rotor that
+turns clockwise from above is the mirror image: lateral quantities go in and come out multiplied by `rotation`.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+from swashplate.physics import actuators, bell_hiller, engine, fuselage, ground_contact, tail_rotor, tail_surfaces
+from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.bell_hiller import Bar
+from swashplate.physics.engine import RotorSpeed
+from swashplate.physics.environment import Environment
+from swashplate.physics.flapping import Flapping
+from swashplate.physics.frames import Vector, local_to_body
+from swashplate.physics.inflow import Inflow
+from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
+from swashplate.vehicles.card import Card
+from swashplate.vehicles.helicopter_checks import check_numbers
+from swashplate.vehicles.helicopter_options import HelicopterOptions, helicopter_options
+from swashplate.vehicles.helicopter_parameters import UNITS, HelicopterParameters
+from swashplate.vehicles.main_rotor import Contribution, main_rotor
+from swashplate.vehicles.vehicle import Vehicle
+
+_SLOWEST = 0.1
+"""Share of the governed speed below which coefficients no longer change, and loads fade with the speed squared."""
+
+
+class Controls(NamedTuple):
+    """Main rotor collective, longitudinal (forward positive) and lateral (right positive) cyclic, tail collective."""
+
+    theta0: Scalar
+    B1: Scalar
+    A1: Scalar
+    theta0T: Scalar
+
+
+class EngineControls(NamedTuple):
+    """The same and the throttle: 1 for governed flight, 0 for autorotation."""
+
+    theta0: Scalar
+    B1: Scalar
+    A1: Scalar
+    theta0T: Scalar
+    throttle: Scalar
+
+
+class YawGyro(NamedTuple):
+    """The yaw gyro's filtered yaw rate [rad/s]."""
+
+    r_gyro: Scalar
+
+
+class Servos(NamedTuple):
+    """Where the servos stand, in the units of the controls [rad]."""
+
+    theta0_servo: Scalar
+    B1_servo: Scalar
+    A1_servo: Scalar
+    theta0T_servo: Scalar
+
+
+class HelicopterState(NamedTuple):
+    """Rigid body and tip-path plane, and the optional parts: None where they are left out."""
+
+    body: RigidBody
+    disc: Flapping
+    bar: Bar | None
+    inflow: Inflow | None
+    rotor: RotorSpeed | None
+    gyro: YawGyro | None
+    servos: Servos | None
+
+
+class Loads(NamedTuple):
+    """What acts on the fuselage by contributor, and how the moving parts move."""
+
+    main_rotor: Contribution
+    tail_rotor: Contribution
+    tailplane: Contribution
+    fin: Contribution
+    fuselage: Contribution
+    ground: Contribution | None
+    disc: Flapping
+    bar: Bar | None
+    inflow: Inflow | None
+    rotor: RotorSpeed | None
+    gyro: YawGyro | None
+    servos: Servos | None
+    induced: Scalar
+    power: Scalar
+
+    def contributions(self) -> dict[str, Contribution]:
+        """The contributors that there are, by name."""
+        named = {name: getattr(self, name) for name in CONTRIBUTORS}
+        return {name: part for name, part in named.items() if part is not None}
+
+
+CONTRIBUTORS = ("main_rotor", "tail_rotor", "tailplane", "fin", "fuselage", "ground")
+
+
+def _at(position: Vector, force: Vector) -> Contribution:
+    return Contribution(force, position.cross(force))
+
+
+def loads(
+    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+) -> Loads:
+    """Forces and moments on the fuselage by contributor, without gravity, and the rates of everything that moves."""
+    body = state.body
+    sense, density = options.sense, env.air_density
+    air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
+    u, v, w = air
+    p, q, r = body.rates
+
+    # Controls: servos, yaw gyro, stabilizer bar.
+    sticks = Controls(inputs.theta0, inputs.B1, inputs.A1, inputs.theta0T)
+    servo_rates = None
+    if state.servos is not None:
+        stops = (
+            (par.collective_low, par.collective_high),
+            (-par.cyclic_limit, par.cyclic_limit),
+            (-par.cyclic_limit, par.cyclic_limit),
+            (par.tail_low, par.tail_high),
+        )
+        servo_rates = Servos(
+            *(
+                actuators.servo_rate(
+                    at, to, time_constant=par.servo_time, fastest=par.servo_speed, low=low, high=high, xp=xp
+                )
+                for at, to, (low, high) in zip(state.servos, sticks, stops, strict=True)
+            )
+        )
+        sticks = Controls(*state.servos)
+    tail_pitch, gyro_rates = sticks.theta0T, None
+    if state.gyro is not None:
+        tail_pitch = tail_pitch + sense * par.gyro_gain * state.gyro.r_gyro
+        gyro_rates = YawGyro((r - state.gyro.r_gyro) / par.gyro_time)
+    turning = par.rotor_speed if state.rotor is None else state.rotor.omega
+    omega, fading = turning, 1.0
+    if state.rotor is not None:
+        omega = xp.maximum(turning, _SLOWEST * par.rotor_speed)
+        fading = xp.minimum(1.0, (turning / omega) * (turning / omega))
+    A1, B1, bar_rates = sticks.A1, sticks.B1, None
+    if state.bar is not None:
+        lock = bell_hiller.bar_lock_number(
+            density=density,
+            lift_slope=par.bar_lift_slope,
+            chord=par.bar_chord,
+            inner=par.bar_inner,
+            outer=par.bar_outer,
+            inertia=par.bar_inertia,
+        )
+        bar_rates = bell_hiller.bar_rates(state.bar, p, q, A1, B1, lock=lock, omega=omega, cyclic=par.bar_cyclic)
+        A1, B1 = bell_hiller.mixed_cyclic(A1, B1, state.bar, par.bar_gain)
+
+    # Main rotor.
+    rotor = main_rotor(
+        air, body.rates, state.disc, state.inflow, (sticks.theta0, A1, B1), omega, par, density, xp, options
+    )
+    lifted = rotor.acting
+    if state.rotor is not None:
+        lifted = Contribution(lifted.force.scaled(fading), lifted.moment.scaled(fading))
+
+    # Tail rotor; its wake and the main rotor's reach the tails.
+    tail_at = Vector(-par.tail_arm, 0.0, -par.tail_height)
+    at_tail = air + body.rates.cross(tail_at)
+    tail = tail_rotor.tail_rotor_loads(
+        tail_pitch,
+        at_tail.x * at_tail.x + at_tail.z * at_tail.z,
+        -sense * at_tail.y,
+        omega=par.tail_gear * omega,
+        density=density,
+        radius=par.tail_radius,
+        chord=par.tail_chord,
+        blades=par.tail_blades,
+        lift_slope=par.tail_lift_slope,
+        drag=par.tail_drag,
+        delta3=par.tail_delta3,
+        blade_inertia=par.tail_blade_inertia,
+        xp=xp,
+    )
+    unblocked = tail_rotor.fin_blockage(par.fin_area, par.tail_radius, par.fin_blockage)
+    tail_force = Vector(0.0, sense * unblocked * fading * tail.thrust, 0.0)
+
+    rim = par.tail_arm - par.rotor_radius
+    downwash = tail_surfaces.wake_on_tailplane(
+        u, w, rotor.induced, near=rim - par.tail_radius, far=rim + par.tail_radius, drop=par.tail_height, xp=xp
+    )
+    tailplane_lift = tail_surfaces.lifting_force(
+        u,
+        w + par.tailplane_arm * q - downwash,
+        area=par.tailplane_area,
+        lift_slope=par.tailplane_lift_slope,
+        density=density,
+        xp=xp,
+    )
+    fin_at = Vector(-par.fin_arm, 0.0, -par.fin_height)
+    fin_side = tail_surfaces.lifting_force(
+        u,
+        v - par.fin_arm * r + par.fin_height * p + sense * par.fin_wake * tail.induced,
+        area=par.fin_area,
+        lift_slope=par.fin_lift_slope,
+        density=density,
+        xp=xp,
+    )
+    areas = Vector(par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
+    drag = fuselage.flat_plate_drag(air, rotor.induced, areas=areas, density=density, xp=xp)
+
+    # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.
+    load = fading * (rotor.torque + par.tail_gear * tail.torque)
+    rotor_rates = None
+    if state.rotor is not None:
+        throttle = inputs.throttle if options.throttle else 1.0
+        torque = engine.engine_torque(
+            state.rotor,
+            throttle,
+            wanted=par.rotor_speed,
+            power=par.engine_power,
+            gain=par.governor_gain,
+            xp=xp,
+        )
+        rotor_rates = engine.rotor_speed_rates(
+            state.rotor,
+            torque,
+            load,
+            wanted=par.rotor_speed,
+            inertia=par.rotor_inertia,
+            integral_gain=par.governor_integral,
+            xp=xp,
+        )
+        # Spinning up pushes back on the fuselage, as the drag torque does; yaw follows the engine's torque.
+        back = sense * par.rotor_inertia * rotor_rates.omega
+        tilt = Vector(-xp.sin(par.shaft_tilt) * back, 0.0, xp.cos(par.shaft_tilt) * back)
+        lifted = Contribution(lifted.force, lifted.moment + tilt)
+    touching = None
+    if options.ground:
+        skids = ground_contact.Skids(
+            par.skid_length, par.skid_width, par.skid_depth, par.skid_stiffness, par.skid_damping, par.skid_friction
+        )
+        touching = Contribution(*ground_contact.skid_loads(body, skids, xp))
+    return Loads(
+        lifted,
+        _at(tail_at, tail_force),
+        _at(Vector(-par.tailplane_arm, 0.0, 0.0), Vector(0.0, 0.0, tailplane_lift)),
+        _at(fin_at, Vector(0.0, fin_side, 0.0)),
+        Contribution(drag, Vector(0.0, 0.0, 0.0)),
+        touching,
+        rotor.disc,
+        bar_rates,
+        rotor.inflow,
+        rotor_rates,
+        gyro_rates,
+        servo_rates,
+        rotor.induced,
+        load * turning,
+    )
+
+
+def _sum(acting: Loads) -> Contribution:
+    force, moment = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
+    for part in acting.contributions().values():
+        force, moment = force + part.force, moment + part.moment
+    return Contribution(force, moment)
+
+
+def derivatives(
+    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+) -> HelicopterState:
+    """Time derivative of the whole state (Bhandari et al. 2005, eqs 1 to 6, with the components of `physics`)."""
+    acting = loads(state, inputs, par, env, xp, options=options)
+    total = _sum(acting)
+    inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, par.inertia_xz)
+    force = total.force + gravity(par.mass, env.gravity, state.body.attitude, xp)
+    return HelicopterState(
+        rigid_body_rates(state.body, force, total.moment, inertia, xp),
+        acting.disc,
+        acting.bar,
+        acting.inflow,
+        acting.rotor,
+        acting.gyro,
+        acting.servos,
+    )
+
+
+def specific_force(
+    state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
+) -> Vector:
+    """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
+    return _sum(loads(state, inputs, par, env, xp, options=options)).force.scaled(1.0 / par.mass)
+
+
+_BODY_UNITS = ("m",) * 3 + ("m/s",) * 3 + ("rad",) * 3 + ("rad/s",) * 3
+
+
+def conventional(card: Card) -> Vehicle:
+    """The single-rotor helicopter with a card's numbers and options (see `helicopter_options`).
+
+    Raises:
+        CardError: for a number that is missing, unknown, in another unit or impossible, or an unknown option.
+    """
+    options = helicopter_options(card)
+    card.checked_against(UNITS)
+    check_numbers(card)
+    speed = card.values()["rotor_speed"]
+    nothing = HelicopterState(
+        RigidBody(*(0.0,) * 12),
+        Flapping(0.0, 0.0),
+        Bar(0.0, 0.0) if options.bar else None,
+        Inflow(0.03, 0.0, 0.0) if options.inflow == "pitt-peters" else None,
+        RotorSpeed(speed, 0.3) if options.rotor_speed != "fixed" else None,
+        YawGyro(0.0) if options.gyro else None,
+        Servos(0.1, 0.0, 0.0, 0.1) if options.servos else None,
+    )
+    names, units = list(RigidBody._fields), list(_BODY_UNITS)
+    for part, inner in (
+        (nothing.disc, ("rad", "rad")),
+        (nothing.bar, ("rad", "rad")),
+        (nothing.inflow, ("1", "1", "1")),
+        (nothing.rotor, ("rad/s", "1")),
+        (nothing.gyro, ("rad/s",)),
+        (nothing.servos, ("rad",) * 4),
+    ):
+        if part is not None:
+            names += part._fields
+            units += inner
+    numbers = card.values()
+    limits = [
+        (numbers["collective_low"], numbers["collective_high"]),
+        (-numbers["cyclic_limit"], numbers["cyclic_limit"]),
+        (-numbers["cyclic_limit"], numbers["cyclic_limit"]),
+        (numbers["tail_low"], numbers["tail_high"]),
+    ]
+    inputs: Any = Controls
+    if options.throttle:
+        inputs = EngineControls
+        limits.append((0.0, 1.0))
+    return Vehicle(
+        card=card,
+        state=nothing,
+        inputs=inputs,
+        parameters=HelicopterParameters,
+        state_names=tuple(names),
+        state_units=tuple(units),
+        input_names=inputs._fields,
+        input_limits=tuple(limits),
+        derivatives=partial(derivatives, options=options),
+        specific_force=partial(specific_force, options=options),
+        trim_held=(("throttle", 1.0),) if options.throttle else (),
+    )

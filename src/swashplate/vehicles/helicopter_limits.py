@@ -1,0 +1,60 @@
+"""Where a single-rotor helicopter's equations stop being true, said of one flight state."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from swashplate.physics.backend import FloatBackend
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import local_to_body
+from swashplate.vehicles.conventional import HelicopterState, loads
+from swashplate.vehicles.derivatives import Array
+from swashplate.vehicles.helicopter_options import HelicopterOptions
+from swashplate.vehicles.structure import rebuild
+from swashplate.vehicles.vehicle import Vehicle
+
+_ADVANCE = 0.35
+_LOADING = 0.13
+_FLAPPING = 0.21
+"""Advance ratio, C_T / sigma and flapping [rad] beyond which reversed flow, stall and large angles count."""
+
+
+def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tuple[str, ...]:
+    """What of the equations does not hold at a state; empty where they may be trusted, or for other vehicles.
+
+    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large flapping angles.
+    """
+    options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
+    if not isinstance(options, HelicopterOptions):
+        return ()
+    xp, par = FloatBackend(), vehicle.values()
+    state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
+    inputs: Any = vehicle.inputs(*(float(value) for value in u))
+    acting = loads(state, inputs, par, environment, xp, options=options)
+    body = state.body
+    air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
+    omega = par.rotor_speed if state.rotor is None else state.rotor.omega
+    tip = omega * par.rotor_radius
+    solidity = par.rotor_blades * par.rotor_chord / (np.pi * par.rotor_radius)
+    force = acting.main_rotor.force
+    thrust = float(np.sqrt(force.x**2 + force.y**2 + force.z**2))
+    loading = thrust / (environment.air_density * np.pi * par.rotor_radius**2 * tip**2) / solidity
+    hover = float(np.sqrt(thrust / (2.0 * environment.air_density * np.pi * par.rotor_radius**2)))
+    across = float(np.hypot(air.x, air.y))
+    found = []
+    if 0.5 * hover < air.z < 2.0 * hover and across < hover:
+        found.append(
+            f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({0.5 * hover:.1f} to "
+            f"{2.0 * hover:.1f} m/s below {hover:.1f} m/s of speed), where momentum theory is only a mean"
+        )
+    if across / tip > _ADVANCE:
+        found.append(f"the advance ratio is {across / tip:.2f}, above {_ADVANCE}: reversed flow and stall are left out")
+    if loading > _LOADING:
+        found.append(f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear")
+    flap = max(abs(float(state.disc.a1)), abs(float(state.disc.b1)))
+    if flap > _FLAPPING:
+        found.append(f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small")
+    return tuple(found)

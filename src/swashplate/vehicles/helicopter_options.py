@@ -1,0 +1,72 @@
+"""The switches of the single-rotor helicopter's equations."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from swashplate.errors import CardError
+from swashplate.vehicles.card import Card
+
+
+class HelicopterOptions(NamedTuple):
+    """What a card's `[options]` may say.
+
+    Attributes:
+        rotation: "ccw" or "cw", the main rotor's sense seen from above.
+        inflow: "glauert" (momentum theory and Glauert's gradient), "uniform" (no gradient), "pitt-peters-static", or
+            "pitt-peters" (three inflow states).
+        coning: blades cone by themselves; False holds them at the precone (teetering hubs).
+        bar: Bell-Hiller stabilizer bar.
+        rotor_speed: "fixed", "governed" (a state under the governor) or "throttle" (the same with a fifth input).
+        gyro: yaw gyro.
+        servos: servo lags, speed limits and stops.
+        ground: skids touch ground at z = 0.
+        phase_lag: use the card's aerodynamic phase lag.
+        in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
+    """
+
+    rotation: str = "ccw"
+    inflow: str = "glauert"
+    coning: bool = False
+    bar: bool = False
+    rotor_speed: str = "fixed"
+    gyro: bool = False
+    servos: bool = False
+    ground: bool = False
+    phase_lag: bool = False
+    in_plane: str = "blade-element"
+
+    @property
+    def sense(self) -> float:
+        """+1 for a counter-clockwise rotor, -1 for a clockwise one (Gamma)."""
+        return 1.0 if self.rotation == "ccw" else -1.0
+
+    @property
+    def throttle(self) -> bool:
+        return self.rotor_speed == "throttle"
+
+
+_CHOICES: dict[str, tuple[Any, ...]] = {
+    "rotation": ("ccw", "cw"),
+    "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
+    "rotor_speed": ("fixed", "governed", "throttle"),
+    "in_plane": ("blade-element", "thrust-tilt"),
+    **dict.fromkeys(("coning", "bar", "gyro", "servos", "ground", "phase_lag"), (True, False)),
+}
+
+
+def helicopter_options(card: Card) -> HelicopterOptions:
+    """A card's options.
+
+    Raises:
+        CardError: naming the option that is not known or has no such value.
+    """
+    where = card.path or card.vehicle
+    for name, value in card.options.items():
+        if name not in _CHOICES:
+            known = ", ".join(_CHOICES)
+            raise CardError("is not an option.", where=where, channel=name, hint=f"Options are {known}.")
+        if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
+            expected = ", ".join(map(repr, _CHOICES[name]))
+            raise CardError(f"is {value!r}, expected one of {expected}.", where=where, channel=name)
+    return HelicopterOptions(**dict(card.options))

@@ -1,0 +1,183 @@
+"""`swash respond`, `fit-tf`, `fit-ss` and `validate` on linear models: files, messages and exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import one_message, swash
+from scipy import signal
+
+from swashplate.identification.linear_simulation import delayed, hold_matrices
+from swashplate.identification.state_space_file import structure
+
+RATE = 100.0
+TRUTH = {
+    "Lb": 3000.0, "Ma": 800.0, "tau_f": 0.07, "Ba": 0.5, "Ab": -0.5, "Blat": 0.2, "Blon": -0.05, "Alat": 0.05,
+    "Alon": 0.25, "tau_roll": 0.05, "tau_pitch": 0.05,
+}  # fmt: skip
+
+
+def log(path: Path, *, seed: int, dead: bool = False, doubled: bool = False, seconds: float = 120.0) -> Path:
+    """A CSV log of a four-state helicopter shaken on both axes, with noise."""
+    random = np.random.default_rng(seed)
+    n = round(seconds * RATE)
+    u = 0.05 * signal.lfilter([0.2], [1.0, -0.8], random.standard_normal((n, 2)), axis=0)
+    u[:, 1] = 0.0 if dead else 0.5 * u[:, 0] if doubled else u[:, 1] + 0.4 * u[:, 0]
+    a, b, c, _ = structure("rotor_body").with_values(TRUTH).explicit()
+    phi, q0, q1 = hold_matrices(a, b, 1 / RATE)
+    late = np.column_stack([delayed(column, 5.0) for column in u.T])
+    x = np.zeros((n, 4))
+    for k in range(1, n):
+        x[k] = phi @ x[k - 1] + q0 @ late[k - 1] + q1 @ (late[k] - late[k - 1])
+    y = x @ c.T + 0.002 * random.standard_normal((n, 2))
+    head = "time [s],mixer_roll [1],mixer_pitch [1],p [rad/s],q [rad/s]"
+    np.savetxt(path, np.column_stack([np.arange(n) / RATE, u, y]), delimiter=",", header=head, comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("sweeps")
+
+
+@pytest.fixture(scope="module")
+def flown(folder: Path) -> Path:
+    return log(folder / "flown.csv", seed=1)
+
+
+@pytest.fixture(scope="module")
+def answered(folder: Path, flown: Path) -> Path:
+    out = folder / "responses"
+    done = swash(
+        "respond", flown, "--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.2-12", "--out", out
+    )
+    assert done.code == 0, done.err
+    assert "p / mixer_roll" in done.out
+    assert {file.name for file in out.iterdir()} == {"responses.nc", "responses.json", "report.html"}
+    return out
+
+
+def test_from_a_log_to_a_model_that_is_verified(folder: Path, answered: Path) -> None:
+    out, unseen = folder / "model", log(folder / "unseen.csv", seed=2, seconds=40.0)
+    done = swash("fit-ss", "rotor_body", answered, "--out", out, "--hold-out", unseen, "--gains")
+    assert done.code == 0, done.err
+    assert "ATC_RAT_RLL_FF" in done.out
+    fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
+    found = {p["name"]: p["value"] for p in fit["parameters"]}
+    assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
+    assert found["tau_roll"] == pytest.approx(0.05, abs=0.003)
+    verification = json.loads((out / "verification.json").read_text(encoding="utf-8"))
+    assert verification["J_rms"] < 0.5
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Suggested rate-loop gains" in page
+    assert "bode-p-mixer-roll" in page
+    again = swash("validate", "--model", out / "model.toml", "--flight", unseen, "--out", folder / "validated")
+    assert again.code == 0, again.err
+    assert "J_rms" in again.out
+    assert (folder / "validated" / "report.html").is_file()
+
+
+def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) -> None:
+    out = folder / "tf"
+    done = swash("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--out", out, "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert len(document["tried"]) > 5
+    assert document["fit"]["models"][0]["J"] < 50.0
+    assert (out / "model.toml").is_file()
+    fixed = swash("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "2/4", "--fix", "tau=0.05")
+    assert fixed.code == 0
+    assert "fixed" in fixed.out
+
+
+def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
+    done = swash("fit-ss", "rotor_body", answered, "--hold-out", flown, "--starts", "1")
+    assert "NOT A HOLD-OUT" in done.out
+
+
+@pytest.mark.parametrize(("kind", "words"), [("dead", "'mixer_pitch' never moves"), ("doubled", "cannot be told from")])
+def test_a_dead_or_doubled_input_is_named_and_the_rest_is_kept(folder: Path, kind: str, words: str) -> None:
+    bad = log(folder / f"{kind}.csv", seed=3, **{kind: True})  # type: ignore[arg-type]
+    out = folder / kind
+    done = swash(
+        "respond", bad, "--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.2-10", "--out", out
+    )
+    assert done.code == 2
+    assert words in done.err
+    assert "Traceback" not in done.err
+    assert "NOT COMPUTED" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_noise_is_not_a_response(folder: Path) -> None:
+    random = np.random.default_rng(4)
+    rows = np.column_stack([np.arange(6000) / RATE, random.standard_normal((6000, 2))])
+    path = folder / "noise.csv"
+    np.savetxt(path, rows, delimiter=",", header="time [s],mixer_roll [1],p [rad/s]", comments="")
+    done = swash("respond", path, "--inputs", "mixer_roll", "--outputs", "p", "--out", folder / "noise")
+    assert done.code == 2
+    assert "do not use its responses" in done.err
+    refused = one_message(swash("fit-tf", folder / "noise", "--input", "mixer_roll", "--outputs", "p"))
+    assert "p / mixer_roll" in refused
+
+
+def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: Path) -> None:
+    ask = ("--inputs", "mixer_roll", "--outputs", "p")
+    assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--windows", "500"))
+    assert "the flight has no such channel" in one_message(
+        swash("respond", flown, "--inputs", "stick", "--outputs", "p")
+    )
+    assert "is not LOW-HIGH" in one_message(swash("respond", flown, *ask, "--band", "10-1"))
+    assert "no such file" in one_message(swash("fit-tf", folder / "nothing.nc", "--input", "mixer_roll"))
+    assert "does not hold frequency responses" in one_message(swash("fit-tf", flown, "--input", "mixer_roll"))
+    assert "is no input of these responses" in one_message(swash("fit-tf", answered, "--input", "stick"))
+    assert "neither a ready structure nor a file" in one_message(swash("fit-ss", "rotorbody", answered))
+    assert "is no form" in one_message(swash("fit-tf", answered, "--input", "mixer_roll", "--form", "two"))
+    bad = folder / "bad.toml"
+    from importlib import resources
+
+    text = (resources.files("swashplate.identification") / "structures" / "rotor_body.toml").read_text(encoding="utf-8")
+    bad.write_text(text.replace('b = "Lb"', 'b = "Lbb"'), encoding="utf-8")
+    message = one_message(swash("fit-ss", bad, answered))
+    assert "'Lbb'" in message
+    assert "Did you mean 'Lb'" in message
+    assert "is no parameter" in one_message(swash("fit-ss", "rotor_body", answered, "--start", "Lbb=3"))
+
+
+def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: Path) -> None:
+    text = folder / "unstable.toml"
+    from importlib import resources
+
+    ready = (resources.files("swashplate.identification") / "structures" / "rotor_body.toml").read_text(
+        encoding="utf-8"
+    )
+    text.write_text(
+        ready.replace('Lb = {value = 1000.0, unit = "1/s^2", lower = 0.0}', "Lb = {value = -1000.0}"), encoding="utf-8"
+    )
+    out = folder / "unstable"
+    done = swash("fit-ss", text, answered, "--out", out)
+    assert done.code == 2
+    assert "is unstable" in done.err
+    assert (out / "fit.json").is_file()
+
+
+def test_a_record_in_two_rates_is_brought_to_one(folder: Path, flown: Path) -> None:
+    rows = np.loadtxt(flown, delimiter=",", skiprows=1)[::2]
+    slow = folder / "slow.csv"
+    np.savetxt(slow, rows, delimiter=",", header=flown.read_text(encoding="utf-8").splitlines()[0], comments="")
+    done = swash(
+        "respond",
+        flown,
+        slow,
+        "--inputs",
+        "mixer_roll,mixer_pitch",
+        "--outputs",
+        "p,q",
+        "--band",
+        "0.2-8",
+        "--rate",
+        "50",
+    )
+    assert done.code == 0, done.err

@@ -1,0 +1,134 @@
+"""The single-rotor helicopter's equations: three backends alike, mirror image, moving frames, bad cards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi
+import jax
+import numpy as np
+import pytest
+
+from swashplate.errors import CardError
+from swashplate.physics.backend import CasadiBackend, FloatBackend
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, local_to_body
+from swashplate.simulation.dynamics import enable_double_precision, rates_function
+from swashplate.vehicles import catalogue
+from swashplate.vehicles.structure import leaves
+from swashplate.vehicles.vehicle import Vehicle
+
+FLOATS = FloatBackend()
+EVERYTHING = {
+    "bar": True,
+    "inflow": "pitt-peters",
+    "rotor_speed": "throttle",
+    "gyro": True,
+    "servos": True,
+    "ground": True,
+    "coning": True,
+}
+FORMS = [
+    {},
+    {"inflow": "pitt-peters-static", "phase_lag": True, "in_plane": "thrust-tilt"},
+    {"inflow": "uniform", "rotor_speed": "governed"},
+    EVERYTHING,
+]
+MIRRORED = ("y", "v", "phi", "psi", "p", "r", "b1", "d", "lam_s", "r_gyro", "A1_servo", "A1")
+
+
+def random_case(vehicle: Vehicle, seed: int) -> tuple[np.ndarray, np.ndarray, Environment, Vehicle]:
+    """A state near the template's, inputs, surroundings, and a card without a zero."""
+    rng = np.random.default_rng(seed)
+    template = np.array(list(leaves(vehicle.state)))
+    small = np.array([0.1 if unit in ("rad", "1") else 1.0 for unit in vehicle.state_units])
+    x = template * rng.uniform(0.8, 1.2, template.size) + 0.5 * small * rng.uniform(-1.0, 1.0, template.size)
+    u = np.array([rng.uniform(low, high) for low, high in vehicle.input_limits])
+    around = Environment(*rng.uniform(-2.0, 2.0, 3), rng.uniform(1.0, 1.3), 9.81, 12.0)
+    zero = [name for name, value in vehicle.card.values().items() if value == 0.0]
+    return x, u, around, vehicle.with_values({name: rng.uniform(0.0, 0.02) for name in zero})
+
+
+@pytest.mark.parametrize("options", FORMS)
+def test_floats_jax_and_casadi_compute_the_same(options: dict[str, object]) -> None:
+    enable_double_precision()
+    vehicle = catalogue.vehicle("raptor50", **options)
+    with_jax = jax.jit(rates_function(vehicle), compiler_options={"xla_cpu_use_fusion_emitters": False})
+    x, u = casadi.SX.sym("x", len(vehicle.state_names)), casadi.SX.sym("u", len(vehicle.input_names))
+    p, e = casadi.SX.sym("p", len(vehicle.parameter_names)), casadi.SX.sym("e", len(Environment._fields))
+    parameters = vehicle.parameters(*casadi.vertsplit(p))
+    traced = vehicle.rates(x, u, parameters, Environment(*casadi.vertsplit(e)), CasadiBackend())
+    with_casadi = casadi.Function("rates", [x, u, p, e], [casadi.vertcat(*traced)])
+    for seed in range(8):
+        state, inputs, around, flown = random_case(vehicle, seed)
+        floats = np.array(flown.rates(state.tolist(), inputs.tolist(), flown.values(), around, FLOATS))
+        jaxed = np.asarray(with_jax(state, inputs, flown.values(), around))
+        casadied = np.asarray(with_casadi(state, inputs, np.array(flown.values()), np.array(around))).ravel()
+        np.testing.assert_allclose(jaxed, floats, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(casadied, floats, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("options", FORMS)
+def test_a_clockwise_helicopter_flies_the_exact_mirror_image(options: dict[str, object]) -> None:
+    """To the last bit: left and right swapped, the rotor turning the other way."""
+    right = catalogue.vehicle("raptor50", **options)
+    for seed in range(10):
+        x, u, around, flown = random_case(right, seed)
+        card = replace(flown.card, options={**flown.card.options, "rotation": "ccw"})
+        left = catalogue.from_card(card).with_values({"hub_y": -flown.card.values()["hub_y"]})
+        sign = np.array([-1.0 if name in MIRRORED else 1.0 for name in right.state_names])
+        commands = u * np.array([-1.0 if name in MIRRORED else 1.0 for name in right.input_names])
+        here = np.array(flown.rates(x.tolist(), u.tolist(), flown.values(), around, FLOATS))
+        air = around._replace(wind_east=-around.wind_east)
+        there = np.array(left.rates((sign * x).tolist(), commands.tolist(), left.values(), air, FLOATS))
+        np.testing.assert_array_equal(there, sign * here)
+
+
+def test_the_air_knows_only_relative_motion() -> None:
+    vehicle = catalogue.vehicle("raptor50", bar=True, inflow="pitt-peters")
+    x, u, around, flown = random_case(vehicle, 3)
+    places = [vehicle.index(name) for name in ("p", "q", "r")]
+    x[places] = 0.0
+    attitude = Euler(*(float(x[vehicle.index(name)]) for name in ("phi", "theta", "psi")))
+    added, moved = Vector(1.3, -0.7, 0.4), x.copy()
+    moved[[vehicle.index(name) for name in ("u", "v", "w")]] += np.array(local_to_body(added, attitude, FLOATS))
+    windy = around._replace(
+        wind_north=around.wind_north + added.x,
+        wind_east=around.wind_east + added.y,
+        wind_down=around.wind_down + added.z,
+    )
+    still = np.array(flown.rates(x.tolist(), u.tolist(), flown.values(), around, FLOATS))
+    moving = np.array(flown.rates(moved.tolist(), u.tolist(), flown.values(), windy, FLOATS))
+    np.testing.assert_allclose(moving[3:], still[3:], atol=1e-9)
+    np.testing.assert_allclose(moving[:3] - still[:3], added, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"inertia_xx": -0.1}, r"inertia_xx: .*(outside|more than 0)"),
+        ({"inertia_yy": 0.5}, "more than the two others together"),
+        ({"rotor_chord": 0.0}, r"rotor_chord: .*(outside|more than 0)"),
+        ({"shaft_tilt": 4.0}, "more than 57 deg. Angles in cards are in radians"),
+        ({"inertia_xz": 0.2}, "too large for inertia_xx"),
+        ({"hinge_offset": 0.6}, "expected 0 to 0.5 of the radius"),
+        ({"collective_low": 0.3}, "not below collective_high"),
+        ({"rotor_drag": -0.01}, r"rotor_drag: .*(outside|0 or more)"),
+    ],
+)
+def test_numbers_that_no_helicopter_has(changed: dict[str, float], said: str) -> None:
+    card = catalogue.vehicle("raptor50").card
+    with pytest.raises(CardError, match=said):
+        catalogue.from_card(card.with_values(changed))
+    bare = {name: replace(parameter, lower=None, upper=None) for name, parameter in card.parameters.items()}
+    with pytest.raises(CardError):
+        catalogue.from_card(replace(card, parameters=bare).with_values(changed))
+
+
+def test_options_that_do_not_exist() -> None:
+    with pytest.raises(CardError, match="inflow: is 'dynamic', expected one of 'glauert'"):
+        catalogue.vehicle("raptor50", inflow="dynamic")
+    with pytest.raises(CardError, match="flybar: is not an option"):
+        catalogue.vehicle("raptor50", flybar=True)
+    with pytest.raises(CardError, match="bar: is 1, expected one of True, False"):
+        catalogue.vehicle("raptor50", bar=1)

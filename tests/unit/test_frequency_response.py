@@ -1,0 +1,206 @@
+"""Frequency responses: the sums, the conditioning, the errors, and what is said where they cannot be had."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.identification.composite import composite
+from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.respond import choose_windows, respond
+from swashplate.identification.spectra import Signals, spectral_matrix
+
+RATE = 100.0
+
+
+def made(channels: dict[str, np.ndarray], *, rate: float = RATE, name: str = "made") -> Flight:
+    n = len(next(iter(channels.values())))
+    units = {key: "1" for key in channels if key.startswith(("stick", "sweep"))}
+    return Flight({"uniform": stream(np.arange(n) / rate, channels, units)}, Provenance(source=name))
+
+
+def coloured(seed: int, n: int) -> np.ndarray:
+    return signal.lfilter([0.2], [1.0, -0.8], np.random.default_rng(seed).standard_normal(n))
+
+
+def plant(u: np.ndarray, gain: float, frequency: float, damping: float, delay: int = 0) -> np.ndarray:
+    """A second-order system on the sample grid, exact for held inputs."""
+    a = (2 * np.pi * frequency) ** 2
+    system = signal.cont2discrete(([gain * a], [1.0, 4 * np.pi * frequency * damping, a]), 1 / RATE)
+    y = signal.lfilter(system[0].ravel(), system[1], u)
+    return np.concatenate([np.zeros(delay), y[: len(y) - delay]])
+
+
+def true_response(omega: np.ndarray, gain: float, frequency: float, damping: float) -> np.ndarray:
+    a = (2 * np.pi * frequency) ** 2
+    num, den, _ = signal.cont2discrete(([gain * a], [1.0, 4 * np.pi * frequency * damping, a]), 1 / RATE)
+    return signal.freqz(num.ravel(), den, worN=omega / RATE)[1]
+
+
+def test_spectra_are_those_of_the_chirp_z_transform() -> None:
+    n = 400
+    values = np.random.default_rng(1).standard_normal((n, 2))
+    hertz = np.linspace(1.0, 9.0, 17)
+    matrix = spectral_matrix([Signals("a", 0.01, values)], 2 * np.pi * hertz, window=4.0, overlap=0.5)
+    assert matrix is not None
+    taper = signal.windows.hann(n, sym=False)
+    step = hertz[1] - hertz[0]
+    total = np.zeros((17, 2, 2), dtype=complex)
+    padded = np.pad(values, ((n // 2, n), (0, 0)))
+    for start in range(0, n + 1, n // 2):
+        cut = padded[start : start + n]
+        cut = taper[:, None] * (cut - (taper @ cut) / taper.sum())
+        z = signal.czt(cut, 17, w=np.exp(-2j * np.pi * step * 0.01), a=np.exp(2j * np.pi * hertz[0] * 0.01), axis=0)
+        total += z.conj()[:, :, None] * z[:, None, :]
+    expected = total * 2 * 0.01 / (2.0 * (taper @ taper))
+    np.testing.assert_allclose(matrix.values, expected, rtol=1e-10, atol=1e-14)
+
+
+def test_power_is_that_of_the_signal() -> None:
+    u = np.random.default_rng(2).standard_normal(40_000)
+    matrix = spectral_matrix(
+        [Signals("a", 0.01, u[:, None])], 2 * np.pi * np.arange(5.0, 45.0), window=4.0, overlap=0.75
+    )
+    assert matrix is not None
+    # White noise of variance one over 50 Hz: 0.02 units^2/Hz, averaged over 40 lines of 100 windows.
+    assert np.mean(matrix.values.real) == pytest.approx(0.02, rel=0.03)
+
+
+def test_conditioning_tells_correlated_inputs_apart_and_single_responses_do_not() -> None:
+    n = 60_000
+    first, second = coloured(3, n), coloured(4, n)
+    mixed = 1.2 * first + second
+    noise = 0.02 * np.random.default_rng(5).standard_normal((2, n))
+    y = plant(first, 2.0, 2.0, 0.4) + plant(mixed, 0.3, 3.0, 0.5) + noise[0]
+    flight = made({"stick1": first, "stick2": mixed, "out": y})
+    both = respond(flight, inputs=["stick1", "stick2"], outputs=["out"], band=(0.2, 8.0))
+    alone = respond(flight, inputs=["stick2"], outputs=["out"], band=(0.2, 8.0))
+    truth = true_response(both.omega, 0.3, 3.0, 0.5)
+    h, coherence, error = both.pair("out", "stick2")
+    used = coherence >= 0.6
+    assert used.sum() > 40
+    decibels = np.abs(20 * np.log10(np.abs(h / truth)))[used]
+    assert np.all(decibels < np.maximum(1.0, 20 * np.log10(1 + 3 * error[used])))
+    assert np.median(np.abs(20 * np.log10(np.abs(alone.pair("out", "stick2")[0] / truth)))) > 3.0
+    assert any("'stick1' moved along" in text for text in alone.warnings)
+    assert any("moved together" in text for text in both.warnings)
+
+
+def test_random_error_is_what_many_seeds_scatter() -> None:
+    logs, promised = [], []
+    truth = None
+    for seed in range(40):
+        u = coloured(seed, 6_000)
+        y = plant(u, 1.0, 2.0, 0.5) + 0.4 * np.random.default_rng(1000 + seed).standard_normal(6_000)
+        found = respond(made({"stick": u, "out": y}), inputs=["stick"], outputs=["out"], band=(0.5, 4.0), windows=[5.0])
+        truth = true_response(found.omega, 1.0, 2.0, 0.5) if truth is None else truth
+        h, _, error = found.pair("out", "stick")
+        logs.append(np.log(h / truth))
+        promised.append(error)
+    scattered = np.sqrt(np.mean(np.square(np.real(logs)), axis=0))
+    ratio = np.mean(scattered / np.mean(promised, axis=0))
+    assert 0.8 < ratio < 1.15
+    phase = np.sqrt(np.mean(np.square(np.imag(logs)), axis=0))
+    assert 0.8 < np.mean(phase / np.mean(promised, axis=0)) < 1.15
+
+
+def test_composite_of_agreeing_windows_is_their_value_and_the_better_window_decides() -> None:
+    one = np.full((2, 3), 2.0)
+    xx, yy, xy = composite(one, 3 * one, (1 + 1j) * one, np.full((2, 3), 0.1))
+    np.testing.assert_allclose(xx, 2.0)
+    np.testing.assert_allclose(yy, 6.0)
+    np.testing.assert_allclose(xy, 2.0 + 2.0j)
+    better = np.array([[0.01], [0.1]])
+    xx, yy, xy = composite(np.array([[1.0], [1.3]]), np.array([[1.0], [1.2]]), np.array([[0.9j], [0.5j]]), better)
+    assert xx[0] == pytest.approx(1.0, abs=1e-3)
+    assert xy[0] == pytest.approx(0.9j, abs=1e-3)
+
+
+def test_joint_estimate_is_unbiased_in_a_loop_where_the_direct_one_is_not() -> None:
+    n, random = 30_000, np.random.default_rng(7)
+    reference, gust = coloured(8, n), 0.5 * coloured(9, n)
+    b, a, _ = signal.cont2discrete(([4.0], [1.0, 2.0]), 1 / RATE)
+    b = b.ravel()
+    u, y, x = np.zeros(n), np.zeros(n), 0.0
+    for k in range(1, n):
+        x = -a[1] * x + b[1] * u[k - 1]
+        y[k] = x + gust[k]
+        u[k] = reference[k] - 1.0 * y[k]
+    sensor = 0.01 * random.standard_normal(n)
+    flight = made({"stick": u, "out": y + sensor, "sweep": reference})
+    joint = respond(flight, inputs=["stick"], outputs=["out"], references=["sweep"], band=(0.1, 2.0))
+    direct = respond(flight, inputs=["stick"], outputs=["out"], band=(0.1, 2.0))
+    truth = signal.freqz(b, a, worN=joint.omega / RATE)[1]
+
+    def off(found: FrequencyResponse) -> float:
+        return float(np.median(np.abs(20 * np.log10(np.abs(found.pair("out", "stick")[0] / truth)))))
+
+    assert off(joint) < 0.7 < 1.8 < off(direct)
+    assert any("feedback biases the direct estimate" in text for text in joint.warnings)
+
+
+def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:
+    n = 20_000
+    u, other = coloured(10, n), coloured(11, n)
+    y = plant(u, 1.0, 2.0, 0.5) + plant(other, 1.0, 1.0, 0.5)
+    flight = made({"stick1": u, "stick2": 0.5 * u, "stick3": other, "stick4": np.zeros(n), "out": y})
+    found = respond(flight, inputs=["stick1", "stick2", "stick3", "stick4"], outputs=["out"], band=(0.2, 5.0))
+    text = " ".join(found.problems)
+    assert "'stick1' cannot be told from 'stick2'" in text
+    assert "'stick2' cannot be told from 'stick1'" in text
+    assert "'stick4' never moves" in text
+    assert np.isnan(found.pair("out", "stick1")[0]).all()
+    h = found.pair("out", "stick3")[0]
+    np.testing.assert_allclose(np.abs(h / true_response(found.omega, 1.0, 1.0, 0.5)), 1.0, atol=0.1)
+
+
+def test_what_cannot_be_done_is_said() -> None:
+    n = 2_000
+    u, noise = coloured(12, n), coloured(13, n)
+    flight = made({"stick": u, "out": noise})
+    found = respond(flight, inputs=["stick"], outputs=["out"], band=(0.5, 10.0))
+    assert any("do not use its responses" in text for text in found.problems)
+    with pytest.raises(FlightError, match=r"longest record has 20 s, the shortest window 50 s"):
+        respond(flight, inputs=["stick"], outputs=["out"], windows=[50.0], band=(0.5, 10.0))
+    with pytest.raises(FlightError, match="lacks what the frequency response needs"):
+        respond(flight, inputs=["stick"], outputs=["nothing"])
+    with pytest.raises(FlightError, match="different rates"):
+        respond([flight, made({"stick": u, "out": noise}, rate=50.0)], inputs=["stick"], outputs=["out"])
+
+
+def test_window_rules() -> None:
+    chosen = choose_windows([100.0, 60.0], 10.0)
+    assert chosen.lengths[0] == pytest.approx(30.0)
+    assert chosen.lengths[-1] == pytest.approx(3.0)
+    assert not chosen.warnings
+    assert choose_windows([10.0], 5.0).warnings
+
+
+def test_file_and_control_round_trip(tmp_path: Path) -> None:
+    n = 6_000
+    u = coloured(14, n)
+    found = respond(
+        made({"stick": u, "out": plant(u, 1.0, 2.0, 0.5)}), inputs=["stick"], outputs=["out"], band=(0.5, 5.0)
+    )
+    back = FrequencyResponse.load(found.save(tmp_path / "r.nc"))
+    np.testing.assert_array_equal(back.response, found.response)
+    assert (back.inputs, back.outputs, back.windows, back.sources) == (
+        found.inputs,
+        found.outputs,
+        found.windows,
+        found.sources,
+    )
+    frd = found.to_control()
+    again = FrequencyResponse.from_control(frd)
+    np.testing.assert_array_equal(again.response, found.response)
+    assert again.outputs == ("out",)
+    assert "out / stick" in repr(found)
+    assert "coherence" in found.table("out", "stick")
+    (tmp_path / "bad.nc").write_bytes(b"no")
+    with pytest.raises(FlightError, match="does not hold frequency responses"):
+        FrequencyResponse.load(tmp_path / "bad.nc")

@@ -1,0 +1,146 @@
+"""The single-rotor helicopter flies: trims and their limits, hold, spin-up, take-off, landing, autorotation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swashplate.control.state_hold import state_hold
+from swashplate.errors import TrimError
+from swashplate.flights.flight import Flight
+from swashplate.physics.atmosphere import air_density
+from swashplate.physics.environment import Environment
+from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
+from swashplate.simulation.integrate import simulate
+from swashplate.simulation.speeds import trims_over_speed
+from swashplate.simulation.trim import trim
+from swashplate.vehicles.catalogue import vehicle
+from swashplate.vehicles.helicopter_limits import doubts
+
+RAPTOR = vehicle("raptor50")
+
+
+@pytest.mark.parametrize("name", ["raptor50", "xcell60", "helion", "rmax"])
+def test_trims_from_hover_to_fast_flight(name: str) -> None:
+    """The power bucket: collective falls, then rises; the nose goes down."""
+    top = 15.0 if name == "raptor50" else 20.0
+    found = trims_over_speed(vehicle(name), np.linspace(0.0, top, 9))
+    collective = [at.commands()["theta0"] for at in found]
+    assert max(at.residual for at in found) < 1e-10
+    assert 0 < int(np.argmin(collective)) < 8
+    assert np.all(np.diff([at.states()["theta"] for at in found]) < 0.0)
+
+
+def test_climb_turn_wind_weight_and_altitude() -> None:
+    hover = trim(RAPTOR).commands()
+    assert (
+        trim(RAPTOR, climb=2.0).commands()["theta0"] > hover["theta0"] > trim(RAPTOR, climb=-1.0).commands()["theta0"]
+    )
+    turning = trim(RAPTOR, speed=10.0, turn=0.5)
+    assert turning.states()["phi"] == pytest.approx(np.arctan(10.0 * 0.5 / 9.81), abs=0.06)
+    assert turning.states()["r"] > 0.3
+    windy = trim(RAPTOR, environment=Environment(wind_north=-6.0)).commands()
+    moving = trim(RAPTOR, speed=6.0).commands()
+    assert windy == pytest.approx(moving, abs=1e-9)  # the air knows only relative motion
+    thin = Environment(air_density=air_density(3000.0))
+    assert air_density(3000.0) == pytest.approx(0.9093, abs=2e-4)  # ISO 2533
+    assert trim(RAPTOR, environment=thin).commands()["theta0"] > hover["theta0"]
+    assert trim(RAPTOR.with_values({"mass": 5.5})).commands()["theta0"] > hover["theta0"]
+
+
+def test_a_trim_that_does_not_exist_says_what_stops_it() -> None:
+    with pytest.raises(TrimError, match=r"theta0: 50 m/s ahead.* needs theta0 = .*, but its limit is 0.2618"):
+        trim(RAPTOR, speed=50.0)
+    with pytest.raises(TrimError, match="limit is"):
+        trim(RAPTOR.with_values({"mass": 20.0}))
+    with pytest.raises(TrimError, match="a turn in wind is no steady flight"):
+        trim(RAPTOR, turn=0.1, environment=Environment(wind_east=2.0))
+    with pytest.raises(TrimError, match="30 m/s ahead"):
+        trims_over_speed(RAPTOR.with_values({"collective_high": 0.1}), [0.0, 30.0])
+
+
+def test_where_the_equations_are_not_to_be_trusted() -> None:
+    def said(**course: float) -> str:
+        at = trim(RAPTOR, **course)
+        return " ".join(doubts(RAPTOR, at.state, at.inputs, at.environment))
+
+    assert said() == said(speed=10.0) == said(climb=3.0) == ""
+    assert "vortex ring" in said(climb=-4.0)
+    assert said(climb=-4.0, speed=8.0) == ""
+    heavy = RAPTOR.with_values({"mass": 16.0, "collective_high": 0.4, "tail_high": 0.8})
+    at = trim(heavy)
+    assert "blades would stall" in " ".join(doubts(heavy, at.state, at.inputs, at.environment))
+
+
+def test_a_hold_keeps_the_helicopter_through_a_maneuver() -> None:
+    for options in ({"bar": True, "inflow": "pitt-peters"},):
+        flight = simulate_maneuver(
+            vehicle("raptor50", **options), "doublet:roll,0.5s,0.03", controller=state_hold, tail=8.0
+        )
+        assert abs(flight.values("p")).max() > 0.3
+        assert abs(flight.values("p")[-1]) < 0.01
+        assert abs(flight.values("z")).max() < 0.5
+
+
+GROUNDED = vehicle("raptor50", ground=True, rotor_speed="throttle")
+
+
+def _start(**states: float) -> dict[str, float]:
+    return {**dict.fromkeys(GROUNDED.state_names, 0.0), **states}
+
+
+def _low(flight: Flight) -> float:
+    return float(flight.values("z").max())
+
+
+def test_spin_up_on_the_skids_take_off_and_landing() -> None:
+    """From rest: the rotor comes up to speed, collective lifts it off, and a slow descent puts it down again."""
+    rate, depth = 500.0, RAPTOR.card.values()["skid_depth"]
+    time = np.arange(round(18.0 * rate)) / rate
+    still = {"theta0": -0.03, "B1": 0.0, "A1": 0.0, "theta0T": 0.0}
+    inputs = {name: np.full(time.size, value) for name, value in still.items()}
+    inputs["throttle"] = np.interp(time, [0.0, 2.0, 9.0, 11.0], [0.02, 0.1, 0.1, 1.0])  # the clutch slips at first
+    spun = simulate(GROUNDED, inputs, start=_start(z=-depth), rate=rate)
+    speed = spun.values("omega")
+    assert speed[0] == 0.0
+    assert speed[-1] == pytest.approx(RAPTOR.card.values()["rotor_speed"], rel=0.02)
+    assert abs(spun.values("z") + depth).max() < 0.02
+    assert abs(spun.values("r")).max() < 0.2  # friction lets it creep, no more
+
+    hover = trim(GROUNDED, height=2.0)
+    ready = {name: float(spun.values(name)[-1]) for name in GROUNDED.state_names}
+    time = np.arange(round(20.0 * rate) + 1) / rate
+    height = np.interp(time, [0.0, 4.0, 8.0, 16.0], [depth, 2.0, 2.0, depth - 0.3])
+    flown = simulate_closed_loop(
+        GROUNDED,
+        state_hold(GROUNDED, hover, rate=100.0),
+        duration=20.0,
+        start={**ready, "psi": 0.0},
+        reference={"z": -height},
+        rate=rate,
+    )
+    assert flown.values("z").min() < -1.7
+    assert _low(flown) < -depth + 0.05
+    assert flown.values("z")[-1] == pytest.approx(-depth, abs=0.05)
+    assert abs(flown.values("w")[-1]) < 0.05
+
+
+def test_autorotation() -> None:
+    """The throttle is cut: the rotor slows and the aircraft sinks; sinking at 10 m/s the air alone keeps it turning."""
+    flying = vehicle("raptor50", rotor_speed="throttle")
+    start, n = trim(flying, speed=8.0), 400
+    time = np.arange(n) / 500.0
+    inputs = {name: np.full(n, value) for name, value in start.commands().items()}
+    inputs["throttle"] = np.where(time < 0.2, 1.0, 0.0)
+    inputs["theta0"] = np.interp(time, [0.2, 0.4], [start.commands()["theta0"], -0.04])
+    inputs["theta0T"] = np.interp(time, [0.2, 0.4], [start.commands()["theta0T"], 0.0])
+    entry = simulate(flying, inputs, start=start, rate=500.0)
+    assert 0.8 < entry.values("omega")[-1] / entry.values("omega")[0] < 0.95
+    assert entry.values("w")[-1] > 3.0
+
+    gliding = trim(flying, speed=8.0, climb=-10.0)
+    assert gliding.states()["omega"] >= flying.card.values()["rotor_speed"]
+    without = {name: np.full(n, value) for name, value in gliding.commands().items()} | {"throttle": np.zeros(n)}
+    glide = simulate(flying, without, start=gliding, rate=500.0)
+    np.testing.assert_allclose(glide.values("omega"), gliding.states()["omega"], rtol=1e-3)
+    assert gliding.commands()["theta0"] < 0.0 < start.commands()["theta0"]

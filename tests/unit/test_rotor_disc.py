@@ -1,0 +1,242 @@
+"""The main rotor's closed forms against numerical quadrature of the blade element's definition, and its energy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+
+from swashplate.physics import blade_element, flapping, inflow
+from swashplate.physics.backend import FloatBackend, JaxBackend
+from swashplate.physics.blade_element import Disc
+from swashplate.physics.flapping import Flapping, Hinge
+
+XP = FloatBackend()
+SOLIDITY, SLOPE, DRAG = 0.052, 5.5, 0.015
+SEEDS = range(20)
+HINGE = Hinge(0.05, 3.8, 27.0)
+
+
+def some_disc(seed: int) -> Disc:
+    """Any flight state: fast, sideways, climbing or sinking, any flapping and cyclic."""
+    rng = np.random.default_rng(seed)
+    sizes = Disc(0.35, 0.2, 0.05, 0.06, 0.05, 0.05, 0.02, 0.02, 0.2, 0.15, 0.1, 0.1, 0.1, 0.1, 0.1)
+    return Disc(*(float(rng.uniform(-size, size)) for size in sizes))
+
+
+def blade(d: Disc) -> dict[str, np.ndarray]:
+    """U_T, U_P, theta, beta and the inflow on a grid that integrates these trigonometric polynomials exactly."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    x, weights = 0.5 * (nodes + 1.0)[:, None], 0.5 * weights[:, None]
+    psi = np.arange(16)[None, :] * 2.0 * np.pi / 16
+    c, s = np.cos(psi), np.sin(psi)
+    beta = d.a0 - d.a1 * c - d.b1 * s
+    beta_dash = d.a1 * s - d.b1 * c
+    induced = d.lam0 + x * (d.lam_c * c + d.lam_s * s)
+    u_t = x + d.mu_x * s + d.mu_y * c
+    u_p = d.mu_z - induced + beta * (-d.mu_x * c + d.mu_y * s) - x * beta_dash + x * (d.p * s + d.q * c)
+    theta = d.theta0 + d.twist * x - d.A1 * c - d.B1 * s
+    mean = lambda f: float(np.sum(weights * f) / 16)  # noqa: E731
+    return {"x": x, "c": c, "s": s, "u_t": u_t, "u_p": u_p, "theta": theta, "beta": beta, "in": induced, "mean": mean}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_closed_forms_are_the_quadrature(seed: int) -> None:
+    d = some_disc(seed)
+    b = blade(d)
+    lift = b["u_t"] ** 2 * b["theta"] + b["u_t"] * b["u_p"]
+    against = DRAG / SLOPE * b["u_t"] ** 2 - b["u_p"] * (b["u_t"] * b["theta"] + b["u_p"])
+    scale = 0.5 * SLOPE * SOLIDITY
+    expected = (
+        scale * b["mean"](lift),
+        scale * b["mean"](-against * b["s"] + lift * b["beta"] * b["c"]),
+        scale * b["mean"](-against * b["c"] - lift * b["beta"] * b["s"]),
+        scale * b["mean"](against * b["x"]),
+    )
+    np.testing.assert_allclose(blade_element.disc_loads(d, SOLIDITY, SLOPE, DRAG), expected, atol=1e-15)
+    assert blade_element.thrust_coefficient(d, SOLIDITY, SLOPE) == pytest.approx(expected[0], abs=1e-16)
+    moments = [b["mean"](b["x"] * lift * weight) for weight in (1.0, 2.0 * b["c"], 2.0 * b["s"])]
+    np.testing.assert_allclose(blade_element.flap_moments(d), moments, atol=1e-15)
+
+
+def steady(d: Disc, **kept: object) -> Disc:
+    """The disc with the flapping at which its tip-path plane stands still in space."""
+
+    def rates(a1: float, b1: float) -> np.ndarray:
+        there = d._replace(a1=a1, b1=b1, p=0.0, q=0.0)
+        arguments = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None, **kept}
+        return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(there), HINGE, **arguments))
+
+    at_rest = rates(0.0, 0.0)
+    slope = np.stack([rates(1.0, 0.0) - at_rest, rates(0.0, 1.0) - at_rest], axis=1)
+    a1, b1 = np.linalg.solve(slope, -at_rest)
+    return d._replace(a1=float(a1), b1=float(b1), p=0.0, q=0.0)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_shaft_power_is_induced_profile_parasite_and_climb(seed: int) -> None:
+    d = steady(some_disc(seed))
+    loads, b = blade_element.disc_loads(d, SOLIDITY, SLOPE, DRAG), blade(d)
+    lift = 0.5 * SLOPE * SOLIDITY * (b["u_t"] ** 2 * b["theta"] + b["u_t"] * b["u_p"])
+    induced = b["mean"](lift * b["in"])
+    profile = 0.5 * SOLIDITY * DRAG * b["mean"](b["u_t"] ** 3)
+    pushing = d.mu_x * loads.CX + d.mu_y * loads.CY - d.mu_z * loads.CT
+    assert pytest.approx(induced + profile + pushing, abs=1e-15) == loads.CQ
+
+
+def test_shaft_power_in_hover_by_momentum_theory() -> None:
+    """The ideal power C_T^1.5 / sqrt 2 and the profile's sigma delta / 8, to 1e-9 of the power."""
+    solidity_loss = 0.25 * SLOPE * SOLIDITY
+    d = Disc(*(0.0,) * 8, 0.1, *(0.0,) * 6)
+    free = blade_element.thrust_coefficient(d, SOLIDITY, SLOPE)
+    lam0 = inflow.momentum_inflow(free, solidity_loss, 0.0, 0.0, XP)
+    loads = blade_element.disc_loads(d._replace(lam0=lam0), SOLIDITY, SLOPE, DRAG)
+    assert pytest.approx(loads.CT**1.5 / math.sqrt(2.0) + SOLIDITY * DRAG / 8.0, rel=1e-9) == loads.CQ
+    assert lam0 == pytest.approx(math.sqrt(loads.CT / 2.0), rel=1e-9)
+
+
+def test_momentum_balance_in_every_flow_state() -> None:
+    """Thrust through zero, climb, descent, vortex ring, windmilling, any speed: one answer, and it balances."""
+    rng = np.random.default_rng(1)
+    worst = 0.0
+    for _ in range(3000):
+        free, loss, mu_z = rng.uniform(-0.02, 0.03), rng.uniform(0.02, 0.25), rng.uniform(-0.2, 0.2)
+        mu2 = float(rng.choice([0.0, rng.uniform(0.0, 0.16)]))
+        lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, XP)
+        v, _, _ = inflow.mass_flow(lam0, mu_z, mu2, XP)
+        worst = max(worst, abs(2.0 * v * lam0 + loss * lam0 - free))
+    assert worst < 1e-12
+
+
+def test_thrust_grows_with_inflow_everywhere() -> None:
+    """Why the equation has one answer: 2 V lam0 rises everywhere, through the vortex ring too."""
+    lam0 = np.linspace(-0.2, 0.2, 4001)
+    for mu_z in (-0.1, -0.03, 0.0, 0.02, 0.07, 0.15):
+        mass = [2.0 * x * inflow.mass_flow(float(x), mu_z, 0.0, XP)[0] for x in lam0]
+        assert np.all(np.diff(mass) > -1e-12)
+
+
+@pytest.mark.parametrize("sink", [0.5, 1.0, 1.5, 1.75, 2.0])
+def test_descent_lies_within_the_stated_distance_of_measurements(sink: float) -> None:
+    """Leishman (2006), eq. 2.96 with kappa = 1: v_i / v_h = 1 - 1.125 x - 1.372 x^2 - 1.718 x^3 - 0.655 x^4."""
+    v_h, x = 0.04, -sink
+    lam0 = inflow.momentum_inflow(2.0 * v_h**2, 0.0, sink * v_h, 0.0, XP)
+    measured = 1.0 - 1.125 * x - 1.372 * x**2 - 1.718 * x**3 - 0.655 * x**4
+    assert abs(lam0 / v_h - measured) < 0.45
+
+
+def test_quasi_steady_flapping_is_the_textbooks() -> None:
+    """Teetering rotor in forward flight (Bramwell 2001, eqs 3.68, 3.69): a1 and b1 in the wind's axes."""
+    mu, a0, lag = 0.2, 0.05, 0.012
+    free = HINGE._replace(excess=0.0)
+    d = Disc(mu, 0.0, -0.01, 0.03, lag, 0.0, 0.0, 0.0, 0.12, -0.05, 0.02, 0.03, a0, 0.0, 0.0)
+    a1 = (8 / 3 * mu * 0.12 + 2 * mu * -0.05 + 2 * mu * (-0.01 - 0.03) - (1 + 1.5 * mu**2) * 0.03) / (1 - mu**2 / 2)
+    b1 = (4 / 3 * mu * a0 + lag + (1 + mu**2 / 2) * 0.02) / (1 + mu**2 / 2)
+    moments = blade_element.flap_moments(d._replace(a1=a1, b1=b1))
+    rates = flapping.plane_rates(Flapping(a1, b1), moments, free, wake_distortion=0.0, phase_lag=None, deficiency=None)
+    np.testing.assert_allclose(rates, 0.0, atol=1e-15)
+
+
+def test_off_axis_flapping_reverses_at_a_wake_distortion_of_one() -> None:
+    """Pitching at q: b1 = -(1 - K_R) q, as measured helicopters do above K_R = 1 (Keller 1996)."""
+    for k_r in (0.0, 1.0, 2.0):
+        # In a steady pitch rate the disc follows the shaft: its rate in space is the body's.
+        q, free = 0.01, HINGE._replace(excess=0.0)
+        b1 = -(1.0 - k_r) * q
+        a1 = -16.0 / free.lock * q
+        d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
+        p_plane, q_plane = flapping.plane_rates(
+            Flapping(a1, b1), blade_element.flap_moments(d), free, wake_distortion=k_r, phase_lag=None, deficiency=None
+        )
+        assert (p_plane, q_plane) == pytest.approx((0.0, q), abs=1e-15)
+
+
+def test_an_aerodynamic_phase_lag_is_a_wake_distortion() -> None:
+    """Off-axis response alike for K_R = (16 / gamma) tan(lag) (small lag; Mansur and Tischler 1998)."""
+    free, lag, turn = HINGE._replace(excess=0.0), 0.05, 0.01
+    k_r = 16.0 / free.lock * math.tan(lag)
+
+    def held_disc(**arguments: object) -> np.ndarray:
+        """The tilt with which the disc turns at q = turn."""
+
+        def rates(a1: float, b1: float) -> np.ndarray:
+            d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
+            given = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None, **arguments}
+            return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(d), free, **given))
+
+        at_rest = rates(0.0, 0.0)
+        slope = np.stack([rates(1.0, 0.0) - at_rest, rates(0.0, 1.0) - at_rest], axis=1)
+        return np.linalg.solve(slope, np.array([0.0, turn]) - at_rest)
+
+    lagging, bending = held_disc(phase_lag=(math.cos(lag), math.sin(lag))), held_disc(wake_distortion=k_r)
+    assert lagging == pytest.approx(bending, rel=0.02)
+
+
+def test_static_pitt_peters_in_hover_is_the_reduced_lock_number() -> None:
+    """Flap damping falls by 1 + a sigma / (16 lam0) (Johnson 1980; Padfield 2007, eq. 3.145)."""
+    lam0 = 0.03
+    v, _, _ = inflow.mass_flow(lam0, 0.0, 0.0, XP)
+    flow = inflow.gradient_flow(lam0, 0.0, 0.0, v)
+    _, (cc, cs, ss) = inflow.pitt_peters_static(lam0, 2 * lam0 * v, (0.0, 0.0), flow, SOLIDITY, SLOPE)
+    reduced = 1.0 / (1.0 + SLOPE * SOLIDITY / (16.0 * lam0))
+    assert (cc, cs, ss) == pytest.approx((reduced, 0.0, reduced), rel=1e-9)
+
+
+def test_dynamic_inflow_settles_at_momentum_theory_and_the_static_gradient() -> None:
+    """In hover the three states come to rest where the static form is."""
+    lam0, moment = 0.03, 0.004
+    v, _, _ = inflow.mass_flow(lam0, 0.0, 0.0, XP)
+    flow = inflow.gradient_flow(lam0, 0.0, 0.0, v)
+    gradient = 2.0 * (0.25 * SLOPE * SOLIDITY * moment) / flow
+    at = inflow.Inflow(lam0, gradient, 0.0)
+    moments = blade_element.FlapMoments(0.0, moment, 0.0)
+    rates = inflow.pitt_peters_rates(
+        at,
+        2 * v * lam0,
+        moments,
+        (0.0, 0.0),
+        (0.0, 0.0),
+        (v, flow),
+        wake_distortion=0.0,
+        solidity=SOLIDITY,
+        lift_slope=SLOPE,
+    )
+    np.testing.assert_allclose(rates, 0.0, atol=1e-15)
+
+
+def test_regressing_flap_mode_against_the_second_order_equation() -> None:
+    """Exact: -gamma/16 + i (1 - sqrt(lambda^2 - (gamma/16)^2)) Omega; the first-order form is within 0.04 Omega."""
+    lock, excess = 3.8, 0.05
+    held = Hinge(excess, lock, 0.0)
+
+    def rates(a1: float, b1: float) -> np.ndarray:
+        d = Disc(*(0.0,) * 3, 0.03, *(0.0,) * 4, 0.1, *(0.0,) * 4, a1, b1)
+        p, q = flapping.plane_rates(
+            Flapping(a1, b1), blade_element.flap_moments(d), held, wake_distortion=0.0, phase_lag=None, deficiency=None
+        )
+        return np.array([q, p])
+
+    at_rest = rates(0.0, 0.0)
+    matrix = np.stack([rates(1.0, 0.0) - at_rest, rates(0.0, 1.0) - at_rest], axis=1)
+    found = np.linalg.eigvals(matrix)[0]
+    exact = complex(-lock / 16.0, 1.0 - math.sqrt(1.0 + excess - (lock / 16.0) ** 2))
+    assert abs(complex(found.real, abs(found.imag)) - complex(exact.real, abs(exact.imag))) < 0.04
+
+
+def test_first_and_second_derivatives_through_the_inflow_are_exact() -> None:
+    """Only the last two Newton steps are differentiated; the implicit function theorem says that is enough."""
+    jax.config.update("jax_enable_x64", True)
+    xp = JaxBackend()
+
+    def solved(free: Any) -> Any:
+        return inflow.momentum_inflow(free, 0.07, 0.005, 0.002, xp)
+
+    at, h = 0.004, 1e-5
+    first, second = jax.grad(solved), jax.grad(jax.grad(solved))
+    values = [float(solved(at + k * h)) for k in (-1, 0, 1)]
+    assert float(first(at)) == pytest.approx((values[2] - values[0]) / (2 * h), rel=1e-5)
+    slopes = [float(first(at + k * h)) for k in (-1, 1)]
+    assert float(second(at)) == pytest.approx((slopes[1] - slopes[0]) / (2 * h), rel=1e-4)

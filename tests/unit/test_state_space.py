@@ -1,0 +1,268 @@
+"""State-space models: files, responses, derivatives, fits, reduction, start values and the flight along a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swashplate.errors import CardError, FlightError, IdentificationError
+from swashplate.flights.flight import Flight, stream
+from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.linear_simulation import hold_matrices
+from swashplate.identification.reduction import reduce
+from swashplate.identification.start_values import from_linear_model, from_transfer_functions
+from swashplate.identification.state_space import StateSpaceModel
+from swashplate.identification.state_space_file import parse, structure, structure_names, to_toml
+from swashplate.identification.state_space_fit import fit_state_space
+from swashplate.identification.transfer_function_fit import fit_transfer_function
+from swashplate.identification.verification import verify
+
+OMEGA = 2 * np.pi * np.geomspace(0.1, 12.0, 80)
+
+ROTOR = {
+    "Lb": 3588.6, "Ma": 617.5, "tau_f": 0.0682, "Ba": 1.2963, "Ab": -1.3402, "Blat": 0.2449, "Blon": -0.0849,
+    "Alat": 0.0729, "Alon": 0.2696, "tau_roll": 0.05, "tau_pitch": 0.05,
+}  # fmt: skip
+
+
+def exact(model: StateSpaceModel, *, noise: float = 0.0, coherence: float = 0.9, seed: int = 0) -> FrequencyResponse:
+    h = model.response(OMEGA)
+    random = np.random.default_rng(seed)
+    h = h * np.exp(noise * (random.standard_normal(h.shape) + 1j * random.standard_normal(h.shape)))
+    n_f, n_out, n_in = h.shape
+    return FrequencyResponse(
+        omega=OMEGA,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        response=h,
+        coherence=np.full(h.shape, coherence),
+        multiple=np.full((n_f, n_out), coherence),
+        error=np.full(h.shape, 0.02),
+        input_power=np.ones((n_f, n_in)),
+        output_power=np.ones((n_f, n_out)),
+        input_coherence=np.ones((n_f, n_in, n_in)),
+    )
+
+
+def rotor() -> StateSpaceModel:
+    return structure("rotor_body").with_values(ROTOR)
+
+
+@pytest.mark.parametrize("name", structure_names())
+def test_ready_structures_are_whole_and_round_trip(name: str) -> None:
+    model = structure(name)
+    again = parse(to_toml(model))
+    assert again.numbers() == model.numbers()
+    np.testing.assert_array_equal(again.response(OMEGA[:5]), model.response(OMEGA[:5]))
+    assert model.trust
+    assert np.all(np.isfinite(model.response(OMEGA)))
+
+
+def test_response_is_that_of_python_control() -> None:
+    model = rotor()
+    expected = np.moveaxis(model.to_control()(1j * OMEGA), -1, 0) * np.exp(-1j * OMEGA * 0.05)[:, None, None]
+    np.testing.assert_allclose(model.response(OMEGA), expected, rtol=1e-9)
+
+
+def test_derivatives_are_exact() -> None:
+    """Every matrix, ties, delays and a sensor away from the centre of gravity, against central differences."""
+    text = to_toml(structure("thirteen_state")).replace(
+        'specific_force = "y"', 'specific_force = "y"\nat = ["xs", 0, "zs"]'
+    )
+    text += "\n[parameters.xs]\nvalue = 0.3\n[parameters.zs]\nvalue = -0.1\n"
+    model = parse(text)
+    pairs = [(o, i, OMEGA[::20]) for o in range(len(model.outputs)) for i in range(len(model.inputs))]
+    free = model.free
+    numbers = np.array([model.parameters[n].value or 0.1 for n in free])
+    _, slopes = model.sensitivities(free, numbers, pairs)
+    for k in range(len(free)):
+        step = 1e-4 * abs(numbers[k])
+        change = step * (np.arange(len(free)) == k)
+        up, down = (model.sensitivities(free, numbers + sign * change, pairs)[0] for sign in (1, -1))
+        for slope, high, low in zip(slopes, up, down, strict=True):
+            expected = (high - low) / (2 * step)
+            size = 2e-6 * (np.abs(expected).max() + np.abs(high).max() / abs(numbers[k]))
+            np.testing.assert_allclose(slope[:, k], expected, atol=size)
+
+
+def test_accelerometer_away_from_the_centre_of_gravity() -> None:
+    """ay = vdot - g phi + x_s rdot - z_s pdot (hover)."""
+    plain = structure("six_dof")
+    text = to_toml(plain).replace('specific_force = "y"', 'specific_force = "y"\nat = ["0.3", 0, "-0.2"]')
+    moved = parse(text)
+    a, _, c, _ = moved.explicit()
+    p, r = (moved.states.index(n) for n in "pr")
+    row = moved.outputs.index("ay")
+    np.testing.assert_allclose(c[row] - plain.explicit()[2][row], 0.3 * a[r] + 0.2 * a[p], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('w = "Zw"', 'w = "Zww"', r"equations.w.w: uses 'Zww', which is no parameter of this model. Did you mean 'Zw'"),
+        ('w = "Zw"', 'w = "Zw.__class__"', "is not an expression"),
+        ('w = "Zw"', 'ww = "Zw"', r"'ww' is no state or input of this model. Did you mean 'w'"),
+        ('specific_force = "z"', 'specific_force = "down"', "expected 'x', 'y' or 'z'"),
+        ('mixer_collective = "tau_collective"', 'stick = "tau_collective"', "is no input"),
+        ("kind", "knid", "kind is None"),
+        ("[parameters]", "[parameters]\nZx = {value = 1.0}", "Zx: stands in no equation"),
+        ("value = -1.0", "value = 'one'", "value is 'one', expected a number"),
+        ("value = -1.0", "tie = 'Zcol * Zw'", "ties run in a circle"),
+        ('w = "m/s"', 'w = "m/s', "is not TOML"),
+    ],
+)  # fmt: skip
+def test_bad_files_are_named(old: str, new: str, words: str) -> None:
+    text = to_toml(structure("heave"))
+    text = (
+        text.replace("[parameters.", "[parameters.")
+        if old != "[parameters]"
+        else text + "\n[parameters.Zx]\nvalue = 1.0\n"
+    )
+    source = text if old == "[parameters]" else _heave().replace(old, new, 1)
+    with pytest.raises(CardError, match=words):
+        parse(source, path="heave.toml")
+
+
+def _heave() -> str:
+    from importlib import resources
+
+    return (resources.files("swashplate.identification") / "structures" / "heave.toml").read_text(encoding="utf-8")
+
+
+def test_fit_finds_the_truth_from_the_ready_structure() -> None:
+    fit = fit_state_space(structure("rotor_body"), exact(rotor()))
+    assert fit.cost < 0.05  # the points are interpolated between lines
+    for name, value in ROTOR.items():
+        assert fit.model.parameters[name].value == pytest.approx(value, rel=0.02), name
+    assert not fit.problems
+    assert all(p.cramer_rao >= p.insensitivity > 0.0 for p in fit.parameters)
+    assert "J_ave" in repr(fit)
+
+
+def test_cramer_rao_is_what_noise_scatters() -> None:
+    """White errors of s nepers on points of their own: scatter / CR = sqrt(2) * (s in dB), T&R's remark made exact.
+
+    Phase errors of the same size weigh 0.01745 (57.3 / 8.686)^2 = 0.76 of the gain's, so the factor is a little less.
+    """
+    true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
+    found, bounds = [], []
+    for seed in range(60):
+        fit = fit_state_space(true, _at_points(true, noise=0.03, seed=seed), starts=1)
+        found.append([fit.model.parameters[n].value for n in fit.free])
+        bounds.append([fit.model.parameters[n].cramer_rao for n in fit.free])
+    factor = np.std(found, axis=0) / np.mean(bounds, axis=0) / (np.sqrt(2.0) * 0.03 * 20 / np.log(10))
+    assert np.all((factor > 0.7) & (factor < 1.3)), factor
+
+
+def _at_points(model: StateSpaceModel, *, noise: float, seed: int) -> FrequencyResponse:
+    """Responses at just the 20 lines that the cost uses: no interpolation smooths the noise."""
+    omega = np.geomspace(OMEGA[0], OMEGA[-1], 20)
+    random = np.random.default_rng(seed)
+    h = model.response(omega)
+    h = h * np.exp(noise * (random.standard_normal(h.shape) + 1j * random.standard_normal(h.shape)))
+    one = np.ones(h.shape)
+    return FrequencyResponse(
+        omega,
+        model.inputs,
+        model.outputs,
+        h,
+        one,
+        one[:, :, 0],
+        0.03 * one,
+        one[:, 0],
+        one[:, :, 0],
+        one[:, :, :1] * one,
+    )
+
+
+def test_reduction_takes_out_what_is_not_there_and_keeps_what_is() -> None:
+    text = to_toml(rotor())
+    text = text.replace('b = "Lb"', 'b = "Lb"\np = "Lp"').replace('a = "Ma"', 'a = "Ma"\nq = "Mq"')
+    text += "\n[parameters.Lp]\nvalue = -0.5\n[parameters.Mq]\nvalue = -0.3\n"
+    larger = parse(text)
+    fit = fit_state_space(larger, exact(rotor(), noise=0.02))
+    smaller = reduce(fit)
+    dropped = {step.dropped for step in smaller.reduction if step.kept}
+    assert {"Lp", "Mq"} <= dropped
+    assert not dropped & {"Lb", "Ma", "tau_f", "tau_roll"}
+    assert smaller.model.parameters["Lp"].value == 0.0
+    assert smaller.cost < fit.cost * 1.05 + 0.5 + 0.5
+
+
+def test_what_no_response_sees_is_held_and_named() -> None:
+    model = structure("rotor_body").with_values(ROTOR)
+    responses = exact(model).select(("p", "q"), ("mixer_roll",))
+    fit = fit_state_space(model, responses)
+    assert any("tau_pitch" in text and "held" in text for text in fit.warnings)
+    assert fit["tau_pitch"].fixed
+
+
+def test_unusable_questions_are_refused() -> None:
+    model = rotor()
+    with pytest.raises(IdentificationError, match="share nothing to fit"):
+        fit_state_space(structure("heave"), exact(model))
+    with pytest.raises(IdentificationError, match="no response keeps a coherence"):
+        fit_state_space(model, exact(model, coherence=0.3))
+    wrong = model.with_values({"tau_f": 0.02})
+    flipped = replace(
+        wrong, parameters={**wrong.parameters, "Lb": replace(wrong.parameters["Lb"], value=-3000.0, lower=-1e9)}
+    )
+    assert any(
+        "is unstable" in text for text in fit_state_space(flipped, exact(model), starts=1, iterations=3).problems
+    )
+    with pytest.raises(CardError, match="is no parameter"):
+        model.with_values({"Lbb": 1.0})
+
+
+def test_start_values_from_transfer_functions() -> None:
+    true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
+    responses = exact(true)
+    fit = fit_transfer_function(responses, "0/1-1s", input="mixer_collective")
+    start = from_transfer_functions(structure("heave"), [fit])
+    for name in ("Zw", "Zcol", "tau_collective"):
+        assert start.parameters[name].value == pytest.approx(true.parameters[name].value, rel=0.02)
+
+
+def test_start_values_from_the_coax() -> None:
+    import swashplate as sp
+
+    linear = sp.linearize(sp.vehicle("coax"))
+    model = from_linear_model(structure("coaxial"), linear)
+    a, b, _, _ = model.explicit()
+    keep = [linear.states.index(s) for s in model.states]
+    cols = [linear.inputs.index(i) for i in model.inputs]
+    np.testing.assert_allclose(a, linear.A[np.ix_(keep, keep)], atol=1e-3 * np.abs(linear.A).max())
+    np.testing.assert_allclose(b, linear.B[np.ix_(keep, cols)], atol=1e-9 * np.abs(linear.B).max())
+
+
+def test_first_order_hold_is_exact_for_a_ramp() -> None:
+    phi, q0, q1 = hold_matrices(np.array([[-2.0]]), np.array([[3.0]]), 0.1)
+    # xdot = -2 x + 3 t from rest: x = 3 (t/2 - 1/4 + e^(-2t)/4)
+    x = phi @ [0.0] + q0 @ [0.0] + q1 @ [0.1]
+    assert x[0] == pytest.approx(3 * (0.05 - 0.25 + np.exp(-0.2) / 4), rel=1e-9)
+
+
+def test_verification_solves_for_biases_and_judges_the_rest() -> None:
+    model, random = rotor(), np.random.default_rng(1)
+    dt, n = 0.005, 4_000
+    u = np.cumsum(random.standard_normal((n, 2)), axis=0)
+    u = 0.05 * (u - u.mean(axis=0)) / u.std(axis=0)
+    a, b, c, _ = model.explicit()
+    phi, q0, q1 = hold_matrices(a, b, dt)
+    late = np.vstack([np.repeat(u[:1], 10, axis=0), u[:-10]])  # 50 ms
+    x, y = np.zeros((n, 4)), np.zeros((n, 2))
+    for k in range(1, n):
+        x[k] = phi @ x[k - 1] + q0 @ late[k - 1] + q1 @ (late[k] - late[k - 1])
+    y = x @ c.T + np.array([0.2, -0.1])
+    columns = {"mixer_roll": u[:, 0] + 0.3, "mixer_pitch": u[:, 1], "p": y[:, 0], "q": y[:, 1]}
+    flight = Flight({"uniform": stream(np.arange(n) * dt, columns)})
+    found = verify(model, flight)
+    assert found.cost < 1e-3
+    assert found.good
+    worse = verify(model.with_values({"Ma": 900.0}), flight)
+    assert worse["q"].theil > 0.02 > 10.0 * found["q"].theil
+    assert "J_rms" in repr(worse)
+    with pytest.raises(FlightError, match="share no output"):
+        verify(structure("heave"), flight)
