@@ -106,5 +106,5 @@ def state_hold_step(
     ahead = jnp.clip(c * north + s * east, -3.0, 3.0)
     right = jnp.clip(-s * north + c * east, -3.0, 3.0)
     below = jnp.clip(body.z - reference[2], -2.0, 2.0)
-    deviation = (measured - rest).at[0].set(ahead).at[1].set(right).at[2].set(below).at[8].set(turned)
+    deviation = (measured[:states] - rest).at[0].set(ahead).at[1].set(right).at[2].set(below).at[8].set(turned)
     return memory, commanded - K @ deviation
