@@ -4,6 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.complete
+WORKERS ?= 2
 
 .PHONY: help demo test lint types layers unit speed proof clean
 .DEFAULT_GOAL := help
@@ -44,7 +45,7 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	$(BIN)/python -m pytest -m "not proof" -q
+	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
 
 speed: $(STAMP)
 	$(BIN)/python -m benchmarks.run --short
