@@ -110,7 +110,8 @@ def minimise(
         found = None
         while damping < _HOPELESS:
             weights = np.where(kinked, max(damping, caution), damping)
-            step = np.clip(_step(row, gradient, information[1], weights, low, high), -reach, reach)
+            step = _step(row, gradient, information[1], weights, low, high)
+            step = _within(reach, step, gradient, information[1])
             trial = np.clip(row + step, low, high)
             trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
             if np.isfinite(trial_cost) and trial_cost < cost:
@@ -140,6 +141,17 @@ def minimise(
     touching = (row <= low + 1e-9) | (row >= high - 1e-9)
     at_bound = tuple(name for name, touch in zip(row_of.names, touching, strict=True) if touch)
     return Optimum(row, cost, tuple(history), information[0], converged, at_bound)
+
+
+def _within(reach: Array, step: Array, gradient: Array, hessian: Array) -> Array:
+    """The step with no entry beyond its reach: cut entry by entry or shortened as a whole, whichever promises more.
+
+    Cutting lets the others go on where one entry runs away, as the logarithm of a noise that is not there; along a
+    narrow valley it leads out of the valley.
+    """
+    cut = np.clip(step, -reach, reach)
+    shortened = step / max(1.0, float(np.max(np.abs(step) / reach)))
+    return min(cut, shortened, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
 
 
 def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
