@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.errors import ExportError
-from swashplate.export.linear import Array, Linear
+from swashplate.export.linear import Linear
+from swashplate.identification.spectra import Complex
 
 KEYS = (
     "Ma1s", "Lb1s", "Xa1s", "Yb1s", "Mu", "Mv", "Mq", "Mp", "Lu",
@@ -95,10 +96,8 @@ def ardupilot_state_space(model: Linear, sticks: Sticks) -> tuple[dict[str, floa
     else:
         missing = "coll_min, coll_max, coll_hover and nominal_rpm"
         notes.append(f"The model knows neither collective limits nor rotor speed: add {missing}.")
-    moved = _moved(plain, assembled(numbers))
-    if moved:
-        told = ", ".join(f"{axis} {decibels:.1f} dB" for axis, decibels in moved.items())
-        notes.append(f"On-axis rate responses between 1 and 20 rad/s moved by at most: {told}.")
+    told = ", ".join(f"{axis} {share:.1%}" for axis, share in _moved(plain, assembled(numbers)).items())
+    notes.append(f"On-axis rate responses from 1 to 20 rad/s moved by at most, of their peaks: {told}.")
     return dict(sorted(numbers.items(), key=lambda item: KEYS.index(item[0]))), tuple(notes)
 
 
@@ -258,19 +257,17 @@ def _with_disc(model: Linear, disc: tuple[str, str]) -> dict[str, float]:
 
 
 def _moved(one: Linear, other: Linear) -> dict[str, float]:
-    """Largest difference of the on-axis rate responses by stick [dB]."""
+    """Largest difference of the on-axis rate responses by stick, as a share of the response's peak."""
     found = {}
     for stick, rate in {"roll": "p", "pitch": "q", "yaw": "r"}.items():
         if stick in one.inputs and rate in one.states:
-            before, after = (_size(model, rate, stick) for model in (one, other))
-            if np.all(before > 0.0) and np.all(after > 0.0):
-                found[stick] = float(np.max(np.abs(20.0 * np.log10(after / before))))
+            before, after = (_response(model, rate, stick) for model in (one, other))
+            found[stick] = float(np.max(np.abs(after - before)) / np.max(np.abs(before)))
     return found
 
 
-def _size(model: Linear, output: str, stick: str) -> Array:
-    n = len(model.states)
+def _response(model: Linear, output: str, stick: str) -> Complex:
     s = 1j * _SEEN[:, None, None]
-    column = np.broadcast_to(model.B[:, [model.inputs.index(stick)]] + 0j, (_SEEN.size, n, 1))
-    x = np.linalg.solve(s * np.eye(n) - model.A, column)
-    return np.asarray(np.abs(x[:, model.states.index(output), 0]))
+    column = np.broadcast_to(model.B[:, [model.inputs.index(stick)]] + 0j, (_SEEN.size, len(model.states), 1))
+    x = np.linalg.solve(s * np.eye(len(model.states)) - model.A, column)
+    return np.asarray(x[:, model.states.index(output), 0], dtype=np.complex128)

@@ -35,9 +35,12 @@ def base_units(unit: str) -> tuple[float, dict[str, int]] | None:
     tokens = _TOKEN.findall(unit)
     if not tokens or "".join(tokens) != re.sub(r"\s", "", unit):
         return None
+    rest = iter([*tokens, ")"])
     try:
-        factor, powers = _product(iter([*tokens, ")"]))
+        factor, powers = _product(rest)
     except (KeyError, StopIteration):
+        return None
+    if next(rest, None) is not None:  # a bracket that closes nothing
         return None
     return factor, {name: power for name, power in powers.items() if power}
 
@@ -45,7 +48,7 @@ def base_units(unit: str) -> tuple[float, dict[str, int]] | None:
 def _product(tokens: Iterator[str]) -> tuple[float, dict[str, int]]:
     """What stands up to the closing bracket."""
     total, powers = 1.0, dict[str, int]()
-    last: tuple[float, dict[str, int]] = (1.0, {})
+    last: tuple[float, dict[str, int]] | None = None
     turned = sign = 1
 
     def take(part: tuple[float, dict[str, int]], power: int) -> None:
@@ -60,6 +63,8 @@ def _product(tokens: Iterator[str]) -> tuple[float, dict[str, int]]:
         if token == "/":
             turned = -1
         elif token.startswith("^"):  # the unit itself has been taken once
+            if last is None:
+                raise KeyError(token)
             take(last, sign * (int(token[1:]) - 1))
         elif token != "*":
             last = _product(tokens) if token == "(" else _KNOWN[token]

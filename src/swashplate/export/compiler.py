@@ -9,7 +9,7 @@ from pathlib import Path
 
 from swashplate.errors import ExportError
 
-STRICT = ("-std=c99", "-O3", "-Wall", "-Wextra", "-Werror")
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror")
 
 
 def compiler() -> str | None:
