@@ -110,7 +110,7 @@ def test_many_are_as_many_single_ones_and_start_anew_by_themselves() -> None:
 
 
 def test_leaving_the_limits_ends_an_episode_and_observations_stay_in_their_space() -> None:
-    env = HelicopterEnv("coax", authority=1.0, substeps=1)
+    env = HelicopterEnv("coax", authority=1.0)
     up = np.array([1.0, 1.0, 0.0, 0.0], np.float32)
     observations, rewards, lost = flown(env, lambda seen: up, seed=0)
     assert lost

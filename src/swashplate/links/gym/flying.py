@@ -27,6 +27,7 @@ from swashplate.simulation.dynamics import (
     rk4_step_looped,
     row_rates,
 )
+from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, trim
 from swashplate.vehicles.catalogue import vehicle as find_vehicle
 from swashplate.vehicles.vehicle import Vehicle
@@ -103,7 +104,7 @@ class Flying:
             self.free,
             x,
             np.asarray(actions, dtype=np.float64),
-            p,
+            p if self.scatter else self.parameters,
             self.table[np.minimum(k + 1, self.steps)],
             {
                 "inputs": self.trim.inputs,
@@ -212,7 +213,7 @@ def _observed(x: Any, target: Any, angles: Any) -> Any:
 def _advance(
     equations: Equations, substeps: int, free: tuple[int, ...], x: Any, actions: Any, p: Any, target: Any, rest: Any
 ) -> Any:
-    rates = row_rates(equations, padded=False)
+    rates = row_rates(equations, padded=False, xp=vector_backend())
 
     def one(x: Any, action: Any, p: Any, target: Any) -> Any:
         action = jnp.clip(action, -1.0, 1.0)
@@ -233,4 +234,6 @@ def _advance(
         reward = jnp.exp(-jnp.sum(far**2)) - EFFORT * jnp.mean(action**2)
         return after, _clipped(errors), jnp.where(inside, reward, CRASH), ~inside
 
-    return jax.vmap(one)(x, actions, p, target)
+    # The vehicles last: every number of a state is then a row of its own, as in `simulation.batch`.
+    after, *rest_of = jax.vmap(one, (1, 1, 1 if p.ndim == 2 else None, 1), (1, 1, 0, 0))(x.T, actions.T, p.T, target.T)
+    return after.T, rest_of[0].T, *rest_of[1:]
