@@ -14,7 +14,7 @@ import pytest
 import swashplate as sp
 from exported import compiled
 from swashplate.errors import ExportError
-from swashplate.export.c_text import identifier, words
+from swashplate.export.c_text import identifier, literal, words
 from swashplate.export.compiler import compiler, shared_library
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
@@ -158,6 +158,29 @@ def test_nothing_that_a_card_says_becomes_code(tmp_path: Path) -> None:
         assert "system(" not in re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
         assert all(c == "\n" or " " <= c <= "~" for c in text)
     compiled(code, tmp_path)
+
+
+@needs_compiler
+def test_nor_what_a_linear_models_file_names_its_signals(tmp_path: Path) -> None:
+    hostile = "w = 0 }; int system(); //"
+    model = replace(of_state_space(structure("heave"), name="heave"), states=(hostile,), units={hostile: "*/ x"})
+    code = model_code(trace_linear(model, name="heave"))
+    assert "heave_state_w_0_int_system" in code.header
+    assert "system()" not in "".join(code.files().values())
+    compiled(code, tmp_path)
+    clash = replace(of_state_space(structure("six_dof"), name="six_dof"), inputs=("a b", "a-b", "c", "d"))
+    with pytest.raises(ExportError, match="are the same in C"):
+        trace_linear(clash, name="six_dof")
+
+
+def test_numbers_for_c() -> None:
+    assert literal(0.1, "double") == "0.1"
+    assert literal(2.0, "single") == "2.0f"
+    assert literal(1e-60, "single") == "0.0f"
+    assert literal(-1e-7, "single") == "-1e-07f"
+    for value, precision in ((float("nan"), "double"), (float("inf"), "single"), (1e60, "single")):
+        with pytest.raises(ExportError, match=r"no (double|single) in C"):
+            literal(value, precision)  # type: ignore[arg-type]
 
 
 def test_words_and_names_for_c() -> None:

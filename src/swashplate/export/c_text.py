@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from typing import Literal
+
+import numpy as np
 
 from swashplate.errors import ExportError
 
@@ -46,14 +47,16 @@ def identifier(text: str) -> str:
 
 
 def literal(value: float, precision: Precision) -> str:
-    """A number as C reads it back to the last bit.
+    """A number as C reads it back to the last bit of its precision.
 
     Raises:
-        ExportError: for a number that is none.
+        ExportError: for a number that is none, or too large for single precision.
     """
-    if not math.isfinite(value):
-        raise ExportError(f"a number of the model is {value}, which no C compiler takes.", hint="Check the card.")
-    text = repr(float(value))
+    with np.errstate(over="ignore"):
+        rounded = float(value) if precision == "double" else np.float32(value)
+    if not np.isfinite(rounded):
+        raise ExportError(f"a number of the model is {value}: no {precision} in C.", hint="Check the card.")
+    text = str(rounded)
     text = text if any(c in text for c in ".e") else f"{text}.0"
     return text if precision == "double" else f"{text}f"
 

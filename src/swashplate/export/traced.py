@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import ExportError
+from swashplate.export.c_text import identifier
 from swashplate.export.linear import Linear, input_unit
 from swashplate.flights.schema import channel, is_known
 from swashplate.physics.backend import CasadiBackend
@@ -161,7 +162,11 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
 
 
 def trace_linear(model: Linear, *, name: str) -> Traced:
-    """A linear model's dx/dt = A x + B u, y = C x + D u with its numbers as constants."""
+    """A linear model's dx/dt = A x + B u, y = C x + D u with its numbers as constants.
+
+    Raises:
+        ExportError: without CasADi, or where two signals would have one name in C.
+    """
     casadi = require_casadi()
     x, u = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(model.inputs))
     nothing = casadi.SX(0, 1)
@@ -175,7 +180,12 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         return casadi.Function("f", [x, u, nothing, nothing], list(results), {"cse": True})
 
     def variables(names: Sequence[str]) -> tuple[Variable, ...]:
-        return tuple(Variable(a, model.units.get(a, ""), meaning=_meaning(a)) for a in names)
+        called = [identifier(a) for a in names]  # a file may name its signals as it likes
+        if len(set(called)) != len(called):
+            raise ExportError(f"names of {', '.join(names)} are the same in C.", where=model.name)
+        return tuple(
+            Variable(c, model.units.get(a, ""), meaning=_meaning(a)) for c, a in zip(called, names, strict=True)
+        )
 
     late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
     waits = [f"{i} by {', '.join(f'{d:g}' for d in ds)} s" for i, ds in late.items() if any(ds)]
