@@ -134,6 +134,11 @@ def test_ardupilot_keeps_the_modes_of_a_helicopters_card() -> None:
         assert np.min(np.abs(theirs - value)) < 0.05 * max(1.0, abs(value))
 
 
+def test_a_bar_that_does_not_fit_is_told_of() -> None:
+    made = export_model(structure("thirteen_state"), "ardupilot-statespace", name="thirteen")
+    assert "another aircraft" in made.notes[-1]
+
+
 @pytest.mark.parametrize(
     ("text", "said"), [('{"Ma1": 1}', "Ma1"), ('{"tf": "0.1"}', "tf"), ("[1]", "object"), ("", "JSON")]
 )

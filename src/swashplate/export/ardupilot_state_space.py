@@ -31,7 +31,8 @@ KEYS = (
 _BODY = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 _SLOW = ("x", "y", "z", "psi", "omega", "governor")
 """States that the format knows nothing of and that are held: place, heading, rotor speed."""
-_DISC = (("b1", "a1"), ("b1s", "a1s"), ("b", "a"))
+_TILTS = (("b1", "a1"), ("b1s", "a1s"), ("b", "a"), ("d", "c"))
+"""Tilt to the right and back of a tip-path plane, the rotor's or a stabilizer bar's: one pair fits into the format."""
 STICKS = ("roll", "pitch", "yaw", "collective")
 _STICK_NAMES = {
     "roll": ("mixer_roll", "lateral", "A1"),
@@ -49,6 +50,8 @@ _FORCES = {
 }
 """Which derivative of a row stands under which key."""
 _BY_DISC = {("p", "b"): "Lb1s", ("q", "a"): "Ma1s", ("u", "a"): "Xa1s", ("v", "b"): "Yb1s"}
+_ANOTHER = 0.3
+"""Share of a response's peak beyond which a reduced model is not the one that was asked for."""
 _SEEN = np.geomspace(1.0, 20.0, 40)  # rad/s, where a pilot and an autopilot close their loops
 
 
@@ -75,12 +78,9 @@ def ardupilot_state_space(model: Linear, sticks: Sticks) -> tuple[dict[str, floa
         ExportError: for a model without the sticks or states of a single-rotor helicopter in hover.
     """
     plain = _in_sticks(model, sticks)
-    disc = next((pair for pair in _DISC if set(pair) <= set(plain.states)), None)
-    reduced = _without(plain, [s for s in plain.states if s in _SLOW], steady=False)
-    rest = [s for s in reduced.states if s not in _BODY and (disc is None or s not in disc)]
-    reduced = _without(reduced, rest, steady=True)
-    found = _with_disc(reduced, disc) if disc is not None else _quasi_steady(reduced)
-    numbers = {key: float(value) for key, value in found.items() if value}
+    pairs = [pair for pair in _TILTS if set(pair) <= set(plain.states)]
+    tried = [_reduced(plain, pair) for pair in pairs] or [_reduced(plain, None)]
+    numbers = min(tried, key=lambda found: max(_moved(plain, assembled(found)).values()))
     for key, names in {"rp": ("roll", "pitch"), "ped": ("yaw",), "col": ("collective",)}.items():
         late = [plain.delay(plain.outputs[0], name) for name in names if name in plain.inputs]
         if any(late):
@@ -96,9 +96,21 @@ def ardupilot_state_space(model: Linear, sticks: Sticks) -> tuple[dict[str, floa
     else:
         missing = "coll_min, coll_max, coll_hover and nominal_rpm"
         notes.append(f"The model knows neither collective limits nor rotor speed: add {missing}.")
-    told = ", ".join(f"{axis} {share:.1%}" for axis, share in _moved(plain, assembled(numbers)).items())
+    moved = _moved(plain, assembled(numbers))
+    told = ", ".join(f"{axis} {share:.1%}" for axis, share in moved.items())
     notes.append(f"On-axis rate responses from 1 to 20 rad/s moved by at most, of their peaks: {told}.")
+    if max(moved.values()) > _ANOTHER:
+        notes.append("That is another aircraft: this format has no room for the model's bar, gyro or inflow.")
     return dict(sorted(numbers.items(), key=lambda item: KEYS.index(item[0]))), tuple(notes)
+
+
+def _reduced(plain: Linear, kept: tuple[str, str] | None) -> dict[str, float]:
+    """The numbers that are not 0, with one pair of tilts kept as states and the others settled."""
+    held = _without(plain, [s for s in plain.states if s in _SLOW], steady=False)
+    fast = [s for s in held.states if s not in _BODY and (kept is None or s not in kept)]
+    settled = _without(held, fast, steady=True)
+    found = _with_tilts(settled, kept) if kept else _quasi_steady(settled)
+    return {key: float(value) for key, value in found.items() if value}
 
 
 def to_json(numbers: Mapping[str, float]) -> str:
@@ -227,9 +239,9 @@ def _quasi_steady(model: Linear) -> dict[str, float]:
     return {key: _entry(model, row, name) for row, keys in _FORCES.items() for name, key in keys.items()}
 
 
-def _with_disc(model: Linear, disc: tuple[str, str]) -> dict[str, float]:
-    """With b1s and a1s: what the format's flapping equations lack goes into the body's rows as it settles to."""
-    names = dict(zip(("b", "a"), disc, strict=True))
+def _with_tilts(model: Linear, kept: tuple[str, str]) -> dict[str, float]:
+    """With `kept` as b1s and a1s; what the format's flapping equations lack enters the body's rows as it settles to."""
+    names = dict(zip(("b", "a"), kept, strict=True))
     place = [model.states.index(names[tilt]) for tilt in ("b", "a")]
     inner = model.A[np.ix_(place, place)]
     tf = -2.0 / float(np.trace(inner))
@@ -242,10 +254,10 @@ def _with_disc(model: Linear, disc: tuple[str, str]) -> dict[str, float]:
     for stick in ("roll", "pitch"):
         lacking[1][:, model.inputs.index(stick)] = 0.0
     settled = [-np.linalg.solve(inner, part) for part in lacking]
-    kept = [i for i in range(len(model.states)) if i not in place]
+    rest = [i for i in range(len(model.states)) if i not in place]
     A, B = model.A.copy(), model.B.copy()
-    A[kept] += model.A[np.ix_(kept, place)] @ settled[0]
-    B[kept] += model.A[np.ix_(kept, place)] @ settled[1]
+    A[rest] += model.A[np.ix_(rest, place)] @ settled[0]
+    B[rest] += model.A[np.ix_(rest, place)] @ settled[1]
     body = replace(model, A=A, B=B)
     found = _quasi_steady(body)
     found |= {key: _entry(model, row, names[tilt]) for (row, tilt), key in _BY_DISC.items()}
