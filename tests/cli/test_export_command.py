@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 from commands import one_message, swash
 
+import swashplate as sp
+from swashplate.control.controller_file import save_controller
 from swashplate.export import compiler, fmu
 from swashplate.identification.state_space_file import structure, to_toml
 
@@ -33,8 +36,6 @@ def test_a_vehicle_in_each_format(form: str, files: set[str], tmp_path: Path) ->
 
 
 def test_an_identified_model_with_another_name_mass_and_precision(tmp_path: Path) -> None:
-    import swashplate as sp
-
     sp.vehicle("coax", bar=False).with_values({"tau_f_lower": 0.123}, status="identified").save(tmp_path / "model.toml")
     arguments = ("--format", "c", "--out", tmp_path, "--name", "my heli", "--mass", "0.3", "--precision", "single")
     document = json.loads(swash("export", tmp_path / "model.toml", *arguments, "--json").out)
@@ -60,7 +61,8 @@ def test_a_linear_model_and_a_controller(tmp_path: Path) -> None:
     assert "no speed" in one_message(swash("export", tmp_path / "linear.toml", "--format", "c", "--speed", "3"))
 
     controller = tmp_path / "hold.toml"
-    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "-q").code == 0
+    coax = sp.vehicle("coax")
+    save_controller(sp.autopilot(coax, sp.trim(coax)), controller)
     outcome = swash("export", controller, "--format", "c", "--out", tmp_path, "--precision", "single")
     assert outcome.code == 0, outcome.err
     assert "void swash_step(float memory" in (tmp_path / "hold.c").read_text()
@@ -77,6 +79,12 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
     assert "no C compiler" in outcome.err or fmu.fmu_platform() is None
     assert (tmp_path / "coax.fmu").stat().st_size > 10_000
     assert compiler.compiler() is None
+
+
+def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    assert "extra 'export'" in one_message(swash("export", "coax", "--format", "c", "--out", tmp_path))
+    assert swash("export", "coax", "--format", "control", "--out", tmp_path).code == 0
 
 
 @pytest.mark.parametrize(

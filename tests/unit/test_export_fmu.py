@@ -19,7 +19,7 @@ import swashplate as sp
 from swashplate.export import fmu as fmu_module
 from swashplate.export.base_units import base_units
 from swashplate.export.compiler import compiler
-from swashplate.export.fmu import fmu, fmu_platform
+from swashplate.export.fmu import fmu, fmu_platform, internal_step
 from swashplate.export.linear import of_state_space
 from swashplate.export.traced import Traced, trace_linear, trace_vehicle
 from swashplate.identification.state_space_file import structure
@@ -159,6 +159,17 @@ def test_the_description_names_units_derivatives_and_parameters(coax: tuple[Vehi
     assert variables["servo_roll"][0].get("min") == "-1.0"
     unit = next(u for u in root.iter("Unit") if u.get("name") == "N s^2/rad^2")
     assert unit[0].attrib == {"kg": "1", "m": "1", "rad": "-2"}
+
+
+def test_a_fast_mode_shortens_the_internal_step() -> None:
+    slow = of_state_space(structure("heave"), name="heave")
+    assert internal_step(trace_linear(slow, name="heave")) == 0.002
+    fast = trace_linear(replace(slow, A=np.array([[-1000.0]])), name="heave")
+    assert internal_step(fast) == pytest.approx(0.0005)
+    with zipfile.ZipFile(io.BytesIO(fmu(fast, version="0.1")[0])) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+    step = next(v for v in root.iter("ScalarVariable") if v.get("name") == "step_size")
+    assert float(step[0].get("start", "")) == pytest.approx(0.0005)
 
 
 def test_the_same_model_gives_the_same_bytes_and_words_stay_words(coax: tuple[Vehicle, Traced]) -> None:

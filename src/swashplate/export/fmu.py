@@ -11,13 +11,17 @@ from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
+
 from swashplate.export.compiler import compiler, shared_library
-from swashplate.export.fmu_description import STEP, description
+from swashplate.export.fmu_description import description
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced
 
 _WRAPPER = "fmu2.c"
 _CONFIG = "fmu_model.h"
+STEP = 0.002
+"""Longest internal Runge-Kutta step [s], unless a user sets `step_size`."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -38,16 +42,16 @@ def fmu(model: Traced, *, version: str) -> tuple[bytes, str]:
     Raises:
         ExportError: where the compiler refuses the sources.
     """
-    code = model_code(model)
+    code, step = model_code(model), internal_step(model)
     texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: wrapper(_WRAPPER)}
     listed = (f"{model.name}.c", _WRAPPER)
-    texts[_CONFIG] = _config(model, "")
-    unsigned = description(model, guid="", version=version, sources=listed)
+    texts[_CONFIG] = _config(model, "", step)
+    unsigned = description(model, guid="", version=version, sources=listed, step=step)
     digest = hashlib.sha256(b"\0".join([unsigned, *(texts[name].encode() for name in sorted(texts))])).hexdigest()
     guid = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
-    texts[_CONFIG] = _config(model, guid)
+    texts[_CONFIG] = _config(model, guid, step)
     content = {
-        "modelDescription.xml": description(model, guid=guid, version=version, sources=listed),
+        "modelDescription.xml": description(model, guid=guid, version=version, sources=listed, step=step),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},
     }
     message = ""
@@ -67,7 +71,15 @@ def wrapper(name: str) -> str:
     return (resources.files("swashplate.export") / "runtime" / name).read_text(encoding="utf-8")
 
 
-def _config(model: Traced, guid: str) -> str:
+def internal_step(model: Traced) -> float:
+    """Length of an internal Runge-Kutta step [s]: 2 ms, or half the fastest mode's time constant at the start."""
+    rows = ([v.start for v in kind] for kind in (model.states, model.inputs, model.surroundings, model.parameters))
+    A = np.asarray(model.jacobians.call([np.array(row) for row in rows])[0])
+    fastest = float(np.max(np.abs(np.linalg.eigvals(A)), initial=0.0))
+    return min(STEP, 0.5 / fastest) if fastest > 0.0 else STEP
+
+
+def _config(model: Traced, guid: str, step: float) -> str:
     functions = ("step", "rates", "outputs", "start_x", "start_u", "start_s", "start_p")
     kinds = ("states", "inputs", "surroundings", "parameters", "outputs")
     lines = [
@@ -75,7 +87,7 @@ def _config(model: Traced, guid: str) -> str:
         f'#include "{model.name}.h"',
         *(f"#define model_{name} {model.name}_{name}" for name in functions),
         *(f"#define N_{kind.upper()} {model.name}_n_{kind}" for kind in kinds),
-        f"#define MODEL_STEP {STEP!r}",
+        f"#define MODEL_STEP {step!r}",
         f'#define MODEL_GUID "{guid}"',
         "#ifdef FMI2_STATIC_LINKING",
         f"#define FMI2_FUNCTION_PREFIX {model.name}_",

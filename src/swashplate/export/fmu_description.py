@@ -9,9 +9,6 @@ from xml.etree import ElementTree
 from swashplate.export.base_units import base_units
 from swashplate.export.traced import Traced, Variable
 
-STEP = 0.002
-"""Length of an internal Runge-Kutta step [s], unless a user sets `step_size`."""
-
 
 @dataclass(frozen=True)
 class Entry:
@@ -25,8 +22,8 @@ class Entry:
     derivative: int = 0
 
 
-def entries(model: Traced) -> list[Entry]:
-    """Every variable in the order of the value references in runtime/fmu2.c."""
+def entries(model: Traced, *, step: float) -> list[Entry]:
+    """Every variable in the order of the value references in runtime/fmu2.c; `step` is the internal one [s]."""
     n = len(model.states)
     made = [Entry(v.name, v, "output", "continuous", "exact") for v in model.states]
     made += [
@@ -41,13 +38,13 @@ def entries(model: Traced) -> list[Entry]:
     for v in model.outputs:
         name = f"{v.name}_measured" if v.name in taken else v.name
         made.append(Entry(name, v, "output", "continuous", "calculated"))
-    step = Variable("step_size", "s", STEP, meaning="longest internal step of the Runge-Kutta integration")
-    made.append(Entry(step.name, step, "parameter", "tunable", "exact"))
+    longest = Variable("step_size", "s", step, meaning="longest internal step of the Runge-Kutta integration")
+    made.append(Entry(longest.name, longest, "parameter", "tunable", "exact"))
     assert [e.derivative for e in made[n : 2 * n]] == list(range(1, n + 1))
     return made
 
 
-def description(model: Traced, *, guid: str, version: str, sources: tuple[str, ...]) -> bytes:
+def description(model: Traced, *, guid: str, version: str, sources: tuple[str, ...], step: float) -> bytes:
     """The XML document."""
     root = ElementTree.Element(
         "fmiModelDescription",
@@ -71,7 +68,7 @@ def description(model: Traced, *, guid: str, version: str, sources: tuple[str, .
     files = ElementTree.SubElement(unit, "SourceFiles")
     for name in sources:
         ElementTree.SubElement(files, "File", name=name)
-    listed = entries(model)
+    listed = entries(model, step=step)
     units = sorted({e.variable.unit for e in listed if e.variable.unit not in ("", "1")})
     if units:
         definitions = ElementTree.SubElement(root, "UnitDefinitions")
