@@ -19,7 +19,7 @@ from swashplate.export.compiler import compiler, shared_library
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
 from swashplate.export.model_c import model_code
-from swashplate.export.traced import Traced, trace_linear, trace_vehicle
+from swashplate.export.traced import Traced, late_notes, trace_linear, trace_vehicle
 from swashplate.identification.state_space_file import structure
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
@@ -104,7 +104,7 @@ def test_in_single_precision_a_second_keeps_four_digits(tmp_path: Path) -> None:
 def test_a_linear_model_steps_as_its_matrices_say(tmp_path: Path) -> None:
     linear = of_state_space(structure("hybrid"), name="hybrid")
     model = trace_linear(linear, name="hybrid")
-    assert "hold back lateral by 0.02 s" in model.notes[0]
+    assert "hold back lateral by 0.02 s" in late_notes(model)[0]
     run = compiled(model_code(model), tmp_path)
     random = np.random.default_rng(0)
     x, u, nothing = random.standard_normal(10), random.standard_normal(4), np.zeros(1)

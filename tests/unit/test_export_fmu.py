@@ -108,6 +108,42 @@ def test_ten_seconds_are_pythons_with_accelerometers_and_derivatives(unit: Path,
 
 
 @needs_binary
+def test_delays_of_a_linear_model_are_in_it(tmp_path: Path) -> None:
+    """Each input acts one delay later than without; steps of any length, saved states and resets keep that."""
+    given = of_state_space(structure("six_dof"), name="six_dof")
+    late = replace(given, delays={"lateral": 0.03, "longitudinal": 0.0, "pedal": 0.05, "collective": 0.01})
+    for name, model in (("late", late), ("plain", replace(given, delays={}))):
+        (tmp_path / f"{name}.fmu").write_bytes(fmu(trace_linear(model, name="six_dof"), version="0.1")[0])
+    names, n, dt = list(given.states), 60, 0.01
+    random = np.random.default_rng(0)
+    inputs = {name: random.standard_normal(n) for name in given.inputs}
+    shifted = {}
+    for name, series in inputs.items():
+        steps = round(late.delays[name] / dt)
+        shifted[name] = np.concatenate([np.zeros(steps), series[: n - steps]])
+    with running(tmp_path / "plain.fmu") as (slave, at):
+        expected = fly(slave, at, shifted, names, dt)
+    with running(tmp_path / "late.fmu") as (slave, at):
+        np.testing.assert_allclose(fly(slave, at, inputs, names, dt), expected, rtol=1e-12, atol=1e-12)
+        slave.reset()
+        slave.setReal([at["step_size"]], [1e-5])  # more steps in a delay than are remembered one by one
+        fine = fly(slave, at, inputs, names, dt)
+        assert np.max(np.abs(fine - expected)) < 0.02 * np.max(np.abs(expected))
+        slave.reset()
+        slave.setReal([at["pedal"]], [1.0])
+        slave.doStep(0.0, 0.04)
+        saved = slave.getFMUstate()
+        assert slave.getReal([at["r"]]) == [0.0]
+        slave.doStep(0.04, 0.04)
+        (first,) = slave.getReal([at["r"]])
+        assert first > 0.1
+        slave.setFMUstate(saved)
+        slave.doStep(0.04, 0.04)
+        assert slave.getReal([at["r"]]) == [first]
+        slave.freeFMUstate(saved)
+
+
+@needs_binary
 def test_states_are_saved_and_parameters_set(unit: Path) -> None:
     with running(unit) as (slave, at):
         slave.setReal([at["p"]], [0.2])

@@ -22,6 +22,7 @@ _WRAPPER = "fmu2.c"
 _CONFIG = "fmu_model.h"
 STEP = 0.002
 """Longest internal Runge-Kutta step [s], unless a user sets `step_size`."""
+_PAST = 256
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -89,11 +90,24 @@ def _config(model: Traced, guid: str, step: float) -> str:
         *(f"#define N_{kind.upper()} {model.name}_n_{kind}" for kind in kinds),
         f"#define MODEL_STEP {step!r}",
         f'#define MODEL_GUID "{guid}"',
+        *_delays(model),
         "#ifdef FMI2_STATIC_LINKING",
         f"#define FMI2_FUNCTION_PREFIX {model.name}_",
         "#endif",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _delays(model: Traced) -> list[str]:
+    """The longest delay, room to remember the inputs for so long, and the delay of each."""
+    if not model.delays:
+        return []
+    listed = ", ".join(repr(float(delay)) for delay in model.delays)
+    return [
+        f"#define MODEL_LATE {max(model.delays)!r}",
+        f"#define N_PAST {_PAST}",
+        f"static const double model_delays[] = {{{listed}}};",
+    ]
 
 
 def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:

@@ -80,9 +80,10 @@ def _linear(model: Model, about: Trim | None, name: str) -> Linear:
 
 def _c(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
     from swashplate.export.model_c import model_code
+    from swashplate.export.traced import late_notes
 
     traced = _traced(model, about, name)
-    return Export(_encoded(model_code(traced, precision=precision).files()), traced.notes)
+    return Export(_encoded(model_code(traced, precision=precision).files()), (*traced.notes, *late_notes(traced)))
 
 
 def _fmu(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
@@ -97,9 +98,10 @@ def _fmu(model: Model, about: Trim | None, name: str, precision: Precision) -> E
 
 def _simulink(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
     from swashplate.export.simulink import simulink
+    from swashplate.export.traced import late_notes
 
     traced = _traced(model, about, name)
-    return Export(_encoded(simulink(traced)), traced.notes)
+    return Export(_encoded(simulink(traced)), (*traced.notes, *late_notes(traced)))
 
 
 def _control(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:

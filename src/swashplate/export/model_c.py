@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from swashplate.export.c_expression import body
 from swashplate.export.c_text import REAL, Precision, array, words
-from swashplate.export.traced import Traced, Variable
+from swashplate.export.traced import Traced, Variable, late_notes
 
 _KINDS = ("state", "input", "surrounding", "parameter", "output")
 
@@ -120,7 +120,7 @@ def _heading(model: Traced) -> str:
         words(f"{model.name}: {model.title}"),
         words(f"Trust: {model.trust}") if model.trust else "",
         words(f"Starts: {model.about}"),
-        *(words(note) for note in model.notes),
+        *(words(note) for note in (*model.notes, *late_notes(model))),
         "",
         "Written by swashplate from the equations that it simulates with. SI units, radians; body axes",
         "forward-right-down, local axes north-east-down. No allocation, no static variables that change.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -51,6 +51,7 @@ class Traced:
             equations use; the outputs of a vehicle are what accelerometers at the CG read.
         rates, readings: derivatives of the states, and the outputs.
         jacobians: A and B, the rates by state and by input.
+        delays: of each input [s]; empty where there are none. The functions do not have them.
         notes: what a user must know.
     """
 
@@ -66,7 +67,14 @@ class Traced:
     rates: Any = field(repr=False)
     readings: Any = field(repr=False)
     jacobians: Any = field(repr=False)
+    delays: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
+
+
+def late_notes(model: Traced) -> tuple[str, ...]:
+    """What a user of the equations alone must do about delays."""
+    waits = [f"{v.name} by {d:g} s" for v, d in zip(model.inputs, model.delays, strict=False) if d]
+    return (f"Delays are not in these equations; hold back {'; '.join(waits)}.",) if waits else ()
 
 
 def require_casadi() -> Any:
@@ -188,7 +196,9 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         )
 
     late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
-    waits = [f"{i} by {', '.join(f'{d:g}' for d in ds)} s" for i, ds in late.items() if any(ds)]
+    alike = all(len(found) <= 1 for found in late.values())
+    delays = tuple(found[0] for found in late.values() if found) if alike else ()
+    waits = "Delays differ between outputs and are not in this file; see the model's own."
     return Traced(
         name=name,
         title=model.title,
@@ -202,13 +212,9 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         rates=function([casadi.densify(A @ x + B @ u)]),
         readings=function([casadi.densify(C @ x + D @ u)]),
         jacobians=function([A, B]),
-        notes=(f"Delays are not in these equations; hold back {'; '.join(waits)}.",) if waits else (),
+        delays=delays if any(delays) else (),
+        notes=() if alike else (waits,),
     )
-
-
-def evaluator(function: Any) -> Callable[..., list[Any]]:
-    """A traced function as one of arrays, for tests and comparisons."""
-    return lambda *rows: [np.asarray(part) for part in function.call([np.asarray(row) for row in rows])]
 
 
 def _course(trim: Trim) -> str:

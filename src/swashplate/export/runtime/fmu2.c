@@ -61,6 +61,11 @@ enum {
 typedef struct {
   fmi2Real time;
   fmi2Real step;
+#ifdef MODEL_LATE
+  int newest, count; /* what the inputs were: a ring of times and values */
+  fmi2Real past_time[N_PAST];
+  fmi2Real past[N_PAST][N_INPUTS];
+#endif
   fmi2Real x[N_STATES + 1];
   fmi2Real u[N_INPUTS + 1];
   fmi2Real s[N_SURROUNDINGS + 1];
@@ -89,6 +94,45 @@ static void start(Instance *at) {
   at->now.step = MODEL_STEP;
   at->finite = 1;
 }
+
+#ifdef MODEL_LATE
+/* The inputs at the beginning of an internal step; steps too short to be kept apart share an entry. */
+static void remember(State *now, fmi2Real time) {
+  if (now->count == 0 || time >= now->past_time[now->newest] + MODEL_LATE / (N_PAST - 2)) {
+    now->newest = (now->newest + 1) % N_PAST;
+    now->past_time[now->newest] = time;
+    if (now->count < N_PAST) ++now->count;
+  }
+  memcpy(now->past[now->newest], now->u, N_INPUTS * sizeof(fmi2Real));
+}
+
+/* What the equations see of the inputs: each as it was one delay ago, and at its start before that. */
+static const fmi2Real *seen(const State *now, fmi2Real time, fmi2Real *u) {
+  int i, k;
+  for (i = 0; i < N_INPUTS; ++i) {
+    u[i] = model_delays[i] > 0 ? model_start_u[i] : now->u[i];
+    for (k = 0; model_delays[i] > 0 && k < now->count; ++k) {
+      const int at = (now->newest - k + N_PAST) % N_PAST;
+      if (now->past_time[at] <= time - model_delays[i] + 1e-9) {
+        u[i] = now->past[at][i];
+        break;
+      }
+    }
+  }
+  return u;
+}
+#else
+static void remember(State *now, fmi2Real time) {
+  (void)now;
+  (void)time;
+}
+
+static const fmi2Real *seen(const State *now, fmi2Real time, fmi2Real *u) {
+  (void)time;
+  (void)u;
+  return now->u;
+}
+#endif
 
 static fmi2Real *place(State *now, fmi2ValueReference reference) {
   if (reference < AT_DERIVATIVES) return &now->x[reference];
@@ -164,7 +208,7 @@ EXPORT fmi2Status API(fmi2Reset)(fmi2Component c) {
 EXPORT fmi2Status API(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
   Instance *at = c;
   State *now;
-  fmi2Real rates[N_STATES + 1], outputs[N_OUTPUTS + 1];
+  fmi2Real rates[N_STATES + 1], outputs[N_OUTPUTS + 1], u[N_INPUTS + 1];
   int rated = 0, read = 0;
   size_t i;
   if (!at) return fmi2Error;
@@ -178,11 +222,11 @@ EXPORT fmi2Status API(fmi2GetReal)(fmi2Component c, const fmi2ValueReference vr[
     if (found) {
       value[i] = *found;
     } else if (vr[i] < AT_INPUTS) {
-      if (!rated) model_rates(now->x, now->u, now->s, now->p, rates);
+      if (!rated) model_rates(now->x, seen(now, now->time, u), now->s, now->p, rates);
       rated = 1;
       value[i] = rates[vr[i] - AT_DERIVATIVES];
     } else {
-      if (!read) model_outputs(now->x, now->u, now->s, now->p, outputs);
+      if (!read) model_outputs(now->x, seen(now, now->time, u), now->s, now->p, outputs);
       read = 1;
       value[i] = outputs[vr[i] - AT_OUTPUTS];
     }
@@ -207,7 +251,7 @@ EXPORT fmi2Status API(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr[
 
 EXPORT fmi2Status API(fmi2DoStep)(fmi2Component c, fmi2Real at_time, fmi2Real length, fmi2Boolean no_return) {
   Instance *at = c;
-  fmi2Real count, h;
+  fmi2Real count, h, u[N_INPUTS + 1];
   long i, n;
   (void)no_return;
   if (!at) return fmi2Error;
@@ -222,7 +266,11 @@ EXPORT fmi2Status API(fmi2DoStep)(fmi2Component c, fmi2Real at_time, fmi2Real le
   }
   n = count < 1 ? 1 : (long)count;
   h = length / (fmi2Real)n;
-  for (i = 0; i < n; ++i) model_step(at->now.x, at->now.u, at->now.s, at->now.p, h);
+  for (i = 0; i < n; ++i) {
+    const fmi2Real time = at_time + (fmi2Real)i * h;
+    remember(&at->now, time);
+    model_step(at->now.x, seen(&at->now, time, u), at->now.s, at->now.p, h);
+  }
   for (i = 0; i < N_STATES; ++i) {
     if (!isfinite(at->now.x[i])) {
       if (at->finite) say(at, fmi2Error, "the states left the finite numbers");
