@@ -21,8 +21,10 @@ from swashplate.export.linear import of_state_space
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced, late_notes, trace_linear, trace_vehicle
 from swashplate.identification.state_space_file import structure
+from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
+from swashplate.vehicles.structure import leaves
 from swashplate.vehicles.vehicle import Vehicle
 
 pytest.importorskip("casadi", reason="the extra 'export' is not installed")
@@ -32,7 +34,6 @@ VEHICLES: list[tuple[str, dict[str, Any], float]] = [
     ("coax", {}, 0.0),
     ("coax", {"bar": False, "mixing": "as_printed"}, 0.0),
     ("raptor50", {}, 5.0),
-    ("raptor50", {"bar": True, "gyro": True, "rotor_speed": "throttle", "servos": True}, 0.0),
 ]
 WINDY = Environment(wind_north=0.5, wind_east=-0.3, wind_down=0.1, air_density=1.15, gravity=9.80665, voltage=11.8)
 
@@ -79,6 +80,36 @@ def test_ten_seconds_and_the_jacobians_are_pythons(
     # At rest in the steady flight's axes accelerometers read the weight.
     (force,) = run.call("outputs", trim.state, trim.inputs, s, p, out=(3,))
     np.testing.assert_allclose(np.linalg.norm(force), WINDY.gravity, rtol=1e-9)
+
+
+@needs_compiler
+def test_every_option_of_a_helicopter_evaluates_as_plain_floats_do(tmp_path: Path) -> None:
+    options = {"bar": True, "gyro": True, "servos": True, "rotor_speed": "throttle", "inflow": "pitt-peters"}
+    vehicle = sp.vehicle("raptor50", ground=True, rotation="ccw", coning=True, **options)
+    x0 = np.array(list(leaves(vehicle.state)))
+    low, high = np.array(vehicle.input_limits).T
+    start = Trim(x0, 0.5 * (low + high), vehicle.state_names, vehicle.input_names, WINDY, 0.0, 0.0, 0.0, 0.0)
+    model = trace_vehicle(vehicle, start, name="heli")
+    run = compiled(model_code(model), tmp_path)
+    s, p = starts(model, "surroundings"), starts(model, "parameters")
+
+    def plain(x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.array(vehicle.rates(x.tolist(), u.tolist(), vehicle.values(), WINDY, FloatBackend()))
+
+    random = np.random.default_rng(0)
+    for scale in (0.05, 0.3, 1.0) * 20:
+        x = x0 * random.uniform(0.7, 1.3, x0.size) + scale * random.standard_normal(x0.size) * np.where(x0 == 0, 1, 0.1)
+        u = random.uniform(low, high)
+        (rates,) = run.call("rates", x, u, s, p, out=(x.size,))
+        expected = plain(x, u)
+        np.testing.assert_allclose(rates, expected, rtol=1e-10, atol=1e-10)
+
+    x, u = x0 + 0.05 * random.standard_normal(x0.size), 0.5 * (low + high)
+    found = run.call("jacobians", x, u, s, p, out=(x.size**2, x.size * u.size))
+    for matrix, row, move in zip(found, (x, u), (lambda v: (v, u), lambda v: (x, v)), strict=True):
+        nudges = 1e-6 * np.eye(row.size)
+        slopes = np.stack([(plain(*move(row + d)) - plain(*move(row - d))) / 2e-6 for d in nudges], axis=1)
+        np.testing.assert_allclose(matrix.reshape(slopes.shape), slopes, rtol=1e-4, atol=1e-4 * np.abs(slopes).max())
 
 
 @needs_compiler
