@@ -31,9 +31,12 @@ void fly(double *x, const double *u, const double *s, const double *p, int n) {
 """
 
 
-def step(name: str, *, steps: int, repeats: int) -> Result:
-    """The exported Runge-Kutta step of a packaged vehicle, double precision, gcc -O2, called in a loop in C."""
-    vehicle = load_vehicle(name)
+def step(name: str, *, steps: int, repeats: int, **options: object) -> Result:
+    """The exported Runge-Kutta step of a packaged vehicle, double precision, gcc -O2, called in a loop in C.
+
+    `options` as the scan has them that it is held against.
+    """
+    vehicle = load_vehicle(name, **options)
     model = trace_vehicle(vehicle, trim(vehicle), name=name)
     kinds = ("states", "inputs", "surroundings", "parameters")
     start, *given = (np.array([v.start for v in getattr(model, kind)]) for kind in kinds)

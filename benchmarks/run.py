@@ -33,7 +33,7 @@ def measure(*, short: bool) -> list[Result]:
         single.numpy_loop(steps=100 * scale, repeats=repeats),
         single.c_loop(steps=100_000 * scale, repeats=repeats),
         export.step("coax", steps=100_000 * scale, repeats=repeats),
-        export.step("raptor50", steps=20_000 * scale, repeats=repeats),
+        export.step("raptor50", steps=20_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters"),
         export.environments(steps=100 * scale, repeats=repeats),
         many.batch("float64", steps=50 * scale, repeats=repeats),
         many.batch("float32", steps=50 * scale, repeats=repeats),
