@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -102,6 +101,8 @@ def export(
 
 def _kind(model: str) -> str:
     """What a file says that it is; "" for a name, or where it says nothing."""
+    import tomllib
+
     try:
         return str(tomllib.loads(Path(model).read_text(encoding="utf-8")).get("kind", ""))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
