@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import frequency, helicopter, identifying, many, peers, single
+from benchmarks import export, frequency, helicopter, identifying, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -32,6 +32,9 @@ def measure(*, short: bool) -> list[Result]:
         single.scan(steps=20_000 * scale, repeats=2 * repeats),
         single.numpy_loop(steps=100 * scale, repeats=repeats),
         single.c_loop(steps=100_000 * scale, repeats=repeats),
+        export.step("coax", steps=100_000 * scale, repeats=repeats),
+        export.step("raptor50", steps=20_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters"),
+        export.environments(steps=100 * scale, repeats=repeats),
         many.batch("float64", steps=50 * scale, repeats=repeats),
         many.batch("float32", steps=50 * scale, repeats=repeats),
         helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),

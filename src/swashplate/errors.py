@@ -89,3 +89,7 @@ class IdentificationError(SwashError):
 
 class BenchError(SwashError):
     """A bench record that cannot be read, or that contradicts what its procedure measures."""
+
+
+class ExportError(SwashError):
+    """A model that a format cannot hold, or a tool that writing it needs and that is not here."""

@@ -14,6 +14,7 @@ from swashplate.cli import (
     decouple,
     demo,
     derivatives,
+    export,
     fit_ss,
     fit_tf,
     identify,
@@ -73,6 +74,7 @@ app.command("maneuver", short_help="Design an excitation to fly and check its ru
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
+app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")

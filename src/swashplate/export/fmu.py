@@ -1,0 +1,132 @@
+"""A model as a Functional Mock-up Unit: FMI 2.0 co-simulation, sources inside, a binary where a compiler is here."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import platform
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.export.compiler import compiler, shared_library
+from swashplate.export.fmu_description import description
+from swashplate.export.model_c import model_code
+from swashplate.export.traced import Traced
+
+_WRAPPER = "fmu2.c"
+_CONFIG = "fmu_model.h"
+STEP = 0.002
+"""Longest internal Runge-Kutta step [s], unless a user sets `step_size`."""
+_PAST = 256
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def fmu_platform() -> str | None:
+    """FMI's name for this machine's binaries ("linux64"), None where FMI 2.0 has none."""
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return None
+    return {"Linux": "linux64", "Darwin": "darwin64"}.get(platform.system())
+
+
+def fmu(model: Traced, *, version: str) -> tuple[bytes, str]:
+    """The .fmu as bytes, the same for the same model and compiler, and a message ("" where a binary is inside).
+
+    Args:
+        model: what to pack.
+        version: of this package, for the description.
+
+    Raises:
+        ExportError: where the compiler refuses the sources.
+    """
+    code, step = model_code(model), internal_step(model)
+    texts = {f"{model.name}.c": code.source, f"{model.name}.h": code.header, _WRAPPER: wrapper(_WRAPPER)}
+    listed = (f"{model.name}.c", _WRAPPER)
+    texts[_CONFIG] = _config(model, "", step)
+    unsigned = description(model, guid="", version=version, sources=listed, step=step)
+    digest = hashlib.sha256(b"\0".join([unsigned, *(texts[name].encode() for name in sorted(texts))])).hexdigest()
+    guid = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+    texts[_CONFIG] = _config(model, guid, step)
+    content = {
+        "modelDescription.xml": description(model, guid=guid, version=version, sources=listed, step=step),
+        **{f"sources/{name}": text.encode() for name, text in texts.items()},
+    }
+    message = ""
+    place = fmu_platform()
+    if place is None or compiler() is None:
+        missing = "there is no C compiler (cc, gcc or clang)" if place else "FMI 2.0 has no name for this platform"
+        message = f"{missing}: the FMU holds its sources and no binary; a tool that compiles FMUs can run it."
+    else:
+        content[
+            f"binaries/{place}/{model.name}.so" if place == "linux64" else f"binaries/{place}/{model.name}.dylib"
+        ] = _binary(texts, listed)
+    return _packed(content), message
+
+
+def wrapper(name: str) -> str:
+    """The text of one of our C files that stand around every model."""
+    return (resources.files("swashplate.export") / "runtime" / name).read_text(encoding="utf-8")
+
+
+def internal_step(model: Traced) -> float:
+    """Length of an internal Runge-Kutta step [s]: 2 ms, or half the fastest mode's time constant at the start."""
+    rows = ([v.start for v in kind] for kind in (model.states, model.inputs, model.surroundings, model.parameters))
+    A = np.asarray(model.jacobians.call([np.array(row) for row in rows])[0])
+    fastest = float(np.max(np.abs(np.linalg.eigvals(A)), initial=0.0))
+    return min(STEP, 0.5 / fastest) if fastest > 0.0 else STEP
+
+
+def _config(model: Traced, guid: str, step: float) -> str:
+    functions = ("step", "rates", "outputs", "start_x", "start_u", "start_s", "start_p")
+    kinds = ("states", "inputs", "surroundings", "parameters", "outputs")
+    lines = [
+        "/* What fmu2.c needs to know of the model. */",
+        f'#include "{model.name}.h"',
+        *(f"#define model_{name} {model.name}_{name}" for name in functions),
+        *(f"#define N_{kind.upper()} {model.name}_n_{kind}" for kind in kinds),
+        f"#define MODEL_STEP {step!r}",
+        f'#define MODEL_GUID "{guid}"',
+        *_delays(model),
+        "#ifdef FMI2_STATIC_LINKING",
+        f"#define FMI2_FUNCTION_PREFIX {model.name}_",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _delays(model: Traced) -> list[str]:
+    """The longest delay, room to remember the inputs for so long, and the delay of each."""
+    if not model.delays:
+        return []
+    listed = ", ".join(repr(float(delay)) for delay in model.delays)
+    return [
+        f"#define MODEL_LATE {max(model.delays)!r}",
+        f"#define N_PAST {_PAST}",
+        f"static const double model_delays[] = {{{listed}}};",
+    ]
+
+
+def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        here = Path(folder)
+        for name, text in texts.items():
+            (here / name).write_text(text, encoding="utf-8")
+        # Hidden: two FMUs of one name in one process must not see each other's functions.
+        made = shared_library([here / name for name in sources], here / "fmu.so", options=["-fvisibility=hidden"])
+        return made.read_bytes()
+
+
+def _packed(content: Mapping[str, bytes]) -> bytes:
+    """A zip archive without the time of day."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(content):
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content[name])
+    return buffer.getvalue()

@@ -1,0 +1,241 @@
+"""A model as self-contained C99: equations, their Jacobians, one Runge-Kutta step, and a header that explains them."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from swashplate.export.c_expression import body
+from swashplate.export.c_text import REAL, Precision, array, words
+from swashplate.export.traced import Traced, Variable, late_notes
+
+_KINDS = ("state", "input", "surrounding", "parameter", "output")
+
+
+@dataclass(frozen=True)
+class ModelCode:
+    """C source of a model.
+
+    Attributes:
+        name: what every name in it begins with.
+        precision: of every number.
+        header, source: the texts of NAME.h and NAME.c.
+        example: a program that flies it for ten seconds, NAME_example.c.
+    """
+
+    name: str
+    precision: Precision
+    header: str
+    source: str
+    example: str
+
+    def files(self) -> dict[str, str]:
+        """Texts by file name."""
+        return {
+            f"{self.name}.h": self.header,
+            f"{self.name}.c": self.source,
+            f"{self.name}_example.c": self.example,
+        }
+
+
+def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
+    """C of a traced model.
+
+    Args:
+        model: what to print.
+        precision: "double", or "single" for processors without double precision.
+    """
+    blanks = {
+        "NAME": model.name,
+        "GUARD": f"{model.name.upper()}_H",
+        "REAL": f"{model.name}_real",
+        "TYPE": REAL[precision],
+        **{f"N_{kind.upper()}S": str(len(variables)) for kind, variables in _variables(model).items()},
+    }
+    return ModelCode(
+        model.name,
+        precision,
+        _filled(_heading(model) + _HEADER, {**blanks, "ENUMS": _enums(model)}),
+        _filled(_SOURCE, {**blanks, **_equations(model, precision), "ARRAYS": _arrays(model, precision)}),
+        _filled(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
+    )
+
+
+def _filled(text: str, blanks: Mapping[str, str]) -> str:
+    return re.sub(r"@(\w+)@", lambda found: blanks[found[1]], text)
+
+
+def _variables(model: Traced) -> dict[str, tuple[Variable, ...]]:
+    return {kind: getattr(model, f"{kind}s") for kind in _KINDS}
+
+
+def _equations(model: Traced, precision: Precision) -> dict[str, str]:
+    given = ("x", "u", "s", "p")
+
+    def printed(function: object, outputs: Sequence[str]) -> str:
+        text = body(function, real=f"{model.name}_real", precision=precision, inputs=given, outputs=outputs)
+        unused = [name for name in given if not re.search(rf"\b{name}\[", text)]
+        return text + "".join(f"  (void){name};\n" for name in unused)
+
+    return {
+        "RATES": printed(model.rates, ["rates"]),
+        "OUTPUTS": printed(model.readings, ["outputs"]),
+        "JACOBIANS": printed(model.jacobians, ["A", "B"]),
+    }
+
+
+def _enums(model: Traced) -> str:
+    made = []
+    for kind, variables in _variables(model).items():
+        if not variables:
+            continue
+        lines = []
+        for place, v in enumerate(variables):
+            limits = f", {v.limits[0]:.6g} to {v.limits[1]:.6g}" if v.limits else ""
+            told = words(f"[{v.unit or '?'}{limits}] {v.meaning}")
+            lines.append(f"  {model.name}_{kind}_{v.name}{' = 0' if place == 0 else ''}, /* {told} */")
+        made.append(f"enum {model.name}_{kind} {{\n" + "\n".join(lines).replace(", /*", ", /*") + "\n};")
+    return "\n\n".join(_without_last_comma(text) for text in made)
+
+
+def _without_last_comma(enum: str) -> str:
+    """C90 compilers, which some autopilots' makefiles ask for, refuse a comma before the closing brace."""
+    head, _, tail = enum.rpartition(", /*")
+    return f"{head} /*{tail}"
+
+
+def _arrays(model: Traced, precision: Precision) -> str:
+    real = f"{model.name}_real"
+    parts = (("states", "start_x"), ("inputs", "start_u"), ("surroundings", "start_s"), ("parameters", "start_p"))
+    return "\n".join(
+        array(f"{model.name}_{name}", [v.start for v in getattr(model, kind)], precision, kind=real)
+        for kind, name in parts
+    )
+
+
+def _heading(model: Traced) -> str:
+    lines = [
+        words(f"{model.name}: {model.title}"),
+        words(f"Trust: {model.trust}") if model.trust else "",
+        words(f"Starts: {model.about}"),
+        *(words(note) for note in (*model.notes, *late_notes(model))),
+        "",
+        "Written by swashplate from the equations that it simulates with. SI units, radians; body axes",
+        "forward-right-down, local axes north-east-down. No allocation, no static variables that change.",
+    ]
+    wrapped = (part for line in lines for part in (textwrap.wrap(line, 112) or [""]))
+    return "/*\n" + "".join(f" * {part}".rstrip() + "\n" for part in wrapped) + " */\n"
+
+
+_HEADER = """#ifndef @GUARD@
+#define @GUARD@
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef @TYPE@ @REAL@;
+
+#define @NAME@_n_states @N_STATES@
+#define @NAME@_n_inputs @N_INPUTS@
+#define @NAME@_n_surroundings @N_SURROUNDINGS@
+#define @NAME@_n_parameters @N_PARAMETERS@
+#define @NAME@_n_outputs @N_OUTPUTS@
+
+@ENUMS@
+
+/* Where a flight may start: states, inputs and surroundings in steady flight, and the card's parameters. */
+extern const @REAL@ @NAME@_start_x[];
+extern const @REAL@ @NAME@_start_u[];
+extern const @REAL@ @NAME@_start_s[];
+extern const @REAL@ @NAME@_start_p[];
+
+/* Derivatives of the states. Arguments everywhere: x states, u inputs, s surroundings, p parameters. */
+void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates);
+
+/* What is measured beside the states. */
+void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs);
+
+/* Derivatives of the rates by states, A, and by inputs, B; full matrices, row by row. */
+void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B);
+
+/* One step of dt seconds: classical Runge-Kutta of order 4, inputs and surroundings held. x is replaced. */
+void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+"""
+
+_SOURCE = """#include "@NAME@.h"
+
+#include <math.h>
+
+@ARRAYS@
+void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates) {
+@RATES@}
+
+void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs) {
+@OUTPUTS@}
+
+static void slopes(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B) {
+@JACOBIANS@}
+
+void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *A, @REAL@ *B) {
+  int i;
+  for (i = 0; i < @NAME@_n_states * @NAME@_n_states; ++i) A[i] = 0;
+  for (i = 0; i < @NAME@_n_states * @NAME@_n_inputs; ++i) B[i] = 0;
+  slopes(x, u, s, p, A, B);
+}
+
+void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt) {
+  @REAL@ k[@NAME@_n_states], sum[@NAME@_n_states], at[@NAME@_n_states];
+  const @REAL@ half = dt / 2, sixth = dt / 6;
+  int i;
+  @NAME@_rates(x, u, s, p, k);
+  for (i = 0; i < @NAME@_n_states; ++i) {
+    sum[i] = k[i];
+    at[i] = x[i] + half * k[i];
+  }
+  @NAME@_rates(at, u, s, p, k);
+  for (i = 0; i < @NAME@_n_states; ++i) {
+    sum[i] += 2 * k[i];
+    at[i] = x[i] + half * k[i];
+  }
+  @NAME@_rates(at, u, s, p, k);
+  for (i = 0; i < @NAME@_n_states; ++i) {
+    sum[i] += 2 * k[i];
+    at[i] = x[i] + dt * k[i];
+  }
+  @NAME@_rates(at, u, s, p, k);
+  for (i = 0; i < @NAME@_n_states; ++i) x[i] += sixth * (sum[i] + k[i]);
+}
+"""
+
+_EXAMPLE = """/* Flies @NAME@ for ten seconds from its start and prints the first states, one line a second.
+ *
+ *   cc -O2 -std=c99 @NAME@_example.c @NAME@.c -lm && ./a.out
+ */
+#include <stdio.h>
+
+#include "@NAME@.h"
+
+int main(void) {
+  @REAL@ x[@NAME@_n_states];
+  int i, k;
+  for (i = 0; i < @NAME@_n_states; ++i) x[i] = @NAME@_start_x[i];
+  for (k = 0; k <= 1000; ++k) {
+    if (k % 100 == 0) {
+      printf("%5.1f s", k * 0.01);
+      for (i = 0; i < @SHOWN@; ++i) printf(" %9.4f", (double)x[i]);
+      printf("\\n");
+    }
+    @NAME@_step(x, @NAME@_start_u, @NAME@_start_s, @NAME@_start_p, (@REAL@)0.01);
+  }
+  return 0;
+}
+"""

@@ -1,0 +1,227 @@
+"""A model as every format in C needs it: named variables with units and starts, equations traced by CasADi."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from swashplate.errors import ExportError
+from swashplate.export.c_text import identifier
+from swashplate.export.linear import Linear, input_unit
+from swashplate.flights.schema import channel, is_known
+from swashplate.physics.backend import CasadiBackend
+from swashplate.physics.environment import Environment
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.structure import rebuild
+from swashplate.vehicles.vehicle import Vehicle
+
+_SURROUNDINGS = {
+    "wind_north": ("m/s", "wind towards north"),
+    "wind_east": ("m/s", "wind towards east"),
+    "wind_down": ("m/s", "wind downwards"),
+    "air_density": ("kg/m^3", "density of the air"),
+    "gravity": ("m/s^2", "acceleration of free fall"),
+    "voltage": ("V", "battery voltage"),
+}
+_ACCELEROMETERS = ("ax", "ay", "az")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A named number of a model: its unit, where it starts, its limits where it has any, and what it is."""
+
+    name: str
+    unit: str
+    start: float = 0.0
+    limits: tuple[float, float] | None = None
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A model and its equations as CasADi functions of (state, input, surrounding, parameter).
+
+    Attributes:
+        name: what its C functions begin with. title, trust: what it is and where it holds.
+        about: what the starts are: "hover", "5 m/s ahead" or, for a linear model, deviations.
+        states, inputs, surroundings, parameters, outputs: in the order of the arrays. Surroundings are those that the
+            equations use; the outputs of a vehicle are what accelerometers at the CG read.
+        rates, readings: derivatives of the states, and the outputs.
+        jacobians: A and B, the rates by state and by input.
+        delays: of each input [s]; empty where there are none. The functions do not have them.
+        notes: what a user must know.
+    """
+
+    name: str
+    title: str
+    trust: str
+    about: str
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    surroundings: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    rates: Any = field(repr=False)
+    readings: Any = field(repr=False)
+    jacobians: Any = field(repr=False)
+    delays: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def late_notes(model: Traced) -> tuple[str, ...]:
+    """What a user of the equations alone must do about delays."""
+    waits = [f"{v.name} by {d:g} s" for v, d in zip(model.inputs, model.delays, strict=False) if d]
+    return (f"Delays are not in these equations; hold back {'; '.join(waits)}.",) if waits else ()
+
+
+def require_casadi() -> Any:
+    """CasADi, or what to do without it."""
+    try:
+        import casadi
+    except ImportError:
+        raise ExportError(
+            "needs CasADi.", channel="C code", hint="Install swashplate with the extra 'export'."
+        ) from None
+    return casadi
+
+
+class _Remembering(CasadiBackend):
+    """Values that differentiation must not look into become symbols, and are put back afterwards."""
+
+    def __init__(self, casadi: Any) -> None:
+        super().__init__()
+        self.hidden: list[tuple[Any, Any]] = []
+        self._casadi = casadi
+        self.detached = self._hide
+
+    def _hide(self, x: Any) -> Any:
+        symbol = self._casadi.SX.sym(f"hidden_{len(self.hidden)}")
+        self.hidden.append((symbol, x))
+        return symbol
+
+    def shown(self, expressions: Sequence[Any]) -> list[Any]:
+        found = list(expressions)
+        for symbol, value in reversed(self.hidden):  # later ones may be made of earlier ones
+            found = self._casadi.substitute(found, [symbol], [value])
+        return found
+
+
+def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
+    """A vehicle's equations, its numbers as parameters, and a trim to start from.
+
+    Raises:
+        ExportError: without CasADi.
+    """
+    casadi = require_casadi()
+    around = tuple(_SURROUNDINGS)
+    n, m, k = len(vehicle.state_names), len(vehicle.input_names), len(vehicle.parameter_names)
+    x, u, s, p = (casadi.SX.sym(a, size) for a, size in zip("xusp", (n, m, len(around), k), strict=True))
+    state = rebuild(vehicle.state, [x[i] for i in range(n)])
+    inputs = vehicle.inputs(*(u[i] for i in range(m)))
+    parameters = vehicle.parameters(*(p[i] for i in range(k)))
+    environment = Environment(**{a: s[i] for i, a in enumerate(around)})
+
+    def rates(xp: Any) -> Any:
+        return casadi.vertcat(*vehicle.rates(x, u, parameters, environment, xp))
+
+    hiding = _Remembering(casadi)
+    slopes = [casadi.jacobian(rates(hiding), by) for by in (x, u)]
+    plain = CasadiBackend()
+    right = rates(plain)
+    force = casadi.vertcat(*vehicle.specific_force(state, inputs, parameters, environment, plain))
+    used = [i for i, does in enumerate(casadi.which_depends(casadi.vertcat(right, force), s, 1)) if does]
+
+    def function(results: Sequence[Any]) -> Any:
+        rest = s[used] if used else casadi.SX(0, 1)
+        return casadi.Function("f", [x, u, rest, p], list(results), {"cse": True})
+
+    numbers = vehicle.values()
+    card = vehicle.card.parameters
+    return Traced(
+        name=name,
+        title=vehicle.card.title,
+        trust=vehicle.card.trust,
+        about=_course(trim),
+        states=tuple(
+            Variable(a, unit, float(start), meaning=_meaning(a))
+            for a, unit, start in zip(vehicle.state_names, vehicle.state_units, trim.state, strict=True)
+        ),
+        inputs=tuple(
+            Variable(a, input_unit(a), float(start), limits, _meaning(a))
+            for a, start, limits in zip(vehicle.input_names, trim.inputs, vehicle.input_limits, strict=True)
+        ),
+        surroundings=tuple(
+            Variable(around[i], unit, float(getattr(trim.environment, around[i])), meaning=meaning)
+            for i, (unit, meaning) in enumerate(_SURROUNDINGS.values())
+            if i in used
+        ),
+        parameters=tuple(
+            Variable(a, card[a].unit, float(getattr(numbers, a)), meaning=f"{card[a].status}: {card[a].source}")
+            for a in vehicle.parameter_names
+        ),
+        outputs=tuple(Variable(a, channel(a).unit, meaning=channel(a).description) for a in _ACCELEROMETERS),
+        rates=function([right]),
+        readings=function([force]),
+        jacobians=function(hiding.shown(slopes)),
+    )
+
+
+def trace_linear(model: Linear, *, name: str) -> Traced:
+    """A linear model's dx/dt = A x + B u, y = C x + D u with its numbers as constants.
+
+    Raises:
+        ExportError: without CasADi, or where two signals would have one name in C.
+    """
+    casadi = require_casadi()
+    x, u = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(model.inputs))
+    nothing = casadi.SX(0, 1)
+
+    def sparse(matrix: Any) -> Any:
+        return casadi.SX(casadi.sparsify(casadi.DM(np.asarray(matrix))))
+
+    A, B, C, D = (sparse(matrix) for matrix in (model.A, model.B, model.C, model.D))
+
+    def function(results: Sequence[Any]) -> Any:
+        return casadi.Function("f", [x, u, nothing, nothing], list(results), {"cse": True})
+
+    def variables(names: Sequence[str]) -> tuple[Variable, ...]:
+        called = [identifier(a) for a in names]  # a file may name its signals as it likes
+        if len(set(called)) != len(called):
+            raise ExportError(f"names of {', '.join(names)} are the same in C.", where=model.name)
+        return tuple(
+            Variable(c, model.units.get(a, ""), meaning=_meaning(a)) for c, a in zip(called, names, strict=True)
+        )
+
+    late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
+    alike = all(len(found) <= 1 for found in late.values())
+    delays = tuple(found[0] for found in late.values() if found) if alike else ()
+    waits = "Delays differ between outputs and are not in this file; see the model's own."
+    return Traced(
+        name=name,
+        title=model.title,
+        trust=model.trust,
+        about="linear: deviations from the flight that it was identified in",
+        states=variables(model.states),
+        inputs=variables(model.inputs),
+        surroundings=(),
+        parameters=(),
+        outputs=variables(model.outputs),
+        rates=function([casadi.densify(A @ x + B @ u)]),
+        readings=function([casadi.densify(C @ x + D @ u)]),
+        jacobians=function([A, B]),
+        delays=delays if any(delays) else (),
+        notes=() if alike else (waits,),
+    )
+
+
+def _course(trim: Trim) -> str:
+    if not (trim.speed or trim.lateral or trim.climb or trim.turn):
+        return "hover"
+    return f"steady flight at {trim.speed:g} m/s ahead"
+
+
+def _meaning(name: str) -> str:
+    return channel(name).description if is_known(name) else ""

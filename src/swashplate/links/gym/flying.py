@@ -1,0 +1,239 @@
+"""The physics, observation and reward that the single and the vector environment share: one function, under `vmap`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import SwashError
+from swashplate.links.gym.tasks import Task
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, local_to_body
+from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    jax_backend,
+    parameter_row,
+    rk4_step_looped,
+    row_rates,
+)
+from swashplate.simulation.trigonometry import vector_backend
+from swashplate.simulation.trim import Trim, trim
+from swashplate.vehicles.catalogue import vehicle as find_vehicle
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+OBSERVED = (
+    *("ahead", "right", "below"),
+    *("u", "v", "w"),
+    *("roll", "pitch", "heading"),
+    *("p", "q", "r"),
+)
+"""What is observed: target minus actual of place [m], velocity [m/s] (body axes), roll, pitch and heading [rad]; body
+rates [rad/s]. Rotor, bar and inflow states stay hidden."""
+LIMITS = np.array([50.0] * 3 + [50.0] * 3 + [np.pi] * 3 + [20.0] * 3)
+"""Observations are clipped to these."""
+SPREAD = {"place": 0.3, "velocity": 0.2, "attitude": 0.05, "rates": 0.1}
+"""Half width of the uniform distribution about the trim that episodes start from [m, m/s, rad, rad/s]."""
+CRASH = -10.0
+"""Reward of the step that ends an episode by leaving the limits."""
+EFFORT = 0.01
+"""What the mean square of the action costs at each step."""
+
+
+@dataclass(frozen=True)
+class Flying:
+    """A vehicle with a task.
+
+    Attributes:
+        vehicle, task, trim: what flies, what it should do, and where actions of zero hold it.
+        free: places of the inputs that an action moves (a throttle that a governor stands behind is none).
+        reach: what an action of 1 adds to those inputs.
+        dt: between actions [s]. substeps: Runge-Kutta steps in it. steps: of an episode.
+        table: targets at every step, shape (steps + 1, 9).
+        parameters: the card's numbers and the surroundings' constants.
+        scatter: relative standard deviations of parameters, drawn anew for each episode; by place in the row.
+        spread: scale of the start's distribution.
+    """
+
+    vehicle: Vehicle
+    task: Task
+    trim: Trim
+    free: tuple[int, ...]
+    reach: Array
+    dt: float
+    substeps: int
+    steps: int
+    table: Array
+    parameters: Array
+    scatter: Mapping[int, float]
+    spread: float
+
+    def start(self, random: np.random.Generator) -> tuple[Array, Array]:
+        """A state row and a parameter row of a new episode."""
+        x = np.array(self.trim.state)
+        for first, name in zip((0, 3, 6, 9), SPREAD, strict=True):
+            x[first : first + 3] += self.spread * SPREAD[name] * random.uniform(-1.0, 1.0, 3)
+        p = self.parameters.copy()
+        for place, sigma in self.scatter.items():
+            p[place] *= 1.0 + sigma * float(np.clip(random.standard_normal(), -3.0, 3.0))
+        return x, p
+
+    def observe(self, x: Array, k: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Observations of states (n, n_states) at steps (n,)."""
+        return np.asarray(_observed(jnp.asarray(x), jnp.asarray(self.table)[k], self._angles), dtype=np.float32)
+
+    def advance(
+        self, x: Array, k: NDArray[np.int64], actions: NDArray[Any], p: Array
+    ) -> tuple[Array, NDArray[np.float32], Array, NDArray[np.bool_]]:
+        """States, observations, rewards and whether the limits were left, one step later, for n vehicles at once."""
+        found = _advance(
+            equations_of(self.vehicle),
+            self.substeps,
+            self.free,
+            x,
+            np.asarray(actions, dtype=np.float64),
+            p if self.scatter else self.parameters,
+            self.table[np.minimum(k + 1, self.steps)],
+            {
+                "inputs": self.trim.inputs,
+                "reach": self.reach,
+                "limits": np.array(self.vehicle.input_limits).T,
+                "around": np.array([getattr(self.trim.environment, name) for name in SURROUNDINGS]),
+                "angles": self._angles,
+                "scales": np.array(self.task.scales),
+                "edges": np.array([self.task.level_limit, self.task.height_limit, self.task.lean_limit]),
+                "dt": self.dt,
+            },
+        )
+        states, observations, rewards, lost = (np.asarray(part) for part in found)
+        return states, observations.astype(np.float32), rewards, lost
+
+    @property
+    def _angles(self) -> Array:
+        return np.array([self.trim.states()["phi"], self.trim.states()["theta"]])
+
+
+def flying(
+    vehicle: Vehicle | str,
+    task: Task,
+    *,
+    rate: float = 50.0,
+    substeps: int = 5,
+    authority: float = 0.2,
+    spread: float = 1.0,
+    randomize: Mapping[str, float] | None = None,
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Flying:
+    """A vehicle with a task, ready to step.
+
+    Args:
+        vehicle: a vehicle, its name or a card's or model's file.
+        task: see `tasks`.
+        rate: actions per second [Hz].
+        substeps: Runge-Kutta steps between actions.
+        authority: share of an input's whole range that an action of 1 adds to its trim.
+        spread: scale of `SPREAD`; 0 starts every episode at the trim.
+        randomize: relative standard deviation by parameter name, drawn anew for each episode, cut at three.
+        wind: north, east and down [m/s].
+
+    Raises:
+        SwashError: for numbers that make no sense, or a parameter that the vehicle does not have.
+        TrimError: where there is no hover.
+    """
+    enable_double_precision()
+    enable_compilation_cache()
+    chosen = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    if not (rate > 0.0 and substeps >= 1 and 0.0 < authority <= 1.0 and spread >= 0.0):
+        raise SwashError(
+            f"rate is {rate:g}, substeps {substeps}, authority {authority:g} and spread {spread:g}; expected positive "
+            "numbers, authority at most 1."
+        )
+    surroundings = Environment(*wind)
+    if "voltage_nominal" in chosen.parameter_names:
+        surroundings = surroundings._replace(voltage=chosen.card.values()["voltage_nominal"])
+    for name in randomize or {}:
+        if name not in chosen.parameter_names:
+            raise SwashError("is no parameter of the vehicle.", where=chosen.name, channel=f"randomize {name}")
+    held = dict(chosen.trim_held)
+    free = tuple(i for i, name in enumerate(chosen.input_names) if name not in held)
+    steps = round(task.duration * rate)
+    low, high = np.array(chosen.input_limits).T
+    return Flying(
+        chosen,
+        task,
+        trim(chosen, environment=surroundings),
+        free,
+        authority * (high - low)[list(free)],
+        1.0 / rate,
+        substeps,
+        steps,
+        task.targets(np.arange(steps + 1) / rate),
+        parameter_row(chosen, surroundings),
+        {chosen.parameter_names.index(name): float(sigma) for name, sigma in (randomize or {}).items()},
+        spread,
+    )
+
+
+def _wrapped(angle: Any) -> Any:
+    return jnp.mod(angle + jnp.pi, 2.0 * jnp.pi) - jnp.pi
+
+
+def _errors(x: Any, target: Any, angles: Any) -> Any:
+    """`OBSERVED`, not clipped, of one state."""
+    attitude = Euler(x[6], x[7], x[8])
+    place = local_to_body(Vector(*(target[i] - x[i] for i in range(3))), attitude, jax_backend())
+    wanted = local_to_body(Vector(*(target[3 + i] for i in range(3))), attitude, jax_backend())
+    turned = (angles[0] + target[7] - x[6], angles[1] + target[8] - x[7], _wrapped(target[6] - x[8]))
+    speed = (wanted.x - x[3], wanted.y - x[4], wanted.z - x[5])
+    return jnp.stack([*place, *speed, *turned, x[9], x[10], x[11]])
+
+
+def _clipped(errors: Any) -> Any:
+    return jnp.clip(jnp.nan_to_num(errors), -LIMITS, LIMITS)
+
+
+@jax.jit
+def _observed(x: Any, target: Any, angles: Any) -> Any:
+    return jax.vmap(lambda x, target: _clipped(_errors(x, target, angles)))(x, target)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _advance(
+    equations: Equations, substeps: int, free: tuple[int, ...], x: Any, actions: Any, p: Any, target: Any, rest: Any
+) -> Any:
+    rates = row_rates(equations, padded=False, xp=vector_backend())
+
+    def one(x: Any, action: Any, p: Any, target: Any) -> Any:
+        action = jnp.clip(action, -1.0, 1.0)
+        inputs = jnp.asarray(rest["inputs"]).at[jnp.array(free)].add(rest["reach"] * action)
+        w = jnp.concatenate([jnp.clip(inputs, *rest["limits"]), rest["around"]])
+
+        def substep(_: Any, x: Any) -> Any:
+            return rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, rest["dt"] / substeps)
+
+        after = jax.lax.fori_loop(0, substeps, substep, x)
+        errors = _errors(after, target, rest["angles"])
+        away = target[:3] - after[:3]
+        level, height = jnp.hypot(away[0], away[1]), jnp.abs(away[2])
+        speed, lean = jnp.sqrt(jnp.sum(errors[3:6] ** 2)), jnp.hypot(errors[6], errors[7])
+        far = jnp.stack([level, height, speed, lean, errors[8]]) / rest["scales"]
+        leaning = jnp.maximum(jnp.abs(after[6]), jnp.abs(after[7]))
+        inside = jnp.all(jnp.isfinite(after)) & jnp.all(jnp.stack([level, height, leaning]) < rest["edges"])
+        reward = jnp.exp(-jnp.sum(far**2)) - EFFORT * jnp.mean(action**2)
+        return after, _clipped(errors), jnp.where(inside, reward, CRASH), ~inside
+
+    # The vehicles last: every number of a state is then a row of its own, as in `simulation.batch`.
+    after, *rest_of = jax.vmap(one, (1, 1, 1 if p.ndim == 2 else None, 1), (1, 1, 0, 0))(x.T, actions.T, p.T, target.T)
+    return after.T, rest_of[0].T, *rest_of[1:]

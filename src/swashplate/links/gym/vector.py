@@ -1,0 +1,85 @@
+"""`HelicopterVectorEnv`: many vehicles in one compiled step, natively vectorised by `vmap`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from swashplate.errors import SwashError
+from swashplate.links.gym.environment import spaces
+from swashplate.links.gym.flying import flying
+from swashplate.links.gym.tasks import Task, task_of
+from swashplate.vehicles.vehicle import Vehicle
+
+Observations = NDArray[np.float32]
+
+
+class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
+    """`num_envs` copies of `HelicopterEnv`, the same numbers to 1e-9; an ended one is reset by the next step.
+
+    `reset(seed=s)` seeds copy i with s + i, as Gymnasium's own vector environments do. Arguments as `HelicopterEnv`.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        vehicle: Vehicle | str = "coax",
+        task: str | Task = "hover",
+        *,
+        task_options: dict[str, Any] | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        if num_envs < 1:
+            raise SwashError(f"is {num_envs}, expected at least 1.", channel="num_envs")
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
+        self.single_observation_space, self.single_action_space = spaces(len(self.flying.free))
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._randoms = [np.random.default_rng() for _ in range(num_envs)]
+        self._x = np.tile(self.flying.trim.state, (num_envs, 1))
+        self._p = np.tile(self.flying.parameters, (num_envs, 1))
+        self._k = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=np.bool_)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """New episodes for all of them."""
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
+        if seeds is not None:
+            if len(seeds) != self.num_envs:
+                raise SwashError(f"has {len(seeds)} seeds for {self.num_envs} environments.", channel="seed")
+            for i, own in enumerate(seeds):
+                if own is not None:
+                    self._randoms[i] = np.random.default_rng(own)
+        self._begin(np.ones(self.num_envs, dtype=np.bool_))
+        return self.flying.observe(self._x, self._k), {}
+
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        """New episodes for some of them."""
+        for i in np.flatnonzero(which):
+            self._x[i], self._p[i] = self.flying.start(self._randoms[i])
+        self._k[which], self._ended[which] = 0, False
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """One action later; for those that had ended, the start of a new episode with a reward of 0."""
+        fresh = self._ended.copy()
+        states, observations, rewards, lost = self.flying.advance(self._x, self._k, actions, self._p)
+        self._x, self._k = states.copy(), self._k + 1
+        if fresh.any():
+            self._begin(fresh)
+            observations = np.where(fresh[:, None], self.flying.observe(self._x, self._k), observations)
+            rewards, lost = np.where(fresh, 0.0, rewards), lost & ~fresh
+        truncated = (self._k >= self.flying.steps) & ~lost & ~fresh
+        self._ended = lost | truncated
+        return observations, rewards, lost, truncated, {}

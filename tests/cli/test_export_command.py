@@ -1,0 +1,110 @@
+"""`swash export`: files, names, notes, and what is refused in words."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from commands import one_message, swash
+
+import swashplate as sp
+from swashplate.control.controller_file import save_controller
+from swashplate.export import compiler, fmu
+from swashplate.identification.state_space_file import structure, to_toml
+
+pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+
+
+@pytest.mark.parametrize(
+    ("form", "files"),
+    [
+        ("c", {"coax.c", "coax.h", "coax_example.c"}),
+        ("control", {"coax_control.json"}),
+        ("matlab", {"coax.mat"}),
+        ("simulink", {"coax.c", "coax.h", "coax_sfun.c", "sfun_model.h"}),
+    ],
+)
+def test_a_vehicle_in_each_format(form: str, files: set[str], tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "folder"
+    outcome = swash("export", "coax", "--format", form, "--out", out, "--option", "bar=false")
+    assert outcome.code == 0, outcome.err
+    assert {file.name for file in out.iterdir()} == files
+    assert all(name in outcome.out for name in files)
+
+
+def test_an_identified_model_with_another_name_mass_and_precision(tmp_path: Path) -> None:
+    sp.vehicle("coax", bar=False).with_values({"tau_f_lower": 0.123}, status="identified").save(tmp_path / "model.toml")
+    arguments = ("--format", "c", "--out", tmp_path, "--name", "my heli", "--mass", "0.3", "--precision", "single")
+    document = json.loads(swash("export", tmp_path / "model.toml", *arguments, "--json").out)
+    assert [Path(file).name for file in document["files"]] == ["my_heli.h", "my_heli.c", "my_heli_example.c"]
+    source = (tmp_path / "my_heli.c").read_text()
+    assert "0.3f" in source
+    assert "0.123f" in source
+    assert "identified" in (tmp_path / "my_heli.h").read_text()
+
+
+def test_the_trim_of_the_speed_is_where_it_starts(tmp_path: Path) -> None:
+    assert swash("export", "raptor50", "--format", "control", "--speed", "5", "--out", tmp_path, "-q").out == ""
+    about = json.loads((tmp_path / "raptor50_control.json").read_text())["about"]
+    assert about["u"] == pytest.approx(5.0, abs=0.05)
+
+
+def test_a_linear_model_and_a_controller(tmp_path: Path) -> None:
+    (tmp_path / "linear.toml").write_text(to_toml(structure("hybrid")))
+    outcome = swash("export", tmp_path / "linear.toml", "--format", "c", "--out", tmp_path)
+    assert outcome.code == 0, outcome.err
+    assert "Delays are not in these equations" in outcome.err
+    assert "one flight" not in outcome.err
+    assert "no speed" in one_message(swash("export", tmp_path / "linear.toml", "--format", "c", "--speed", "3"))
+
+    controller = tmp_path / "hold.toml"
+    coax = sp.vehicle("coax")
+    save_controller(sp.autopilot(coax, sp.trim(coax)), controller)
+    outcome = swash("export", controller, "--format", "c", "--out", tmp_path, "--precision", "single")
+    assert outcome.code == 0, outcome.err
+    assert "void swash_step(float memory" in (tmp_path / "hold.c").read_text()
+    assert "is a controller" in one_message(swash("export", controller, "--format", "fmu"))
+    assert "this is a controller" in one_message(swash("export", controller, "--format", "c", "--speed", "3"))
+
+
+def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    outcome = swash("export", "coax", "--format", "fmu", "--out", tmp_path, "--option", "bar=false")
+    assert outcome.code == 0
+    assert "no C compiler" in outcome.err or fmu.fmu_platform() is None
+    assert (tmp_path / "coax.fmu").stat().st_size > 10_000
+    assert compiler.compiler() is None
+
+
+def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    assert "extra 'export'" in one_message(swash("export", "coax", "--format", "c", "--out", tmp_path))
+    assert swash("export", "coax", "--format", "control", "--out", tmp_path).code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("coax", "--format", "ardupilot-statespace"), "swash link ardupilot"),
+        (("coax", "--format", "fmu", "--precision", "single"), "are double"),
+        (("coax", "--format", "c", "--name", "///"), "gives no name"),
+        (("coax", "--format", "c", "--speed", "0-2"), "takes one speed"),
+        (("raptor50", "--format", "c", "--speed", "60"), "no equilibrium was found"),
+        (("nothing.toml", "--format", "c"), "neither a vehicle's name nor a file"),
+    ],
+)
+def test_what_is_refused(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    assert said in one_message(swash("export", *arguments, "--out", tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_card_that_is_no_toml_and_an_out_that_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_bytes(b"\xff\x00[")
+    assert "bad.toml" in one_message(swash("export", tmp_path / "bad.toml", "--format", "c"))
+    outcome = swash("export", "coax", "--format", "matlab", "--out", tmp_path / "bad.toml")
+    assert "expected a folder" in one_message(outcome)
