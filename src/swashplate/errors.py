@@ -89,3 +89,7 @@ class IdentificationError(SwashError):
 
 class BenchError(SwashError):
     """A bench record that cannot be read, or that contradicts what its procedure measures."""
+
+
+class LinkError(SwashError):
+    """A link to another program that cannot be opened, or a servo mapping that does not fit the vehicle."""
