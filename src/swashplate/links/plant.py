@@ -55,6 +55,11 @@ class Plant:
         self._spacing = 1.0 / record_rate if record_rate > 0.0 else np.inf
         self.restart()
 
+    def prepare(self) -> None:
+        """Compile the equations now instead of under the first packet."""
+        self._stepping.advance(np.zeros(len(self.vehicle.input_names)), 1e-3)
+        self.restart()
+
     @property
     def voltage(self) -> float:
         """Of the battery now [V]."""
