@@ -141,9 +141,7 @@ def _made(
     from swashplate.simulation.compilation import dispatch_in_line
 
     dispatch_in_line()
-    where = given.conditions(
-        name, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched
-    )
+    where = given.conditions(name, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
     from swashplate.links.plant import Plant, Surroundings
     from swashplate.links.sensing import Sensing
     from swashplate.simulation.sensors import InertialUnit

@@ -43,6 +43,13 @@ class Plant:
         mapping: from outputs to its inputs.
         around: wind, air and battery.
         record_rate: samples per second that are kept for `flight` [Hz]; 0 keeps none.
+
+    Attributes:
+        vehicle, mapping: as given.
+        numbers: of the vehicle's card.
+        standing_depth: how far the CG is above the ground when the vehicle stands [m].
+        time: since it was put on the ground [s].
+        broken: why it lies where it is; empty while it is whole.
     """
 
     def __init__(
@@ -51,6 +58,8 @@ class Plant:
         self.vehicle, self.mapping = vehicle, mapping
         self._around = around
         self._rest = at_rest(vehicle, around.environment)
+        self.standing_depth = -float(self._rest[vehicle.index("z")])
+        self.numbers = vehicle.card.values()
         self._stepping = Stepping(vehicle, self._rest, around.environment)
         self._spacing = 1.0 / record_rate if record_rate > 0.0 else np.inf
         self.restart()
@@ -68,11 +77,6 @@ class Plant:
     @property
     def environment(self) -> Environment:
         return self._around.environment
-
-    @property
-    def standing_depth(self) -> float:
-        """How far the CG is above the ground when the vehicle stands [m]."""
-        return -float(self._rest[self.vehicle.index("z")])
 
     def restart(self) -> None:
         """Back on the ground with the rotors stopped; what was recorded is dropped."""
@@ -119,7 +123,7 @@ class Plant:
             lower, upper = held.states[names.index("omega_lower")], held.states[names.index("omega_upper")]
             return max(0.0, float(lower)), max(0.0, float(upper))
         main = max(0.0, float(held.states[names.index("omega")]))
-        return main, main * float(self.vehicle.card.values()["tail_gear"])
+        return main, main * self.numbers["tail_gear"]
 
     def flight(self) -> Flight | None:
         """What was recorded since the last restart: true states, inputs, wind and voltage; None for too little."""

@@ -60,7 +60,6 @@ class Sensing:
 
     def __init__(self, plant: Plant, *, unit: InertialUnit | None = None, seed: int = 0) -> None:
         self._plant, self._unit, self._seed = plant, unit, seed
-        self._numbers = plant.vehicle.card.values()
         self.restart()
 
     def restart(self) -> None:
@@ -106,7 +105,7 @@ class Sensing:
 
     def _battery(self, rotors: tuple[float, float]) -> tuple[float | None, float | None]:
         """Voltage, and the current of the rotors' shaft power without losses; for electric vehicles only."""
-        numbers = self._numbers
+        numbers = self._plant.numbers
         if "k_torque_lower" not in numbers:
             return None, None
         lower, upper = rotors

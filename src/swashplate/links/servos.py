@@ -18,6 +18,7 @@ from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
+
 class HelicopterMapping:
     """Swashplate, tail and rotor speed control of a conventional helicopter.
 
@@ -99,8 +100,7 @@ class CoaxialMapping:
         An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
         """
         motors = [
-            max(stopped, s.share(pulses[s.channel - 1]))
-            for s, stopped in zip(self._motors, self._stopped, strict=True)
+            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self._motors, self._stopped, strict=True)
         ]
         servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self._servos, self._travel, strict=True)]
         # Autopilots count nose up as positive pitch, the CoaX nose down.

@@ -63,9 +63,7 @@ def shares(
     else:
         raise LinkError(f"is '{kind}', expected one of {', '.join(TYPES)}.", where=where, channel="swashplate.type")
     if not np.isfinite(rows).all() or np.linalg.matrix_rank(rows, tol=1e-6) < 3:
-        raise LinkError(
-            "the servos do not tell collective, roll and pitch apart.", where=where, channel="swashplate"
-        )
+        raise LinkError("the servos do not tell collective, roll and pitch apart.", where=where, channel="swashplate")
     return rows
 
 

@@ -83,9 +83,7 @@ def _derivatives(
     free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, **how: Any
 ) -> Any:
     force, moment = _ground(skids, state, par, xp)
-    inertia = Inertia(
-        par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None)
-    )
+    inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None))
     still = state.body._replace(u=0.0, v=0.0, w=0.0, p=0.0, q=0.0, r=0.0)
     pushed = rigid_body_rates(still, force, moment, inertia, xp)
     rates = free(state, inputs, par, env, xp, **how)

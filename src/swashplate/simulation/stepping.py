@@ -104,9 +104,7 @@ class Stepping:
         if not np.isfinite(values).all():
             self.place(self._last)
             first = int(np.argmin(np.isfinite(values))) % self._n
-            raise DivergenceError(
-                "left the finite numbers.", time=float("nan"), state=self.vehicle.state_names[first]
-            )
+            raise DivergenceError("left the finite numbers.", time=float("nan"), state=self.vehicle.state_names[first])
         self._state, self._last = state, values[: self._n]
         return motion(values[: self._n], values[self._n :], self._gravity)
 
