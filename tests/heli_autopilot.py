@@ -28,7 +28,7 @@ def servo_packet(rate: int, count: int, pulses: list[int], *, outputs: int = 16)
 def read_line(answer: bytes) -> dict[str, list[float]]:
     """What ArduPilot finds in an answer; a missing or badly written mandatory key is an assertion."""
     rows = answer.split(b"\n")
-    assert rows[0] == b"" and rows[-1] == b"" and len(rows) == 3, "a line break before and behind, and one line"
+    assert (rows[0], rows[-1], len(rows)) == (b"", b"", 3), "a line break before and behind, and one line"
     text = rows[1].decode("ascii")
     found = {}
     for section, key in (

@@ -57,7 +57,9 @@ def test_the_answer_is_one_json_object_without_blanks(line: Bench) -> None:
     restarted(line)
     answer = line.send(servo_packet(1200, 0, IDLE))
     assert answer is not None
-    assert answer.startswith(b"\n{") and answer.endswith(b"}\n") and b" " not in answer
+    assert answer.startswith(b"\n{")
+    assert answer.endswith(b"}\n")
+    assert b" " not in answer
     told = json.loads(answer)
     assert list(told)[:5] == ["timestamp", "imu", "position", "attitude", "velocity"]
     assert list(told).index("velocity") < list(told).index("velocity_wind")
@@ -230,7 +232,8 @@ def test_a_vehicle_that_goes_over_lies_still_until_the_autopilot_restarts() -> N
     answers = [read_line(at.send(packet) or b"") for packet in packets]  # full roll and collective: it rolls over
     assert at.plant.broken
     last = answers[-1]
-    assert last["velocity"] == [0.0, 0.0, 0.0] and last["gyro"] == [0.0, 0.0, 0.0]
+    assert last["velocity"] == [0.0, 0.0, 0.0]
+    assert last["gyro"] == [0.0, 0.0, 0.0]
     assert np.linalg.norm(last["accel_body"]) == pytest.approx(9.81, abs=1e-6)
     assert answers[-2]["timestamp"] < last["timestamp"]
     assert sum("broke" in words for words in at.said) == 1
@@ -249,7 +252,8 @@ def test_wind_battery_and_noise_are_told() -> None:
         told = json.loads(windy.send(servo_packet(400, count, [*COAX_IDLE[:4], 1400, 1400])) or b"")
     assert told["battery"]["voltage"] == pytest.approx(11.5, abs=0.01)
     assert 0.05 < told["battery"]["current"] < 5.0
-    assert told["rpm_1"] > 1000.0 and told["rpm_2"] > 1000.0
+    assert told["rpm_1"] > 1000.0
+    assert told["rpm_2"] > 1000.0
 
     def noisy(seed: int) -> np.ndarray:
         at = bench("raptor50", unit=InertialUnit(), seed=seed)
@@ -257,7 +261,8 @@ def test_wind_battery_and_noise_are_told() -> None:
         return np.array([[*row["gyro"], *row["accel_body"]] for row in rows])
 
     one, same, other = noisy(1), noisy(1), noisy(2)
-    assert np.array_equal(one, same) and not np.array_equal(one, other)
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
     unit = InertialUnit()
     np.testing.assert_allclose(one.std(axis=0)[:3], unit.rate_noise, rtol=0.2)
     np.testing.assert_allclose(one.std(axis=0)[3:], unit.force_noise, rtol=0.2)

@@ -76,7 +76,7 @@ def ardupilot(
     """
     _check_record(record)
     plant, sensing = _made(
-        vehicle, servos, "", wind, altitude, voltage, sag, changed, switched, sensors, seed, record and record_rate
+        vehicle, servos, "", wind, altitude, voltage, sag, changed, switched, sensors, seed, record_rate if record else None
     )
     from swashplate.links.ardupilot.runner import serve
     from swashplate.links.ardupilot.session import Session

@@ -1,4 +1,4 @@
-"""From an autopilot's outputs to a vehicle's inputs: what a small TOML says about servos, swashplate, tail and motors."""
+"""From an autopilot's outputs to a vehicle's inputs, as a small TOML says."""
 
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ class HelicopterMapping:
 
     The throttle follows its output no faster than `spool` allows, as an engine that is started does: an autopilot only
     ramps its output, and a governor that gets the whole engine at once would turn the helicopter on its skids.
+
+    Attributes:
+        channels: outputs that it uses, from 1.
+        shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
     """
 
     def __init__(self, table: Table, vehicle: Vehicle) -> None:
@@ -57,6 +61,7 @@ class HelicopterMapping:
             raise table.error("throttle", "expected full and spool_time above zero.")
         table.done()
         self.channels = tuple(s.channel for s in (*self._swash, self._tail, self._throttle))
+        self.shares = (self._throttle.channel,)
         self.restart()
 
     def restart(self) -> None:
@@ -77,7 +82,7 @@ class HelicopterMapping:
 
 
 class CoaxialMapping:
-    """Two motors and two servos of a coaxial helicopter. The servos' signs are the vehicle's: right, and nose down."""
+    """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`."""
 
     def __init__(self, table: Table, vehicle: Vehicle) -> None:
         motors, cyclic = table.part("motors"), table.part("cyclic")
@@ -90,6 +95,7 @@ class CoaxialMapping:
         stopped = [-numbers[f"o_drive_{name}"] / numbers[f"k_drive_{name}"] for name in ("lower", "upper")]
         self._stopped = tuple(max(0.0, command) for command in stopped)
         self.channels = tuple(s.channel for s in (*self._motors, *self._servos))
+        self.shares = tuple(s.channel for s in self._motors)
 
     def restart(self) -> None:
         """Nothing is carried over."""

@@ -131,8 +131,10 @@ def _advance(equations: Equations, x: Any, row: Any, p: Any) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=True)
     w, h, steps = row[:-2], row[-2], row[-1].astype(jnp.int32)
 
+    barrier: Any = jax.lax.optimization_barrier
+
     def held(x: Any, w: Any) -> Any:
-        return rates(*jax.lax.optimization_barrier((x, w, p)))
+        return rates(*barrier((x, w, p)))
 
     def one(i: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
         after = rk4_step_looped(held, carry[0], lambda fraction: w, h)

@@ -41,13 +41,13 @@ class Frames(NamedTuple):
 
     Attributes:
         sender: whose flight this is; None before the first packet.
-        count: of the last frame that was answered.
+        last: count of the last frame that was answered.
         heard: when that was [s].
         doubt: sender, count and time of a packet that fell back and was not believed.
     """
 
     sender: Address | None = None
-    count: int = 0
+    last: int = 0
     heard: float = 0.0
     doubt: tuple[Address, int, float] | None = None
 
@@ -68,17 +68,17 @@ def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Fram
     if frames.sender is None:
         return here, Step.START
     if sender != frames.sender:
-        restarted = count <= FRESH and count < frames.count
+        restarted = count <= FRESH and count < frames.last
         if restarted or now - frames.heard >= SILENT:
             return here, Step.START
         return frames, Step.STRANGER
-    if count == frames.count:
+    if count == frames.last:
         return here, Step.RESEND
-    if count == frames.count + 1:
+    if count == frames.last + 1:
         return here, Step.NEXT
-    if frames.count < count <= frames.count + AHEAD:
+    if frames.last < count <= frames.last + AHEAD:
         return here, Step.SKIP
-    fallen = frames.count - count
+    fallen = frames.last - count
     if fallen > LATE and count <= FRESH:
         return here, Step.START
     if frames.doubt is not None:

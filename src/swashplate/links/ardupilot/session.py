@@ -65,22 +65,19 @@ class Session:
         if step is Step.DOUBTFUL:
             self._notices.tell(
                 "count",
-                f"frame {packet.frame_count} after {before.count} is neither the next one nor a restart's; it is "
+                f"frame {packet.frame_count} after {before.last} is neither the next one nor a restart's; it is "
                 "ignored until it is repeated.",
             )
             return None
         if step is Step.STRANGER:
             self._notices.tell(
-                "sender",
-                f"a second autopilot at {sender[0]}:{sender[1]} is ignored: {before.sender[0]}:{before.sender[1]} flies."
-                if before.sender
-                else "a second autopilot is ignored.",
+                "sender", f"another autopilot at {sender[0]}:{sender[1]} is ignored while the first one speaks."
             )
             return None
         if step is Step.START:
             self._start(packet, sender, again=before.sender is not None)
         elif step is Step.SKIP:
-            missed = packet.frame_count - before.count - 1
+            missed = packet.frame_count - before.last - 1
             self._notices.tell("skip", f"{missed} frames before {packet.frame_count} never came; the flight goes on.")
         return self._fly(packet)
 
