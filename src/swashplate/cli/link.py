@@ -13,7 +13,6 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from swashplate.links.ardupilot.session import Progress
     from swashplate.links.plant import Plant
     from swashplate.links.sensing import Sensing
     from swashplate.links.servos import ServoMapping
@@ -76,7 +75,18 @@ def ardupilot(
     """
     _check_record(record)
     plant, sensing = _made(
-        vehicle, servos, "", wind, altitude, voltage, sag, changed, switched, sensors, seed, record_rate if record else None
+        vehicle,
+        servos,
+        "",
+        wind,
+        altitude,
+        voltage,
+        sag,
+        changed,
+        switched,
+        sensors,
+        seed,
+        record_rate if record else None,
     )
     from swashplate.links.ardupilot.runner import serve
     from swashplate.links.ardupilot.session import Session
@@ -88,11 +98,66 @@ def ardupilot(
         _tell_where("UDP", bound.getsockname(), listen, plant, quiet=quiet)
         session = Session(plant, sensing, notices)
         try:
-            serve(bound, session, idle_exit=idle_exit, report=None)
+            serve(bound, session, idle_exit=idle_exit)
         except KeyboardInterrupt:
             pass
         finally:
-            _finish(plant, record, session.progress, notices.summary(), quiet=quiet)
+            _finish(plant, record, session.progress.exchanges, notices.summary(), quiet=quiet)
+
+
+@app.command("px4")
+def px4(
+    vehicle: options.VehicleName,
+    servos: Servos = None,
+    port: Annotated[int, typer.Option("--port", help="TCP port to listen on.", min=0, max=65535)] = 4560,
+    listen: Listen = "127.0.0.1",
+    wind: given.Wind = "0,0,0",
+    altitude: given.Altitude = 0.0,
+    voltage: Voltage = None,
+    sag: Sag = 0.0,
+    changed: given.Set = None,
+    switched: given.Switch = None,
+    sensors: SensorsOption = SensorSet.NOISY,
+    seed: Seed = 0,
+    record: Record = None,
+    record_rate: RecordRate = 200.0,
+    idle_exit: IdleExit = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Be the simulator of PX4's SITL (`make px4_sitl none_iris` and the like): MAVLink HIL in lockstep over TCP.
+
+    Needs the extra `link`. The vehicle stands on the ground whenever PX4 connects. Ctrl-C ends.
+    """
+    _check_record(record)
+    plant, sensing = _made(
+        vehicle,
+        servos,
+        "_px4",
+        wind,
+        altitude,
+        voltage,
+        sag,
+        changed,
+        switched,
+        sensors,
+        seed,
+        record_rate if record else None,
+    )
+    from swashplate.links.notices import Notices
+    from swashplate.links.px4.runner import serve
+    from swashplate.links.px4.session import Session
+    from swashplate.links.sockets import listen_tcp
+
+    notices = Notices(_say)
+    session = Session(plant, sensing, notices, seed=seed)
+    with listen_tcp(listen, port) as listening:
+        _tell_where("TCP", listening.getsockname(), listen, plant, quiet=quiet)
+        try:
+            serve(listening, session, notices, idle_exit=idle_exit)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            _finish(plant, record, session.exchanges, notices.summary(), quiet=quiet)
 
 
 def _say(words: str) -> None:
@@ -172,7 +237,7 @@ def _tell_where(kind: str, at: tuple[str, int], listen: str, plant: Plant, *, qu
         _say(f"{plant.vehicle.card.title}: waiting for an autopilot on {kind} {at[0]}:{at[1]}. Ctrl-C ends.")
 
 
-def _finish(plant: Plant, record: Path | None, progress: Progress, counts: str, *, quiet: bool) -> None:
+def _finish(plant: Plant, record: Path | None, exchanges: int, counts: str, *, quiet: bool) -> None:
     flight = plant.flight() if record is not None else None
     if record is not None and flight is not None:
         if record.suffix.lower() == ".nc":
@@ -183,7 +248,7 @@ def _finish(plant: Plant, record: Path | None, progress: Progress, counts: str, 
             write_csv(flight, record)
     if quiet:
         return
-    _say(f"{progress.exchanges} exchanges, {progress.restarts} restarts, {progress.time:.1f} s flown.")
+    _say(f"{exchanges} exchanges; {plant.time:.1f} s since the vehicle was last put on the ground.")
     if counts:
         _say(f"Noted: {counts}.")
     if record is not None:

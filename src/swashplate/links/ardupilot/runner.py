@@ -7,13 +7,11 @@ import time
 from collections.abc import Callable
 
 from swashplate.links.ardupilot.packets import LONGEST
-from swashplate.links.ardupilot.session import Progress, Session
+from swashplate.links.ardupilot.session import Session
 
 PORT = 9002
 _LOOK_UP = 0.2
-"""s between looks at whether to go on where nobody speaks."""
-_REPORT = 1.0
-"""s between reports."""
+"""s between looks at whether to go on."""
 
 
 def serve(
@@ -21,7 +19,6 @@ def serve(
     session: Session,
     *,
     idle_exit: float | None = None,
-    report: Callable[[Progress], None] | None = None,
     go_on: Callable[[], bool] = lambda: True,
 ) -> None:
     """Answer every servo packet to the address that it came from. Nothing is sent before the first one.
@@ -30,11 +27,10 @@ def serve(
         bound: a UDP socket from `listen_udp`; it is not closed.
         session: what answers.
         idle_exit: end after so many seconds without a datagram that was answered; None waits for ever.
-        report: called about once a second while packets come.
         go_on: asked now and then whether to go on.
     """
     bound.settimeout(_LOOK_UP)
-    heard = told = time.monotonic()
+    heard = looked = time.monotonic()
     while True:
         try:
             data, sender = bound.recvfrom(LONGEST + 1)
@@ -48,10 +44,8 @@ def serve(
             if answer is not None:
                 heard = now
                 _answer(bound, answer, sender)
-        if now - told >= _REPORT or data is None:
-            told = now
-            if report is not None and data is not None:
-                report(session.progress)
+        if now - looked >= _LOOK_UP or data is None:
+            looked = now
             if not go_on() or (idle_exit is not None and now - heard >= idle_exit):
                 return
 
