@@ -1,4 +1,4 @@
-"""The ArduPilot link: lockstep exchanges per second with a client in a process of its own, over UDP on this machine.
+"""The ArduPilot link: lockstep exchanges per second over UDP on this machine, the link in a process of its own.
 
 python -m benchmarks.link [--short]
 """

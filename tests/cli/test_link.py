@@ -77,6 +77,14 @@ def test_a_link_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert flight.values("motor_lower")[-1] == pytest.approx(0.3)
 
 
+def test_a_model_file_is_a_vehicle(tmp_path: Path) -> None:
+    file = tmp_path / "model.toml"
+    sp.vehicle("coax").with_values({"mass": 0.333}, source="test", status="identified").save(file)
+    outcome = swash("link", "ardupilot", "--vehicle", file, "--port", "0", "--idle-exit", "0.1")
+    assert outcome.code == 0, outcome.err
+    assert "waiting for an autopilot" in outcome.err
+
+
 def test_listening_beyond_this_machine_is_warned_of() -> None:
     outcome = swash(
         "link", "ardupilot", "--vehicle", "coax", "--listen", "0.0.0.0", "--port", "0", "--idle-exit", "0.1"
