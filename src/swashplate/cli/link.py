@@ -74,25 +74,16 @@ def ardupilot(
     the autopilot is restarted. Ctrl-C ends.
     """
     _check_record(record)
-    plant, sensing = _made(
-        vehicle,
-        servos,
-        "",
-        wind,
-        altitude,
-        voltage,
-        sag,
-        changed,
-        switched,
-        sensors,
-        seed,
-        record_rate if record else None,
-    )
+    _own_process()
     from swashplate.links.ardupilot.runner import serve
     from swashplate.links.ardupilot.session import Session
     from swashplate.links.notices import Notices
     from swashplate.links.sockets import listen_udp
 
+    listen_udp(listen, port).close()  # told before anything is compiled
+    where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+    plant = _plant(vehicle, where, servos, suffix="", voltage=voltage, sag=sag, rate=record_rate if record else 0)
+    sensing = _sensing(plant, sensors, seed)
     notices = Notices(_say)
     with listen_udp(listen, port) as bound:
         _tell_where("UDP", bound.getsockname(), listen, plant, quiet=quiet)
@@ -129,25 +120,16 @@ def px4(
     Needs the extra `link`. The vehicle stands on the ground whenever PX4 connects. Ctrl-C ends.
     """
     _check_record(record)
-    plant, sensing = _made(
-        vehicle,
-        servos,
-        "_px4",
-        wind,
-        altitude,
-        voltage,
-        sag,
-        changed,
-        switched,
-        sensors,
-        seed,
-        record_rate if record else None,
-    )
+    _own_process()
     from swashplate.links.notices import Notices
     from swashplate.links.px4.runner import serve
     from swashplate.links.px4.session import Session
     from swashplate.links.sockets import listen_tcp
 
+    listen_tcp(listen, port).close()  # told before anything is compiled
+    where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+    plant = _plant(vehicle, where, servos, suffix="_px4", voltage=voltage, sag=sag, rate=record_rate if record else 0)
+    sensing = _sensing(plant, sensors, seed)
     notices = Notices(_say)
     session = Session(plant, sensing, notices, seed=seed)
     with listen_tcp(listen, port) as listening:
@@ -189,27 +171,23 @@ def _mapping(name: str, servos: str | None, suffix: str, vehicle: Vehicle) -> Se
     return servo_mapping(servos, vehicle)
 
 
-def _made(
-    name: str,
-    servos: str | None,
-    suffix: str,
-    wind: str,
-    altitude: float,
-    voltage: float | None,
-    sag: float,
-    changed: list[str] | None,
-    switched: list[str] | None,
-    sensors: SensorSet,
-    seed: int,
-    record_rate: float | None,
-) -> tuple[Plant, Sensing]:
+def _own_process() -> None:
     from swashplate.simulation.compilation import dispatch_in_line
 
     dispatch_in_line()
-    where = given.conditions(name, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+
+
+def _plant(
+    name: str,
+    where: given.Conditions,
+    servos: str | None,
+    *,
+    suffix: str,
+    voltage: float | None,
+    sag: float,
+    rate: float,
+) -> Plant:
     from swashplate.links.plant import Plant, Surroundings
-    from swashplate.links.sensing import Sensing
-    from swashplate.simulation.sensors import InertialUnit
     from swashplate.simulation.standing import standing
 
     environment = where.environment
@@ -218,14 +196,17 @@ def _made(
             raise SwashError(f"is {voltage:g} V, expected 0 to 1000.", channel="--voltage")
         environment = environment._replace(voltage=voltage)
     aircraft = standing(where.vehicle)
-    plant = Plant(
-        aircraft,
-        _mapping(name, servos, suffix, aircraft),
-        Surroundings(environment, sag),
-        record_rate=record_rate or 0.0,
-    )
+    mapping = _mapping(name, servos, suffix, aircraft)
+    plant = Plant(aircraft, mapping, Surroundings(environment, sag), record_rate=rate)
     plant.prepare()
-    return plant, Sensing(plant, unit=InertialUnit() if sensors is SensorSet.NOISY else None, seed=seed)
+    return plant
+
+
+def _sensing(plant: Plant, sensors: SensorSet, seed: int) -> Sensing:
+    from swashplate.links.sensing import Sensing
+    from swashplate.simulation.sensors import InertialUnit
+
+    return Sensing(plant, unit=InertialUnit() if sensors is SensorSet.NOISY else None, seed=seed)
 
 
 def _tell_where(kind: str, at: tuple[str, int], listen: str, plant: Plant, *, quiet: bool) -> None:
