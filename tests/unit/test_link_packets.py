@@ -82,11 +82,18 @@ def test_a_count_that_fell_back_is_a_restart(sender: tuple[str, int]) -> None:
 
 def test_a_late_duplicate_is_no_restart() -> None:
     assert steps((HERE, 50, 0.0), (HERE, 51, 0.1), (HERE, 50, 0.1), (HERE, 52, 0.2))[2:] == ["late", "next"]
-    assert steps((HERE, 0, 0.0), (HERE, 1, 0.1), (HERE, 0, 0.1), (HERE, 2, 0.2))[2:] == ["late", "next"]
+    assert steps((HERE, 7, 0.0), (HERE, 8, 0.1), (HERE, 2, 0.1), (HERE, 9, 0.2))[2:] == ["late", "next"]
+
+
+def test_the_first_frame_is_a_restart_at_any_time() -> None:
+    assert steps((HERE, 0, 0.0), (HERE, 1, 0.1), (HERE, 2, 0.1), (HERE, 0, 0.2), (HERE, 1, 0.3))[3:] == [
+        "start",
+        "next",
+    ]
 
 
 def test_a_restart_that_looks_late_is_believed_when_it_is_repeated() -> None:
-    assert steps((HERE, 0, 0.0), (HERE, 1, 0.1), (HERE, 0, 2.0), (HERE, 0, 3.0))[2:] == ["late", "start"]
+    assert steps((HERE, 4, 0.0), (HERE, 5, 0.1), (HERE, 3, 2.0), (HERE, 3, 3.0))[2:] == ["late", "start"]
 
 
 def test_odd_counts_are_believed_only_when_repeated_as_a_waiting_autopilot_does() -> None:
@@ -94,6 +101,8 @@ def test_odd_counts_are_believed_only_when_repeated_as_a_waiting_autopilot_does(
     assert steps((HERE, 9000, 0.0), odd, (HERE, 4000, 0.3), (HERE, 9001, 0.4))[1:] == ["doubtful", "doubtful", "next"]
     assert steps((HERE, 9000, 0.0), odd, (HERE, 4000, 1.2), (HERE, 4001, 1.3))[1:] == ["doubtful", "start", "next"]
     assert steps((HERE, 9000, 0.0), (HERE, 2**31, 0.2), (HERE, 9001, 0.3))[1:] == ["doubtful", "next"]
+    # Ahead is never a restart, only a hole.
+    assert steps((HERE, 9000, 0.0), (HERE, 90_000, 0.2), (HERE, 90_000, 1.2))[1:] == ["doubtful", "skip"]
     # A good packet in between clears the doubt.
     assert steps((HERE, 9000, 0.0), odd, (HERE, 9001, 1.0), (HERE, 4000, 2.0))[3] == "doubtful"
 

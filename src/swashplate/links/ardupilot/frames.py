@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 Address = tuple[str, int]
 
+FIRST = 1
+"""Counts that are a restart even just after the start: beginning twice costs nothing there."""
 FRESH = 100
 """Counts that a restarted autopilot may begin with."""
 LATE = 8
@@ -79,12 +81,12 @@ def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Fram
     if frames.last < count <= frames.last + AHEAD:
         return here, Step.SKIP
     fallen = frames.last - count
-    if fallen > LATE and count <= FRESH:
+    if fallen > 0 and (count <= FIRST or (fallen > LATE and count <= FRESH)):
         return here, Step.START
     if frames.doubt is not None:
         who, which, when = frames.doubt
         if (who, which) == (sender, count) and now - when >= AGAIN:
-            return here, Step.START
+            return here, Step.START if fallen > 0 else Step.SKIP
         if (who, which) == (sender, count):
             return frames, Step.DOUBTFUL
     late = 0 < fallen <= LATE
