@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import export, frequency, helicopter, identifying, many, peers, single
+from benchmarks import export, frequency, helicopter, identifying, link, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -40,6 +40,7 @@ def measure(*, short: bool) -> list[Result]:
         helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),
         helicopter.speeds(repeats=repeats),
         helicopter.lpv(steps=1_000 * scale, repeats=repeats),
+        *link.measure(short=short),
     ]
     jsbsim, scan = results[0], results[1]
     results[0] = replace(jsbsim, note=f"{jsbsim.note}; the scan is {scan.rate / jsbsim.rate:.1f} times faster")

@@ -93,3 +93,7 @@ class BenchError(SwashError):
 
 class ExportError(SwashError):
     """A model that a format cannot hold, or a tool that writing it needs and that is not here."""
+
+
+class LinkError(SwashError):
+    """A link to another program that cannot be opened, or a servo mapping that does not fit the vehicle."""

@@ -19,6 +19,7 @@ from swashplate.cli import (
     fit_tf,
     identify,
     inspect,
+    link,
     maneuver,
     respond,
     simulate,
@@ -76,6 +77,7 @@ app.command("linearize", short_help="Linear models and modes about steady flight
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")
+app.add_typer(link.app, name="link")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

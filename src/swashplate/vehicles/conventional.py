@@ -141,10 +141,11 @@ def loads(
         tail_pitch = tail_pitch + sense * par.gyro_gain * state.gyro.r_gyro
         gyro_rates = YawGyro((r - state.gyro.r_gyro) / par.gyro_time)
     turning = par.rotor_speed if state.rotor is None else state.rotor.omega
-    omega, fading = turning, 1.0
+    omega, blowing, fading = turning, 1.0, 1.0
     if state.rotor is not None:
         omega = xp.maximum(turning, _SLOWEST * par.rotor_speed)
-        fading = xp.minimum(1.0, (turning / omega) * (turning / omega))
+        blowing = xp.minimum(1.0, turning / omega)  # rotors at rest have no wake
+        fading = blowing * blowing
     A1, B1, bar_rates = sticks.A1, sticks.B1, None
     if state.bar is not None:
         lock = bell_hiller.bar_lock_number(
@@ -189,7 +190,13 @@ def loads(
 
     rim = par.tail_arm - par.rotor_radius
     downwash = tail_surfaces.wake_on_tailplane(
-        u, w, rotor.induced, near=rim - par.tail_radius, far=rim + par.tail_radius, drop=par.tail_height, xp=xp
+        u,
+        w,
+        blowing * rotor.induced,
+        near=rim - par.tail_radius,
+        far=rim + par.tail_radius,
+        drop=par.tail_height,
+        xp=xp,
     )
     tailplane_lift = tail_surfaces.lifting_force(
         u,
@@ -202,14 +209,14 @@ def loads(
     fin_at = Vector(-par.fin_arm, 0.0, -par.fin_height)
     fin_side = tail_surfaces.lifting_force(
         u,
-        v - par.fin_arm * r + par.fin_height * p + sense * par.fin_wake * tail.induced,
+        v - par.fin_arm * r + par.fin_height * p + sense * par.fin_wake * blowing * tail.induced,
         area=par.fin_area,
         lift_slope=par.fin_lift_slope,
         density=density,
         xp=xp,
     )
     areas = Vector(par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
-    drag = fuselage.flat_plate_drag(air, rotor.induced, areas=areas, density=density, xp=xp)
+    drag = fuselage.flat_plate_drag(air, blowing * rotor.induced, areas=areas, density=density, xp=xp)
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.
     load = fading * (rotor.torque + par.tail_gear * tail.torque)

@@ -1,0 +1,57 @@
+"""The socket around a session: wait for a datagram, answer it, until told to stop."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+from swashplate.links.ardupilot.packets import LONGEST
+from swashplate.links.ardupilot.session import Session
+
+PORT = 9002
+_LOOK_UP = 0.2
+"""s between looks at whether to go on."""
+
+
+def serve(
+    bound: socket.socket,
+    session: Session,
+    *,
+    idle_exit: float | None = None,
+    go_on: Callable[[], bool] = lambda: True,
+) -> None:
+    """Answer every servo packet to the address that it came from. Nothing is sent before the first one.
+
+    Args:
+        bound: a UDP socket from `listen_udp`; it is not closed.
+        session: what answers.
+        idle_exit: end after so many seconds without a datagram that was answered; None waits for ever.
+        go_on: asked now and then whether to go on.
+    """
+    bound.settimeout(_LOOK_UP)
+    heard = looked = time.monotonic()
+    while True:
+        try:
+            data, sender = bound.recvfrom(LONGEST + 1)
+        except TimeoutError:
+            data = None
+        except ConnectionError:
+            continue  # an answer found nobody: the autopilot has gone, and will be back or not
+        now = time.monotonic()
+        if data is not None:
+            answer = session.handle(data, sender, now)
+            if answer is not None:
+                heard = now
+                _answer(bound, answer, sender)
+        if now - looked >= _LOOK_UP or data is None:
+            looked = now
+            if not go_on() or (idle_exit is not None and now - heard >= idle_exit):
+                return
+
+
+def _answer(bound: socket.socket, answer: bytes, sender: tuple[str, int]) -> None:
+    try:
+        bound.sendto(answer, sender)
+    except OSError:
+        return  # whoever asked cannot be reached any more; it will ask again

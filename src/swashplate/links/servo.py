@@ -1,0 +1,40 @@
+"""One output of an autopilot: pulses, and what they mean at a servo, a motor or a throttle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+CENTRE, HALF = 1500.0, 500.0
+"""us: a mapping speaks of pulses; an output of -1 to 1 is one of 1000 to 2000."""
+NO_PULSE = 0
+"""What an autopilot says for an output that it does not drive."""
+PULSES = (500, 2500)
+"""us: no servo output lies outside."""
+CHANNELS = 32
+"""Outputs at most."""
+
+
+@dataclass(frozen=True)
+class Servo:
+    """One output: its number (from 1) and the pulses [us] at its ends and centre."""
+
+    channel: int
+    low: float = 1000.0
+    centre: float = 1500.0
+    high: float = 2000.0
+    reversed: bool = False
+
+    def travel(self, pulse: float) -> float:
+        """-1 to 1 from one end to the other, a little beyond where the pulse is; the centre without a pulse."""
+        if pulse == NO_PULSE:
+            return 0.0
+        side = self.high - self.centre if pulse > self.centre else self.centre - self.low
+        at = (pulse - self.centre) / side
+        return -at if self.reversed else at
+
+    def share(self, pulse: float) -> float:
+        """0 to 1 from the low to the high end, for motors and throttles; 0 without a pulse."""
+        if pulse == NO_PULSE:
+            return 0.0
+        at = min(1.0, max(0.0, (pulse - self.low) / (self.high - self.low)))
+        return 1.0 - at if self.reversed else at

@@ -1,0 +1,168 @@
+"""From an autopilot's outputs to a vehicle's inputs, as a small TOML says."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import LinkError
+from swashplate.links import swashplates
+from swashplate.links.mapping_table import Table
+from swashplate.links.servo import CENTRE, HALF
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+class HelicopterMapping:
+    """Swashplate, tail and rotor speed control of a conventional helicopter.
+
+    The throttle follows its output no faster than `spool` allows, as an engine that is started does: an autopilot only
+    ramps its output, and a governor that gets the whole engine at once would turn the helicopter on its skids.
+
+    Attributes:
+        channels: outputs that it uses, from 1.
+        shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
+    """
+
+    def __init__(self, table: Table, vehicle: Vehicle) -> None:
+        swash, tail, throttle = (table.part(name) for name in ("swashplate", "tail", "throttle"))
+        servos = table.part("servos", missing={})
+        numbers = swash.numbers("channels")
+        self._swash = tuple(swash.servo(number, servos) for number in numbers)
+        rows = swashplates.shares(
+            swash.text("type"),
+            angles=swash.numbers("angles", missing=()),
+            phase=swash.number("phase", missing=0.0),
+            matrix=swash.rows("matrix"),
+            where=table.where,
+        )
+        if len(rows) != len(self._swash):
+            raise table.error("swashplate.channels", f"has {len(self._swash)} servos, the type has {len(rows)}.")
+        self._inverse = swashplates.unmixed(rows)
+        pulses = (np.array(swash.pair("collective_pulse")) - CENTRE) / HALF
+        pitches = np.radians(swash.pair("collective_deg"))
+        if pulses[0] == pulses[1]:
+            raise swash.error("collective_pulse", "has two equal pulses.")
+        self._collective = (pulses, pitches)
+        lateral, longitudinal = np.radians(swash.pair("cyclic_deg"))
+        self._cyclic = (lateral, longitudinal)
+        self._tail = tail.servo(tail.number("channel"), servos)
+        self._tail_pitch = np.radians(tail.pair("deg"))
+        self._throttle = throttle.servo(throttle.number("channel"), servos)
+        self._full = throttle.number("full", missing=1.0)
+        self._spool = throttle.number("spool_time", missing=8.0)
+        if not (self._full > 0.0 and self._spool > 0.0):
+            raise table.error("throttle", "expected full and spool_time above zero.")
+        table.done()
+        self.channels = tuple(s.channel for s in (*self._swash, self._tail, self._throttle))
+        self.shares = (self._throttle.channel,)
+        self.restart()
+
+    def restart(self) -> None:
+        """Engine off."""
+        self._running = 0.0
+
+    def inputs(self, pulses: Sequence[float], duration: float) -> Array:
+        """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
+        collective, roll, pitch = self._inverse @ [s.travel(pulses[s.channel - 1]) for s in self._swash]
+        (first, last), (least, most) = self._collective
+        theta0 = least + (collective - first) / (last - first) * (most - least)
+        side, ahead = self._cyclic
+        low, high = self._tail_pitch
+        tail = 0.5 * (low + high) + 0.5 * (high - low) * self._tail.travel(pulses[self._tail.channel - 1])
+        asked = min(1.0, self._throttle.share(pulses[self._throttle.channel - 1]) / self._full)
+        self._running = min(asked, self._running + duration / self._spool)
+        return np.array([theta0, -ahead * pitch, side * roll, tail, self._running])
+
+
+class CoaxialMapping:
+    """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`."""
+
+    def __init__(self, table: Table, vehicle: Vehicle) -> None:
+        motors, cyclic = table.part("motors"), table.part("cyclic")
+        servos = table.part("servos", missing={})
+        self._motors = tuple(motors.servo(motors.number(name), servos) for name in ("lower", "upper"))
+        self._servos = tuple(cyclic.servo(cyclic.number(name), servos) for name in ("roll", "pitch"))
+        self._travel = (cyclic.number("roll_travel", missing=1.0), cyclic.number("pitch_travel", missing=1.0))
+        table.done()
+        numbers = vehicle.card.values()
+        stopped = [-numbers[f"o_drive_{name}"] / numbers[f"k_drive_{name}"] for name in ("lower", "upper")]
+        self._stopped = tuple(max(0.0, command) for command in stopped)
+        self.channels = tuple(s.channel for s in (*self._motors, *self._servos))
+        self.shares = tuple(s.channel for s in self._motors)
+
+    def restart(self) -> None:
+        """Nothing is carried over."""
+
+    def inputs(self, pulses: Sequence[float], duration: float) -> Array:
+        """motor_lower, motor_upper (0 to 1) and servo_roll, servo_pitch (-1 to 1) for pulses [us] by output.
+
+        An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
+        """
+        motors = [
+            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self._motors, self._stopped, strict=True)
+        ]
+        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self._servos, self._travel, strict=True)]
+        # Autopilots count nose up as positive pitch, the CoaX nose down.
+        return np.array([*motors, servos[0], -servos[1]])
+
+
+ServoMapping = HelicopterMapping | CoaxialMapping
+_KINDS: Mapping[str, type[HelicopterMapping] | type[CoaxialMapping]] = {
+    "conventional": HelicopterMapping,
+    "coax": CoaxialMapping,
+}
+
+
+def packaged() -> tuple[str, ...]:
+    """Names of the mappings that come with the package."""
+    folder = resources.files("swashplate.links") / "mappings"
+    return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
+    """A servo mapping by the name of a packaged one or by its file.
+
+    Args:
+        name_or_file: e.g. "raptor50", or a path.
+        vehicle: whose inputs it must give.
+
+    Raises:
+        LinkError: naming the file and the entry that is missing, unknown, impossible or for another vehicle.
+    """
+    text, where = _read(name_or_file)
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise LinkError(f"is not TOML: {error}.", where=where) from None
+    table = Table(document, where)
+    if table.text("kind") != "servo-mapping" or table.number("schema") != 1:
+        raise table.error("kind", "is not a servo mapping of schema 1.")
+    table.text("title")
+    meant = table.text("vehicle")
+    if meant != vehicle.name or meant not in _KINDS:
+        raise table.error("vehicle", f"is '{meant}', the vehicle has the equations of '{vehicle.name}'.")
+    return _KINDS[meant](table, vehicle)
+
+
+def _read(name_or_file: str | Path) -> tuple[str, str]:
+    if str(name_or_file) in packaged():
+        found = resources.files("swashplate.links") / "mappings" / f"{name_or_file}.toml"
+        return found.read_text(encoding="utf-8"), str(name_or_file)
+    path = Path(name_or_file)
+    if not path.is_file():
+        raise LinkError(
+            "is neither the name of a servo mapping nor a file.",
+            where=path,
+            hint=f"Names are {', '.join(packaged())}.",
+        )
+    try:
+        return path.read_text(encoding="utf-8"), str(path)
+    except UnicodeDecodeError:
+        raise LinkError("is not a text file.", where=path) from None

@@ -1,0 +1,177 @@
+"""A stand-in for ArduPilot's helicopter firmware on its SITL link, written from its documents: packets, reader, loops.
+
+It reads answers as `SIM_JSON.cpp` does (keys looked for from the front, no JSON parser), counts frames, repeats itself
+while nobody answers, mixes for an H3-120 swashplate and truncates pulses to whole microseconds.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+MAGIC_16, MAGIC_32 = 18458, 29569
+Send = Callable[[bytes], bytes | None]
+
+
+def servo_packet(rate: int, count: int, pulses: list[int], *, outputs: int = 16) -> bytes:
+    filled = (pulses + [0] * outputs)[:outputs]
+    magic = MAGIC_16 if outputs == 16 else MAGIC_32
+    return struct.pack(f"<HHI{outputs}H", magic, rate, count, *filled)
+
+
+def read_line(answer: bytes) -> dict[str, list[float]]:
+    """What ArduPilot finds in an answer; a missing or badly written mandatory key is an assertion."""
+    rows = answer.split(b"\n")
+    assert (rows[0], rows[-1], len(rows)) == (b"", b"", 3), "a line break before and behind, and one line"
+    text = rows[1].decode("ascii")
+    found = {}
+    for section, key in (
+        ("", "timestamp"),
+        ("imu", "gyro"),
+        ("imu", "accel_body"),
+        ("", "position"),
+        ("", "attitude"),
+        ("", "velocity"),
+        ("", "rng_1"),
+        ("", "airspeed"),
+        ("windvane", "direction"),
+        ("windvane", "speed"),
+        ("", "velocity_wind"),
+        ("", "rpm_1"),
+    ):
+        start = text.index(section) + len(section) + 1 if section else 1
+        at = text.index(key, start) + len(key) + 2
+        number = r"-?\d+\.?\d*(?:[eE][-+]?\d+)?"
+        vector = re.match(rf"\[({number}), ?({number}), ?({number})\]", text[at:])
+        scalar = re.match(number, text[at:])
+        assert vector or scalar, (key, text[at : at + 40])
+        found[key] = [float(v) for v in vector.groups()] if vector else [float(scalar[0])]  # type: ignore[index]
+    assert all(math.isfinite(v) for values in found.values() for v in values)
+    return found
+
+
+def _quickly(answer: bytes) -> dict[str, list[float]]:
+    told = json.loads(answer)
+    told.update(told.pop("imu"), **told.pop("windvane"))
+    return {key: value if isinstance(value, list) else [value] for key, value in told.items() if key != "battery"}
+
+
+@dataclass
+class Gains:
+    """ArduPilot's parameters by what they do (ATC_ANG_*_P, ATC_RAT_*)."""
+
+    angle: tuple[float, float, float] = (4.5, 4.5, 4.5)
+    forward: tuple[float, float, float] = (0.18, 0.18, 0.0)
+    proportional: tuple[float, float, float] = (0.05, 0.05, 0.25)
+    integral: tuple[float, float, float] = (0.1, 0.1, 0.3)
+
+
+@dataclass
+class HeliAutopilot:
+    """Stabilize mode with a pilot who keeps the place, and a sweep at the mixer.
+
+    Attributes:
+        send: gives a packet to the physics and returns its answer.
+        rate: frames per second [Hz]; the loops run in every frame.
+        outputs: 16 or 32.
+        sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
+        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep.
+    """
+
+    send: Send
+    rate: int = 400
+    outputs: int = 16
+    gains: Gains = field(default_factory=Gains)
+    armed: bool = False
+    interlock: bool = False
+    height: float = 0.0
+    sweep: tuple[int, Callable[[float], float]] | None = None
+    count: int = 0
+    log: list[tuple[float, ...]] = field(default_factory=list)
+    answers: list[dict[str, list[float]]] = field(default_factory=list)
+    place: tuple[float, float] = (0.0, 0.0)
+    collective: float = 0.0
+    _sums: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    _lift: float = 0.0
+    _pulses: list[int] = field(default_factory=lambda: [1460, 1460, 1460, 1500, 0, 0, 0, 1000])
+    _since: float = 0.0
+    _heading: float = 0.0
+
+    def exchange(self) -> dict[str, list[float]]:
+        """One frame: send, wait for the answer, control."""
+        packet = servo_packet(self.rate, self.count, self._pulses, outputs=self.outputs)
+        answer = self.send(packet)
+        for _ in range(5):
+            if answer is not None:
+                break
+            answer = self.send(packet)
+        assert answer is not None, "the physics does not answer"
+        self.count += 1
+        # Every hundredth answer is read the slow way that ArduPilot reads them all.
+        state = read_line(answer) if self.count % 100 == 1 else _quickly(answer)
+        self.answers.append(state)
+        self._control(state)
+        return state
+
+    def fly(self, seconds: float) -> dict[str, list[float]]:
+        for _ in range(round(seconds * self.rate)):
+            state = self.exchange()
+        return state
+
+    def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
+        self.sweep, self._since = (axis, signal), self.answers[-1]["timestamp"][0]
+
+    def _control(self, state: dict[str, list[float]]) -> None:
+        now, gyro, attitude = state["timestamp"][0], np.array(state["gyro"]), state["attitude"]
+        flying = self.armed and self.interlock and self.height > 0.0
+        mixer, collective, swept = np.zeros(3), 0.0, 0.0
+        if flying:
+            wanted = self._lean(state)
+            error = np.array([wanted[0] - attitude[0], wanted[1] - attitude[1], self._heading - attitude[2]])
+            error[2] = math.remainder(error[2], 2.0 * math.pi)
+            g = self.gains
+            target = np.clip(np.array(g.angle) * error, -1.5, 1.5)
+            miss = target - gyro
+            self._sums = np.clip(self._sums + np.array(g.integral) * miss / self.rate, -0.4, 0.4)
+            mixer = np.array(g.forward) * target + np.array(g.proportional) * miss + self._sums
+            collective = self._climb(state)
+            if self.sweep is not None:
+                axis, signal = self.sweep
+                swept = signal(now - self._since)
+                mixer[axis] += swept
+        else:
+            self._heading = attitude[2]
+            self._sums[:] = 0.0
+        mixer = np.clip(mixer, -1.0, 1.0)
+        self.collective = collective
+        self._pulses = self._mixed(mixer, collective)
+        self.log.append((now, *gyro, *mixer, collective, swept))
+
+    def _lean(self, state: dict[str, list[float]]) -> tuple[float, float]:
+        c, s = math.cos(state["attitude"][2]), math.sin(state["attitude"][2])
+        north = 0.04 * (self.place[0] - state["position"][0]) - 0.08 * state["velocity"][0]
+        east = 0.04 * (self.place[1] - state["position"][1]) - 0.08 * state["velocity"][1]
+        return float(np.clip(-s * north + c * east, -0.2, 0.2)), float(np.clip(-c * north - s * east, -0.2, 0.2))
+
+    def _climb(self, state: dict[str, list[float]]) -> float:
+        climb = float(np.clip(0.8 * (self.height + state["position"][2]), -0.5, 0.8))
+        miss = climb + state["velocity"][2]
+        self._lift = float(np.clip(self._lift + 0.06 * miss / self.rate, 0.0, 0.8))
+        return float(np.clip(self._lift + 0.08 * miss, 0.0, 1.0))
+
+    def _mixed(self, mixer: np.ndarray, collective: float) -> list[int]:
+        """H3-120 with H_COL_MIN 1460 and H_COL_MAX 1740; tail on 4, rotor speed on 8 at a set point of 66 %."""
+        share = 0.46 + 0.28 * collective
+        roll, pitch, yaw = mixer
+        servos = [
+            share + 0.45 * (math.cos(math.radians(at + 90)) * roll + math.cos(math.radians(at)) * pitch)
+            for at in (-60.0, 60.0, 180.0)
+        ]
+        pulses = [int(1000 + 1000 * min(1.0, max(0.0, s))) for s in servos]
+        return [*pulses, int(1500 + 500 * yaw), 0, 0, 0, 1660 if self.armed and self.interlock else 1000]

@@ -1,0 +1,48 @@
+"""Links without sockets, for tests: a plant, its sensors, a session, and a sender with a clock of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from swashplate.links.ardupilot.session import Session
+from swashplate.links.notices import Notices
+from swashplate.links.plant import Plant, Surroundings
+from swashplate.links.sensing import Sensing
+from swashplate.links.servos import servo_mapping
+from swashplate.physics.environment import Environment
+from swashplate.simulation.sensors import InertialUnit
+from swashplate.simulation.standing import standing
+from swashplate.vehicles.catalogue import vehicle
+
+
+@dataclass
+class Bench:
+    """A session and what it said; `send` is the loss-free line to it."""
+
+    session: Session
+    plant: Plant
+    said: list[str]
+    sender: tuple[str, int] = ("127.0.0.1", 50_001)
+    now: float = 0.0
+    sent: int = field(default=0)
+
+    def send(self, data: bytes) -> bytes | None:
+        self.now += 1e-3
+        self.sent += 1
+        return self.session.handle(data, self.sender, self.now)
+
+
+def bench(
+    name: str,
+    *,
+    environment: Environment | None = None,
+    unit: InertialUnit | None = None,
+    seed: int = 0,
+    sag: float = 0.0,
+    record_rate: float = 0.0,
+) -> Bench:
+    made = standing(vehicle(name))
+    around = Surroundings(environment or Environment(), sag)
+    plant = Plant(made, servo_mapping(name, made), around, record_rate=record_rate)
+    said: list[str] = []
+    return Bench(Session(plant, Sensing(plant, unit=unit, seed=seed), Notices(said.append)), plant, said)
