@@ -81,7 +81,7 @@ def test_the_report_shows_every_procedure_with_its_figures() -> None:
     coax = sp.vehicle("coax")
     report = compose_bench(evaluate(virtual_bench(coax, planned(coax), seed=2), coax))
     titles = [section.title for section in report.sections]
-    assert len(titles) == 14  # the card, twelve procedures, what it was made with
+    assert len(titles) == 14  # the card, the twelve procedures of the plan, what it was made with
     assert report.picture is not None
     assert [key.words for key in report.picture.keys] == ["total", "flapping", "tilt of the thrust"]
     assert len(figures_of(report)) > 18
@@ -113,10 +113,36 @@ def test_a_bad_record_ends_without_a_card(records: Path, tmp_path: Path, spoil: 
     assert [path.name for path in tmp_path.iterdir()] == ["records"]
 
 
+def test_real_bench_files_are_evaluated_and_shown(shared_data: Path, tmp_path: Path) -> None:
+    folder = shared_data / "coax56"
+    card = tmp_path / "card.toml"
+    done = swash("bench", folder / "bench_input_to_rpm.mat", folder / "bench_voltage_to_rpm.mat", "--out", card)
+    assert (done.code, done.err) == (0, "")
+    assert "Left out: upper at 0.8: saturation" in done.out
+    assert "k_drive_voltage of the lower rotor by itself" in done.out
+    assert set(read_card(card).correlations) <= {"k_drive_upper", "k_drive_lower", "o_drive_upper", "o_drive_lower"}
+    rig = swash("bench", shared_data / "coax_rig", "--report", tmp_path / "rig.html")
+    assert (rig.code, rig.err) == (0, "")
+    assert "loses at equal power" in rig.out
+    assert "Thrust that xoar 18-160-6.5 over xoar" in (tmp_path / "rig.html").read_text(encoding="utf-8")
+    assert "is a parameter of the card" in one_message(swash("bench", shared_data / "coax_rig", "--out", card))
+    assert "is no bench record" in one_message(swash("bench", folder / "flight_2011-08-01_vertical.mat"))
+    shown = swash("inspect", folder / "bench_input_to_rpm.mat")
+    assert "bench record for speed_map; 11 averaged points without a time base" in shown.out
+    told = json.loads(swash("inspect", folder / "stabilizer_bar_orientation.mat", "--json").out)
+    assert (told["rows"], told["rate"], told["procedures"]) == (1000, None, ["bar_orientation"])
+
+
+def test_inspect_shows_a_record_of_the_virtual_bench(records: Path) -> None:
+    shown = swash("inspect", records / "fan_front.csv")
+    assert "bench record for fuselage_drag" in shown.out
+    assert "anemometer: speed of the air from the front" in shown.out
+
+
 def test_places_that_cannot_be_written_to_are_found_first(records: Path, tmp_path: Path) -> None:
     assert "expected .toml" in one_message(swash("bench", records, "--out", tmp_path / "card.json"))
     assert "the folder does not exist" in one_message(swash("bench", records, "--report", tmp_path / "no" / "r.html"))
-    assert "is not a folder" in one_message(swash("bench", tmp_path / "nothing"))
+    assert "is not a folder and not a file" in one_message(swash("bench", tmp_path / "nothing"))
 
 
 def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, tmp_path: Path) -> None:

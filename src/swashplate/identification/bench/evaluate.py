@@ -14,6 +14,7 @@ from swashplate.flights.flight import Array
 from swashplate.identification.bench import (
     bar_linkage,
     bar_motion,
+    bar_orientation,
     drive_frequency,
     drive_steps,
     fuselage_drag,
@@ -22,9 +23,12 @@ from swashplate.identification.bench import (
     single_rotor,
     speed_map,
     supply,
+    supply_compensated,
     swashplate,
     thrust,
+    thrust_loss,
 )
+from swashplate.identification.bench.joint import Joint
 from swashplate.identification.bench.result import BenchResult, Check
 from swashplate.simulation.bench import Schedule
 from swashplate.vehicles.card import Card
@@ -32,6 +36,7 @@ from swashplate.vehicles.vehicle import Vehicle
 
 _MODULES: tuple[ModuleType, ...] = (
     supply,
+    supply_compensated,
     speed_map,
     thrust,
     single_rotor,
@@ -42,10 +47,15 @@ _MODULES: tuple[ModuleType, ...] = (
     servo_steps,
     bar_linkage,
     bar_motion,
+    bar_orientation,
     fuselage_drag,
+    thrust_loss,
 )
 PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
 """Every procedure, in an order in which each finds what it takes as known already measured."""
+
+_IN_TIME = (drive_steps, drive_frequency, servo_steps, bar_motion)
+"""Procedures that need samples at a fixed rate."""
 
 MEASURED = (
     "k_drive_voltage",
@@ -65,6 +75,8 @@ MEASURED = (
 )
 """Every parameter that the bench can measure."""
 
+_WORTH_KEEPING = 1e-4
+"""Smaller correlations are not written to the card."""
 _CLIPPED = 8
 """So many samples in a row at exactly the largest value of a channel are a sensor at its range."""
 
@@ -137,19 +149,19 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
     for record in records:
         refuse_saturated(record)
         refuse_stalled(record, published.values())
-    numbers, joint, results, disagreements = published.values(), _Joint(), [], []
+    numbers, joint, results, disagreements = published.values(), Joint(published), [], []
     for name, chosen in by_procedure.items():
-        result: BenchResult = PROCEDURES[name].estimate(chosen, numbers)
+        result, told = joint.add(PROCEDURES[name].estimate(chosen, numbers))
         results.append(result)
-        disagreements += joint.add(result)
+        disagreements += told
         numbers = {**numbers, **joint.values}
     return Bench(
         tuple(results),
         _card(published, joint, results),
         published,
-        tuple(name for name in MEASURED if name not in joint.names),
-        tuple(joint.names),
-        joint.covariance,
+        tuple(name for name in MEASURED if name not in joint.measured),
+        joint.measured,
+        joint.among(joint.measured),
         tuple(disagreements),
     )
 
@@ -165,6 +177,8 @@ def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
                     where=record.name,
                     hint="Correct the line '# procedure:' of its header.",
                 )
+            if PROCEDURES[name] in _IN_TIME:
+                _ = record.dt  # says that a table of points does not do
             for column in PROCEDURES[name].COLUMNS:
                 _ = record[column]  # says what is missing
             found.setdefault(name, []).append(record)
@@ -177,7 +191,7 @@ def refuse_saturated(record: BenchRecord) -> None:
     Raises:
         BenchError: naming the channel.
     """
-    for channel in LOADS:
+    for channel in LOADS if not record.averaged else ():
         values = record.channels.get(channel)
         if values is None or np.ptp(values) == 0.0:
             continue
@@ -207,13 +221,17 @@ def refuse_stalled(record: BenchRecord, card: Mapping[str, float]) -> None:
             continue
         command, speed = record[f"motor_{rotor}"], record[f"omega_{rotor}"]
         expected = card[f"k_drive_{rotor}"] * command + card[f"o_drive_{rotor}"]
-        span = round(1.5 / record.dt)  # s: eight of the slower drive train's time constants
+        if record.averaged:
+            span, few = 1, 0.0
+        else:  # settled for 1.5 s, eight of the slower drive train's time constants, and slow for longer than 0.2 s
+            span, few = round(1.5 / record.dt), 0.2 / record.dt
         running = np.convolve(command > 0.42, np.ones(span), mode="full")[: command.size] >= span
         slow = running & (speed < 0.6 * expected)
-        if slow.sum() > 0.2 / record.dt:
+        if slow.sum() > few:
             at = int(np.argmax(slow))
+            when = f"point {at + 1}" if record.averaged else f"{record['time'][at]:.2f} s"
             raise BenchError(
-                f"is {speed[at]:.0f} rad/s at {record['time'][at]:.2f} s where motor_{rotor} = {command[at]:.2f} "
+                f"is {speed[at]:.0f} rad/s at {when} where motor_{rotor} = {command[at]:.2f} "
                 f"should give about {expected[at]:.0f}: the motor did not reach its speed.",
                 where=record.name,
                 channel=f"omega_{rotor}",
@@ -221,52 +239,11 @@ def refuse_stalled(record: BenchRecord, card: Mapping[str, float]) -> None:
             )
 
 
-class _Joint:
-    """Values and joint covariance as procedures are added."""
-
-    def __init__(self) -> None:
-        self.names: list[str] = []
-        self.values: dict[str, float] = {}
-        self.sources: dict[str, list[BenchResult]] = {}
-        self.covariance: Array = np.zeros((0, 0))
-
-    def add(self, result: BenchResult) -> list[Check]:
-        """Add a result; what is known already is combined by its weights (told if it disagrees)."""
-        told = [self._combine(name, result) for name in result.names if name in self.names]
-        fresh = [i for i, name in enumerate(result.names) if name not in self.names]
-        if fresh:
-            lean = np.zeros((len(fresh), len(self.names)))
-            for known, slope in result.leans_on.items():
-                if known in self.names:
-                    lean[:, self.names.index(known)] = np.asarray(slope)[fresh]
-            across = lean @ self.covariance
-            own = result.covariance[np.ix_(fresh, fresh)] + across @ lean.T
-            self.covariance = np.block([[self.covariance, across.T], [across, own]])
-            self.names += [result.names[i] for i in fresh]
-            self.values |= {result.names[i]: float(result.values[i]) for i in fresh}
-        for name in result.names:
-            self.sources.setdefault(name, []).append(result)
-        return told
-
-    def _combine(self, name: str, result: BenchResult) -> Check:
-        place = self.names.index(name)
-        value, sigma = result[name]
-        before, variance = self.values[name], self.covariance[place, place]
-        apart = (value - before) / float(np.sqrt(sigma**2 + variance))
-        share = variance / (variance + sigma**2)
-        self.values[name] = before + share * (value - before)
-        self.covariance[place] *= 1.0 - share
-        self.covariance[:, place] *= 1.0 - share
-        self.covariance[place, place] = variance * sigma**2 / (variance + sigma**2)
-        first = self.sources[name][0].procedure
-        return Check(f"{name}: {result.procedure} and {first} are {apart:+.1f} sigmas apart.", good=abs(apart) < 3.0)
-
-
-def _card(published: Card, joint: _Joint, results: Sequence[BenchResult]) -> Card:
+def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card:
     """The published card with what was measured."""
     card = published
-    sigma = np.sqrt(np.diag(joint.covariance))
-    for place, name in enumerate(joint.names):
+    sigma = dict(zip(joint.names, np.sqrt(np.diag(joint.covariance)), strict=True))
+    for name in joint.measured:
         sources = joint.sources[name]
         files = ", ".join(dict.fromkeys(file for result in sources for file in result.records))
         how = ", ".join(result.procedure for result in sources)
@@ -274,10 +251,10 @@ def _card(published: Card, joint: _Joint, results: Sequence[BenchResult]) -> Car
         card = card.with_values(
             {name: joint.values[name]},
             status="measured",
-            sigma=float(sigma[place]),
+            sigma=float(sigma[name]),
             source=f"bench: {how} from {files}",
         )
-    if "k_zeta_lower" in joint.names:  # both rotors alike (Fankhauser et al., sec. IV-A3)
+    if "k_zeta_lower" in joint.measured:  # both rotors alike (Fankhauser et al., sec. IV-A3)
         value = card.parameters["k_zeta_lower"]
         card = card.with_values(
             {"k_zeta_upper": value.value}, status="derived", sigma=value.sigma, source="derived: k_zeta_lower"
@@ -311,6 +288,6 @@ def _correlations(names: Sequence[str], covariance: Array) -> dict[str, dict[str
     for i, first in enumerate(names):
         for j in range(i + 1, len(names)):
             value = float(covariance[i, j] / (sigma[i] * sigma[j]))
-            if abs(value) > 1e-4:
+            if abs(value) > _WORTH_KEEPING:
                 made.setdefault(first, {})[names[j]] = round(value, 9)
     return made

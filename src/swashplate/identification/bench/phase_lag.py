@@ -18,7 +18,7 @@ from scipy import stats
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.result import BenchResult, Check, Curve
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
 from swashplate.identification.bench.steady import check_settled, fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
@@ -106,7 +106,9 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         (curve,),
-        findings=(("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad"),),
+        findings=(
+            Finding("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad"),
+        ),
     )
 
 

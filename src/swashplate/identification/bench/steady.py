@@ -32,7 +32,8 @@ class Points:
         where: the record's name.
         time: middle of each point [s], shape (n,).
         mean: average of each channel, shape (n,).
-        moving: second half less first half of each point, in standard deviations of that difference, shape (n,).
+        moving: second half less first half of each point, in standard deviations of that difference, shape (n,);
+            empty where the record came averaged.
     """
 
     where: str
@@ -62,6 +63,11 @@ def steady_points(record: BenchRecord, channels: Sequence[str]) -> Points:
     Raises:
         BenchError: where a column is missing, there is no point, or one is too short.
     """
+    if record.averaged:
+        values = {name: record[name] for name in channels}
+        count = record["point"].size
+        time = record.channels.get("time", np.arange(float(count)))
+        return Points(record.name, time, values, {})
     number = np.round(record["point"]).astype(int)
     edges = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     starts = edges[number[edges] > 0]
@@ -164,6 +170,8 @@ def stacked(blocks: Sequence[Sequence[Array]]) -> list[Array]:
 
 def check_settled(points: Points, channel: str) -> Check:
     """Whether a channel still moved while the points were measured."""
+    if channel not in points.moving:
+        return Check(f"{points.where}: came averaged; whether {channel} was steady at its points cannot be told.")
     late = int(np.sum(np.abs(points.moving[channel]) > stats.norm.isf(_SURE / 2.0 / max(len(points), 1))))
     if not late:
         return Check(f"{points.where}: {channel} was steady at every point.")

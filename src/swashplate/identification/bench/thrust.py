@@ -16,7 +16,7 @@ import numpy as np
 
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.result import BenchResult, Check, Curve
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
 from swashplate.identification.bench.steady import (
     Line,
     check_drift,
@@ -98,7 +98,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             _curve("Total thrust", "thrust [N]", upper, lower, thrust, 1.0),
             _curve("Total torque", "torque [N mm]", upper, -lower, torque, 1000.0),
         ),
-        findings=(("thrust in Omega_up Omega_lw, share at hover", share, share_sigma, "1"),),
+        findings=(Finding("thrust in Omega_up Omega_lw, share at hover", share, share_sigma),),
     )
 
 

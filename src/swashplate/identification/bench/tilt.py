@@ -9,16 +9,17 @@ with a bias and a drift each; the magnitudes of eq. 18 are for the plot.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from swashplate.errors import BenchError
+from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.result import Check, Curve
-from swashplate.identification.bench.steady import Points, check_settled, nuisance
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import Points, check_settled, nuisance, steady_points
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rotor import TipPathPlane
@@ -28,6 +29,8 @@ XP = FloatBackend()
 
 Steering = Callable[[int, float, float], TipPathPlane]
 """The tilt at a point for a linkage and a lag."""
+Deflections = Callable[[Points], Steering]
+"""The steering that the points of a record make."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,9 @@ class TiltFit:
 
     Attributes:
         values: linkage, lag [rad] and hub stiffness [N m/rad].
-        covariance: shape (3, 3).
-        by_thrust: derivatives of `values` by the logarithm of the thrust factor, shape (3,).
+        covariance: shape (3, 3), thrust and hub height taken as exact.
+        by_thrust, by_height: derivatives of `values` by the logarithms of the thrust factor and of the hub height,
+            shape (3,).
         corrected: measured channels with bias and drift taken out, shape (n, 4).
         residuals: shape (n, 4), bias and drift taken out.
         tilt: size of the fitted tilt at each point [rad].
@@ -46,6 +50,7 @@ class TiltFit:
     values: Array
     covariance: Array
     by_thrust: Array
+    by_height: Array
     corrected: Array
     residuals: Array
     tilt: Array
@@ -73,37 +78,38 @@ def fit_tilt(points: Points, steering: Steering, thrust: Array, *, hub_height: f
     def without(columns: Array) -> Array:
         return np.asarray(columns - basis @ (basis.T @ columns))
 
-    def model(x: Array, lifted: Array) -> Array:
-        return np.array([_loads(steering(i, x[0], x[1]), lifted[i], hub_height, x[2]) for i in range(n)])
+    def model(x: Array, *, lift: float = 1.0, raised: float = 1.0) -> Array:
+        planes = (steering(i, x[0], x[1]) for i in range(n))
+        return np.array([_loads(p, lift * t, raised * hub_height, x[2]) for p, t in zip(planes, thrust, strict=True)])
 
     if np.ptp([abs(complex(*steering(i, 1.0, 0.0))) for i in range(n)]) == 0.0:
         raise BenchError("steers nothing.", where=points.where, hint="Deflect servos or bar between the points.")
-    _refuse_against(without(measured), without(model(start, thrust)), points.where)
+    _refuse_against(without(measured), without(model(start)), points.where)
     scale = np.abs(start) + np.array([0.0, 0.1, 0.0])
     spread = np.array([1e-3, 1e-3, 1e-4, 1e-4])
 
-    def solved(lifted: Array, begin: Array) -> tuple[Array, Array, Array]:
-        nonlocal spread
-        for _ in range(3):
+    values = start
+    for _ in range(3):
 
-            def off(x: Array, by: Array = spread) -> Array:
-                return np.asarray((without(measured - model(x, lifted)) / by).ravel())
+        def off(x: Array, by: Array = spread) -> Array:
+            return np.asarray((without(measured - model(x)) / by).ravel())
 
-            found = least_squares(off, begin, x_scale=scale, xtol=1e-12)
-            left = found.fun.reshape(n, 4) * spread
-            spread, begin = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75)), found.x
-        return found.x, found.jac, left
-
-    values, jacobian, left = solved(thrust, start)
+        found = least_squares(off, values, x_scale=scale, xtol=1e-12)
+        values, used = found.x, spread
+        left = found.fun.reshape(n, 4) * used
+        spread = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75))
     _refuse(values, points.where)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    step = 1e-3
-    higher, lower = (solved(thrust * (1.0 + s), values)[0] for s in (step, -step))
-    fitted = model(values, thrust)
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+
+    def by_held(**shift: float) -> Array:
+        """How the estimate moves with what it holds: what a wrong lift or height adds to the model, fitted back."""
+        added = (model(values, **{k: 1.0 + s for k, s in shift.items()}) - model(values)) / sum(shift.values())
+        return np.asarray(-covariance @ found.jac.T @ (-without(added) / used).ravel())
+
+    fitted = model(values)
     tilt = np.array([abs(complex(*steering(i, values[0], values[1]))) for i in range(n)])
-    by_thrust = np.asarray((higher - lower) / (2.0 * step))
     corrected = without(measured) + (fitted - without(fitted))
-    return TiltFit(values, np.asarray(covariance), by_thrust, corrected, left, tilt)
+    return TiltFit(values, np.asarray(covariance), by_held(lift=1e-4), by_held(raised=1e-4), corrected, left, tilt)
 
 
 def _loads(plane: TipPathPlane, thrust: float, hub_height: float, stiffness: float) -> tuple[float, ...]:
@@ -161,7 +167,7 @@ def torques(tilt: Array, *, stiffness: float, thrust: float, hub_height: float) 
     return flapping + tilting, flapping, tilting
 
 
-def tilt_checks(points: Points, fit: TiltFit, kept: Mapping[str, float]) -> list[Check]:
+def _checks(points: Points, fit: TiltFit) -> list[Check]:
     """Settling, and the residuals against what the sensor's own noise could leave."""
     checks = [check_settled(points, name) for name in ("Fx", "Mx")]
     force, moment = (np.sqrt(np.mean(fit.residuals[:, pair] ** 2)) for pair in ([0, 1], [2, 3]))
@@ -175,6 +181,62 @@ def tilt_checks(points: Points, fit: TiltFit, kept: Mapping[str, float]) -> list
             good=not bent,
         )
     )
-    known = ", ".join(f"{name} = {value:.4g}" for name, value in kept.items())
-    checks.append(Check(f"Taken as known: {known}."))
     return checks
+
+
+def tilt_result(
+    module: tuple[str, str, str],
+    records: Sequence[BenchRecord],
+    card: Mapping[str, float],
+    deflections: Deflections,
+    *,
+    rotor_name: str,
+    channels: Sequence[str],
+) -> BenchResult:
+    """Linkage and hub stiffness of one rotor from its record; the phase lag is a finding.
+
+    Args:
+        module: name, title and source of the procedure.
+        records: one; more than one would need the lag at each speed.
+        card: `k_thrust`, `hub_height` of the rotor and `air_density` are held.
+        deflections: what steers the rotor.
+        rotor_name: "upper" or "lower".
+        channels: that the steady points need beside the loads.
+
+    Raises:
+        BenchError: as `fit_tilt`, or for more than one record.
+    """
+    if len(records) != 1:
+        raise BenchError(
+            f"{len(records)} records, expected one.", where=", ".join(r.name for r in records), hint="Join them."
+        )
+    (record,) = records
+    points = steady_points(record, (*channels, *CHANNELS))
+    names = (f"linkage_{rotor_name}", f"hub_stiffness_{rotor_name}")
+    factor, height = f"k_thrust_{rotor_name}", f"hub_height_{rotor_name}"
+    density = record.number("air_density", card["air_density"]) / card["air_density"]
+    speed = points[f"omega_{rotor_name}"]
+    thrust = card[factor] * density * speed**2
+    lag = card[f"k_zeta_{rotor_name}"] * float(speed.mean()) + card[f"o_zeta_{rotor_name}"]
+    start = np.array([card[names[0]], lag, card[names[1]]])
+    fit = fit_tilt(points, deflections(points), thrust, hub_height=card[height], start=start)
+    pair, leans = [0, 2], {factor: fit.by_thrust / card[factor], height: fit.by_height / card[height]}
+    return BenchResult(
+        *module,
+        names,
+        fit.values[pair],
+        fit.covariance[np.ix_(pair, pair)],
+        (record.name,),
+        tuple(_checks(points, fit)),
+        tuple(figure_6(fit, float(thrust.mean()), hub_height=card[height], rotor_name=rotor_name)),
+        leans_on={name: slope[pair] for name, slope in leans.items()},
+        findings=(
+            Finding(
+                f"phase lag offset of the {rotor_name} rotor at {speed.mean():.0f} rad/s",
+                float(fit.values[1]),
+                float(np.sqrt(fit.covariance[1, 1])),
+                "rad",
+                {name: float(slope[1]) for name, slope in leans.items()},
+            ),
+        ),
+    )
