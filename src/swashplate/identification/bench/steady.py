@@ -64,10 +64,8 @@ def steady_points(record: BenchRecord, channels: Sequence[str]) -> Points:
         BenchError: where a column is missing, there is no point, or one is too short.
     """
     if record.averaged:
-        values = {name: record[name] for name in channels}
-        count = record["point"].size
-        time = record.channels.get("time", np.arange(float(count)))
-        return Points(record.name, time, values, {})
+        rows = record.channels.get("time", np.arange(float(record["point"].size)))
+        return Points(record.name, rows, {name: record[name] for name in channels}, {})
     number = np.round(record["point"]).astype(int)
     edges = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
     starts = edges[number[edges] > 0]
