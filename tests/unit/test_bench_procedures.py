@@ -141,6 +141,10 @@ def _swap_speeds(record: BenchRecord) -> BenchRecord:
     return _changed(record, omega_lower=record["omega_upper"], omega_upper=record["omega_lower"])
 
 
+def _swap(*pairs: tuple[str, str]) -> Callable[[BenchRecord], BenchRecord]:
+    return lambda record: _changed(record, **{a: record[b] for one in pairs for a, b in (one, one[::-1])})
+
+
 def _without(name: str) -> Callable[[BenchRecord], BenchRecord]:
     return lambda record: replace(record, channels={k: v for k, v in record.channels.items() if k != name})
 
@@ -177,15 +181,27 @@ def _not_removed(record: BenchRecord) -> BenchRecord:
         ("phase_lag", _short, "points for"),
         ("swashplate", _flip("Fx", "Fy"), "Fx, Fy: forces lean against the deflection"),
         ("swashplate", _flip("Mx", "My"), "Mx, My: moments point against the deflection"),
+        ("swashplate", _flip("Fy"), "Fy: forces lean against the deflection"),
+        ("swashplate", _flip("servo_pitch"), "against the deflection"),
+        ("swashplate", _swap(("Mx", "My")), "moments point against the deflection"),
+        ("bar_linkage", _flip("Fy"), "Fy: forces lean against the deflection"),
+        ("bar_linkage", _flip("bar_alpha"), "against the deflection"),
+        ("bar_linkage", _swap_speeds, "omega_upper, omega_lower: the rotors' speeds are"),
         ("swashplate", _weak, "Mx, My: moments are smaller than the tilted thrust"),
         ("swashplate", _short, "expected at least 8"),
         ("fan_front", _flip("Fx"), "Fx: grows with airspeed_x"),
+        ("fan_front", _swap(("Fx", "Fy")), "Fx: grows with airspeed_x less than Fy does"),
         ("fan_front", lambda r: _changed(r, omega_lower=r["omega_lower"] + 100.0), "a rotor turns"),
         ("fan_front", lambda r: _changed(r, airspeed_x=0.0 * r["time"]), "varies no single stream"),
         ("single_upper", _not_removed, "rotor_removed"),
         ("supply", lambda r: _changed(r, voltage=12.0 + 0.0 * r["time"]), "vary the supply"),
         ("steps_upper", lambda r: _changed(r, motor_upper=0.5 + 0.0 * r["time"]), "steps no motor, expected one"),
-        ("steps_upper", lambda r: _changed(r, omega_upper=200.0 + r["motor_upper"]), "no first-order response"),
+        ("steps_upper", _swap_speeds, "the rotors' speeds are"),
+        ("steps_upper", _flip("omega_upper"), "omega_upper: is -"),
+        ("steps_upper", _flip("motor_upper"), "motor_upper: is -"),
+        ("steps_upper", lambda r: _changed(r, omega_upper=200.0 + r["motor_upper"]), "omega_upper: moves by"),
+        ("steps_upper", lambda r: _changed(r, omega_upper=421.0 * r["motor_upper"]), "no first-order response"),
+        ("multisine_upper", _swap_speeds, "the rotors' speeds are"),
         ("multisine_upper", _short, "whole periods"),
         ("servo_steps_pitch", lambda r: _changed(r, servo_pitch=0.0 * r["time"]), "steps no servo"),
         ("bar_motion", lambda r: _changed(r, phi=0.0 * r["time"]), "phi: moves by 0 rad"),

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.refusals import refuse_idle
 from swashplate.identification.bench.result import BenchResult, Check, Curve
 from swashplate.simulation.bench import Schedule
 
@@ -53,6 +54,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     names, values, variances, checks, curves = [], [], [], [], []
     for record in records:
         rotor = "upper" if np.std(record["motor_upper"]) > np.std(record["motor_lower"]) else "lower"
+        refuse_idle(record, rotor, card)
         u, y = _coefficients(record, f"motor_{rotor}"), _coefficients(record, f"omega_{rotor}")
         periods = y.shape[0]
         frequency = np.array(HARMONICS) / PERIOD

@@ -17,6 +17,7 @@ from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.identification.bench.lag import LagFit, first_order, fit_lag
+from swashplate.identification.bench.refusals import refuse_idle
 from swashplate.identification.bench.result import BenchResult, Check, Curve
 from swashplate.simulation.bench import Schedule, points
 
@@ -67,6 +68,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         levels, speed = held_levels(record[f"motor_{rotor}"]), record[f"omega_{rotor}"]
         if levels.shape[1] < 3:
             raise BenchError("has fewer than two steps.", where=record.name, hint="Step up and down, several times.")
+        refuse_idle(record, rotor, card)
 
         def response(tau: float, levels: Array = levels, dt: float = record.dt) -> tuple[Array, list[Array]]:
             return np.zeros(len(levels)), [*first_order(levels, tau, dt).T]

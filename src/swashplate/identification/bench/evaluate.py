@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from swashplate.errors import BenchError
-from swashplate.flights.bench_record import LOADS, BenchRecord
+from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.identification.bench import (
     bar_linkage,
@@ -29,6 +29,12 @@ from swashplate.identification.bench import (
     thrust_loss,
 )
 from swashplate.identification.bench.joint import Joint
+from swashplate.identification.bench.refusals import (
+    refuse_exchanged,
+    refuse_out_of_range,
+    refuse_saturated,
+    refuse_stalled,
+)
 from swashplate.identification.bench.result import BenchResult, Check
 from swashplate.simulation.bench import Schedule
 from swashplate.vehicles.card import Card
@@ -77,8 +83,6 @@ MEASURED = (
 
 _WORTH_KEEPING = 1e-4
 """Smaller correlations are not written to the card."""
-_CLIPPED = 8
-"""So many samples in a row at exactly the largest value of a channel are a sensor at its range."""
 
 
 @dataclass(frozen=True)
@@ -147,11 +151,21 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
     published = vehicle.card
     by_procedure = _sorted(records)
     for record in records:
+        refuse_out_of_range(record)
         refuse_saturated(record)
         refuse_stalled(record, published.values())
+        refuse_exchanged(record, published.values())
     numbers, joint, results, disagreements = published.values(), Joint(published), [], []
     for name, chosen in by_procedure.items():
-        result, told = joint.add(PROCEDURES[name].estimate(chosen, numbers))
+        try:
+            estimated = PROCEDURES[name].estimate(chosen, numbers)
+        except np.linalg.LinAlgError:
+            raise BenchError(
+                f"{name} cannot tell its numbers from these records: something that has to be varied stood still.",
+                where=", ".join(record.name for record in chosen),
+                hint="`swash bench plan` says what to vary.",
+            ) from None
+        result, told = joint.add(estimated)
         results.append(result)
         disagreements += told
         numbers = {**numbers, **joint.values}
@@ -183,60 +197,6 @@ def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
                 _ = record[column]  # says what is missing
             found.setdefault(name, []).append(record)
     return {name: found[name] for name in PROCEDURES if name in found}
-
-
-def refuse_saturated(record: BenchRecord) -> None:
-    """Raise where a force or moment stands at its largest value for several samples: the sensor is at its range.
-
-    Raises:
-        BenchError: naming the channel.
-    """
-    for channel in LOADS if not record.averaged else ():
-        values = record.channels.get(channel)
-        if values is None or np.ptp(values) == 0.0:
-            continue
-        for limit in (values.max(), values.min()):
-            at = np.r_[False, values == limit, False]
-            edges = np.flatnonzero(np.diff(at.astype(int)))
-            longest = int((edges[1::2] - edges[::2]).max())
-            if longest >= _CLIPPED:
-                time = record["time"][edges[::2][np.argmax(edges[1::2] - edges[::2])]]
-                raise BenchError(
-                    f"stands at {limit:.4g} for {longest} samples from {time:.2f} s on: the sensor is saturated.",
-                    where=record.name,
-                    channel=channel,
-                    hint="Choose a larger range or smaller inputs, and damp vibration at the mount.",
-                )
-
-
-def refuse_stalled(record: BenchRecord, card: Mapping[str, float]) -> None:
-    """Raise where a motor is told to turn and its rotor does not, or hardly.
-
-    Raises:
-        BenchError: naming the rotor and the time.
-    """
-    removed = record.header.get("rotor_removed", "")
-    for rotor in ("upper", "lower"):
-        if rotor == removed or not {f"motor_{rotor}", f"omega_{rotor}"} <= record.channels.keys():
-            continue
-        command, speed = record[f"motor_{rotor}"], record[f"omega_{rotor}"]
-        expected = card[f"k_drive_{rotor}"] * command + card[f"o_drive_{rotor}"]
-        if record.averaged:
-            span, few = 1, 0.0
-        else:  # settled for 1.5 s, eight of the slower drive train's time constants, and slow for longer than 0.2 s
-            span, few = round(1.5 / record.dt), 0.2 / record.dt
-        running = np.convolve(command > 0.42, np.ones(span), mode="full")[: command.size] >= span
-        slow = running & (speed < 0.6 * expected)
-        if slow.sum() > few:
-            at = int(np.argmax(slow))
-            when = f"point {at + 1}" if record.averaged else f"{record['time'][at]:.2f} s"
-            raise BenchError(
-                f"is {speed[at]:.0f} rad/s at {when} where motor_{rotor} = {command[at]:.2f} "
-                f"should give about {expected[at]:.0f}: the motor did not reach its speed.",
-                where=record.name,
-                channel=f"omega_{rotor}",
-                hint="Check supply, motor and tachometer (and that the rotors' columns are not exchanged).",
-            )
 
 
 def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card:

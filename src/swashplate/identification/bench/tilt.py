@@ -24,6 +24,8 @@ from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rotor import TipPathPlane
 
+_UNLIKE = 0.25
+"""Largest share of a channel's square that the fitted tilt may leave."""
 CHANNELS = ("Fx", "Fy", "Mx", "My")
 XP = FloatBackend()
 
@@ -98,6 +100,7 @@ def fit_tilt(points: Points, steering: Steering, thrust: Array, *, hub_height: f
         values, used = found.x, spread
         left = found.fun.reshape(n, 4) * used
         spread = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75))
+    _refuse_unlike(without(measured), left, points.where)
     _refuse(values, points.where)
     covariance = np.linalg.inv(found.jac.T @ found.jac)
 
@@ -119,20 +122,31 @@ def _loads(plane: TipPathPlane, thrust: float, hub_height: float, stiffness: flo
 
 
 def _refuse_against(measured: Array, expected: Array, where: str) -> None:
-    """Raise where forces point against the deflection that was commanded."""
-    if np.sum(measured[:, :2] * expected[:, :2]) < 0.0:
+    """Raise where forces or moments point against the commanded deflection, on one axis or on both."""
+    for pair, what, hint in (
+        ([0, 1], "forces lean", "Turn the sign of the lateral forces, or that of servos or bar"),
+        ([2, 3], "moments point", "Turn the sign of the moments"),
+    ):
+        along = np.sum(measured * expected, axis=0)
+        against = [CHANNELS[i] for i in pair if along[i] < 0.0]
+        if along[pair].sum() < 0.0 or against:
+            raise BenchError(
+                f"{what} against the deflection that was commanded.",
+                where=where,
+                channel=", ".join(against or [CHANNELS[i] for i in pair]),
+                hint=f"{hint}; axes are forward-right-down.",
+            )
+
+
+def _refuse_unlike(measured: Array, left: Array, where: str) -> None:
+    """Raise where a channel does not follow the deflection at all: exchanged columns, or another axis' sensor."""
+    share = np.sum(left**2, axis=0) / np.sum(measured**2, axis=0)
+    if share.max() > _UNLIKE:
         raise BenchError(
-            "forces lean against the deflection that was commanded.",
+            f"does not follow the deflection: {100 * share.max():.0f} % of its square is left.",
             where=where,
-            channel="Fx, Fy",
-            hint="Turn the sign of the lateral forces, or that of servos or bar; axes are forward-right-down.",
-        )
-    if np.sum(measured[:, 2:] * expected[:, 2:]) < 0.0:
-        raise BenchError(
-            "moments point against the deflection that was commanded.",
-            where=where,
-            channel="Mx, My",
-            hint="Turn the sign of the moments; axes are forward-right-down.",
+            channel=CHANNELS[int(share.argmax())],
+            hint="Are two columns exchanged, or do they refer to other axes than forward-right-down?",
         )
 
 
