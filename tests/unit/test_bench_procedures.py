@@ -11,10 +11,10 @@ import pytest
 import swashplate as sp
 from swashplate.errors import BenchError, CardError
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench import fuselage_drag, lag, speed_map, steady, supply
-from swashplate.identification.bench.evaluate import PROCEDURES, evaluate, hover_commands, schedules
-from swashplate.identification.bench.result import BenchResult
-from swashplate.simulation.bench import virtual_bench
+from swashplate.identification.bench import checks, fuselage_drag, lag, speed_map, steady, supply
+from swashplate.identification.bench.evaluate import PROCEDURES, Bench, evaluate, hover_commands, schedules
+from swashplate.identification.bench.result import BenchResult, Check
+from swashplate.simulation.bench import Setup, virtual_bench
 from swashplate.vehicles.card import parse_card
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -77,7 +77,7 @@ def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
     level = np.repeat(np.linspace(0.0, 1.0, 8), 2)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(16)
     straight, bent = (
-        steady.check_structure(
+        checks.check_structure(
             steady.fit_line([level, np.ones(16)], level + c * level**2 + noise, where="r"), level, what="y"
         )
         for c in (0.0, 0.1)
@@ -92,8 +92,8 @@ def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
         for noise_of in [0.1 * np.random.default_rng(2).standard_normal(400)]
         for c in (0.0, 0.5)
     )
-    assert steady.check_settled(still, "y").good
-    assert not steady.check_settled(moving, "y").good
+    assert checks.check_settled(still, "y").good
+    assert not checks.check_settled(moving, "y").good
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def _not_removed(record: BenchRecord) -> BenchRecord:
         ("swashplate", _flip("Mx", "My"), "Mx, My: moments point against the deflection"),
         ("swashplate", _flip("Fy"), "Fy: forces lean against the deflection"),
         ("swashplate", _flip("servo_pitch"), "against the deflection"),
-        ("swashplate", _swap(("Mx", "My")), "moments point against the deflection"),
+        ("swashplate", _swap(("Mx", "My")), "My: does not follow the deflection"),
         ("bar_linkage", _flip("Fy"), "Fy: forces lean against the deflection"),
         ("bar_linkage", _flip("bar_alpha"), "against the deflection"),
         ("bar_linkage", _swap_speeds, "omega_upper, omega_lower: the rotors' speeds are"),
@@ -214,6 +214,46 @@ def test_a_record_that_contradicts_what_it_measures_is_refused(
         evaluate([change(records[name])], coax)
     assert f"{name}.csv" in str(error.value)
     assert message in str(error.value)
+
+
+def _thrust_checks(coax: Vehicle, setup: Setup) -> tuple[Bench, list[Check]]:
+    wanted = [s for s in schedules(hover_commands(coax.card.values())) if s.name.startswith("sweep")]
+    made = virtual_bench(coax, [replace(s, procedures=("thrust",)) for s in wanted], setup=setup, seed=2)
+    found = evaluate(made, coax)
+    return found, [check for check in found.results[0].checks if not check.good]
+
+
+def test_ground_effect_is_told_by_the_height_and_by_nothing_else(coax: Vehicle) -> None:
+    """At one height it scales thrust alike: residuals stay straight, the factor is too large by what is told."""
+    found, doubts = _thrust_checks(coax, Setup(height=0.2))
+    assert len(doubts) == 2
+    assert all("0.2 m above the floor, ground effect adds 4.8 % to the thrust" in check.words for check in doubts)
+    gained = found.card.values()["k_thrust_lower"] / coax.card.values()["k_thrust_lower"]
+    assert gained == pytest.approx(1.0 / (1.0 - (0.171 / 0.8) ** 2), abs=2e-3)
+    assert _thrust_checks(coax, Setup(height=2.0))[1] == []
+    free, doubts = _thrust_checks(coax, Setup())
+    assert doubts == []
+    assert any("does not say how high" in check.words for check in free.results[0].checks)
+
+
+def test_vibration_is_told(coax: Vehicle) -> None:
+    assert _thrust_checks(coax, Setup())[1] == []
+    found = _thrust_checks(coax, Setup())[0].results[0].checks
+    assert any("with the rotors off: the rest is vibration" in check.words for check in found)
+    strong = _thrust_checks(coax, Setup(force_vibration=4.0))[1]
+    assert any("as much as what is measured" in check.words for check in strong)
+
+
+def test_a_rotor_at_a_multiple_of_the_sample_rate_is_told(coax: Vehicle) -> None:
+    number = np.repeat([1.0, 2.0], 200)
+    time = np.arange(400) / 100.0
+    for speed, good in ((2.0 * np.pi * 100.1, False), (240.0, True)):
+        noise = np.random.default_rng(1).standard_normal(400)
+        channels = {"time": time, "point": number, "Fz": 10.0 * number + noise, "omega_upper": speed + 0.0 * time}
+        found = steady.steady_points(BenchRecord("r", ("thrust",), channels), ("Fz", "omega_upper"))
+        check = checks.check_vibration(found, "Fz")
+        assert check.good == good
+        assert ("looks like a steady load" in check.words) != good
 
 
 def test_what_has_no_record_keeps_the_published_value(coax: Vehicle, records: Records) -> None:

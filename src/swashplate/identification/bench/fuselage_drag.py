@@ -16,8 +16,9 @@ import numpy as np
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, nuisance, steady_points
+from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "fuselage_drag"
@@ -88,7 +89,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         values.append(float(line.values[0]))
         variances.append(float(line.covariance[0, 0]))
         level = np.round(found[speed] * 2.0) / 2.0
-        checks += [check_settled(found, force), *check_structure(line, level, what=f"{record.name}: {force} [N]")]
+        checks += [
+            check_settled(found, force),
+            check_vibration(found, force),
+            *check_structure(line, level, what=f"{record.name}: {force} [N]"),
+        ]
         order = np.argsort(found[speed])
         fitted = line.values[0] * pushed
         curves.append(

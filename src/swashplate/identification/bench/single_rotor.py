@@ -17,8 +17,9 @@ import numpy as np
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import COLUMNS as RECORD_COLUMNS
 from swashplate.flights.bench_record import BenchRecord
+from swashplate.identification.bench.checks import check_ground, check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, nuisance, steady_points
+from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "single_rotor"
@@ -68,7 +69,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         found = steady_points(record, COLUMNS[1:])
         density = record.number("air_density", card["air_density"]) / card["air_density"]
         squared = density * found[f"omega_{rotor}"] ** 2
-        checks.append(check_settled(found, "Fz"))
+        checks += [check_settled(found, "Fz"), check_vibration(found, "Fz"), check_ground(record, card)]
         for name, channel, unit, signs in _LOADS:
             channel_unit = RECORD_COLUMNS[channel][0]
             line = fit_line([squared, *nuisance(found)], signs[rotor] * found[channel], where=record.name)

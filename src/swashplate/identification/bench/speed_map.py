@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_settled, check_structure
 from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, steady_points
+from swashplate.identification.bench.steady import fit_line, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 Mask = NDArray[np.bool_]

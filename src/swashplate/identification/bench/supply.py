@@ -16,8 +16,9 @@ from scipy import stats
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_settled, check_structure
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
-from swashplate.identification.bench.steady import Line, check_settled, check_structure, fit_line, steady_points
+from swashplate.identification.bench.steady import Line, fit_line, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "supply"

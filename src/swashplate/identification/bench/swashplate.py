@@ -2,8 +2,9 @@
 
     M_flap = sqrt(Mx^2 + My^2) - z_lw sqrt(Fx^2 + Fy^2)     (Fankhauser et al., sec. IV-A4, eq. 18 and Fig. 6)
 
-What spoils it: a CG other than the one that the moments refer to, an airframe that bends, a trim that is not zero (it
-is taken out as a bias as long as it does not change), and a sensor near its range.
+What spoils it: vibration (told by the samples' scatter), ground effect on the thrust that is held, a CG other than
+the one that the moments refer to, an airframe that bends, a trim that is not zero (it is taken out as a bias as long as
+it does not change), and a sensor near its range.
 """
 
 from __future__ import annotations

@@ -16,17 +16,15 @@ import numpy as np
 
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
-from swashplate.identification.bench.steady import (
-    Line,
+from swashplate.identification.bench.checks import (
     check_drift,
+    check_ground,
     check_settled,
     check_structure,
-    fit_line,
-    nuisance,
-    stacked,
-    steady_points,
+    check_vibration,
 )
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import Line, fit_line, nuisance, stacked, steady_points
 
 NAME = "thrust"
 TITLE = "Thrust and torque factors, coaxial"
@@ -62,8 +60,9 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     torque = fit_line([upper, -lower, *unknown], turn, where=where)
     _refuse_signs(thrust, torque, where)
     checks: list[Check] = []
-    for place, points in enumerate(found):
-        checks.append(check_settled(points, "Fz"))
+    for place, (points, record) in enumerate(zip(found, records, strict=True)):
+        checks += [check_settled(points, "Fz"), check_vibration(points, "Fz"), check_vibration(points, "Mz")]
+        checks.append(check_ground(record, card))
         span = float(np.ptp(points.time))
         at = 3 + 2 * place
         for line, what in ((thrust, "-Fz [N]"), (torque, "Mz [N m]")):

@@ -18,8 +18,9 @@ from scipy.optimize import least_squares
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_settled, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
-from swashplate.identification.bench.steady import Points, check_settled, nuisance, steady_points
+from swashplate.identification.bench.steady import Points, nuisance, steady_points
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rotor import TipPathPlane
@@ -183,7 +184,7 @@ def torques(tilt: Array, *, stiffness: float, thrust: float, hub_height: float) 
 
 def _checks(points: Points, fit: TiltFit) -> list[Check]:
     """Settling, and the residuals against what the sensor's own noise could leave."""
-    checks = [check_settled(points, name) for name in ("Fx", "Mx")]
+    checks = [check(points, name) for name in ("Fx", "Mx") for check in (check_settled, check_vibration)]
     force, moment = (np.sqrt(np.mean(fit.residuals[:, pair] ** 2)) for pair in ([0, 1], [2, 3]))
     checks.append(Check(f"{points.where}: residuals {1e3 * force:.2g} mN and {1e3 * moment:.2g} N mm."))
     curvature = np.polyfit(fit.tilt, np.sum(fit.residuals[:, 2:] * np.sign(fit.corrected[:, 2:]), axis=1), 2)[0]
