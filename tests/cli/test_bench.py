@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import one_message, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
+from swashplate.flights.bench_record import BenchRecord, write_record
 from swashplate.identification.bench.evaluate import MEASURED, evaluate
 from swashplate.identification.bench.plan import plan, planned
 from swashplate.reporting.bench import compose_bench
@@ -111,6 +116,60 @@ def test_a_bad_record_ends_without_a_card(records: Path, tmp_path: Path, spoil: 
     done = swash("bench", folder, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
     assert message in one_message(done)
     assert [path.name for path in tmp_path.iterdir()] == ["records"]
+
+
+def _cells(change: Callable[[dict[str, np.ndarray]], None]) -> Callable[[BenchRecord], BenchRecord]:
+    """A record with its columns changed in place."""
+
+    def spoiled(record: BenchRecord) -> BenchRecord:
+        channels = {name: values.copy() for name, values in record.channels.items()}
+        change(channels)
+        return replace(record, channels=channels)
+
+    return spoiled
+
+
+@pytest.mark.parametrize(
+    ("procedure", "file", "spoil", "message"),
+    [
+        ("thrust", "sweep_lower.csv", lambda c: c.pop("Mz"), "Mz: the column is missing"),
+        ("thrust", "sweep_lower.csv", lambda c: c.update(Fz=-c["Fz"]), "Turn the sign of Fz"),
+        ("thrust", "sweep_upper.csv", lambda c: c.update(Mz=-c["Mz"]), "Turn the sign of Mz"),
+        ("thrust", "sweep_lower.csv", lambda c: c.update(Fz=np.maximum(c["Fz"], -4.0)), "the sensor is saturated"),
+        (
+            "thrust",
+            "sweep_upper.csv",
+            lambda c: c.update(omega_upper=0.4 * c["omega_upper"]),
+            "did not reach its speed",
+        ),
+        (
+            "thrust",
+            "sweep_upper.csv",
+            lambda c: c.update({name: values[:1200] for name, values in c.items()}),
+            "expected at least 5",
+        ),
+        ("bar_linkage", "bar_linkage.csv", lambda c: c.update(Fy=-c["Fy"]), "Turn the sign of the lateral forces"),
+    ],
+)
+def test_what_spoils_a_measurement_ends_in_words_without_a_card(
+    tmp_path: Path, procedure: str, file: str, spoil: Callable[[dict[str, np.ndarray]], None], message: str
+) -> None:
+    """Every way of the issue, from files as a user has them: exit code 2, one message, neither card nor report."""
+    folder = tmp_path / "records"
+    folder.mkdir()
+    for record in _bench_of(procedure):
+        write_record(_cells(spoil)(record) if record.name == file else record, folder / record.name)
+    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
+    words = one_message(done)
+    assert file in words
+    assert message in words
+    assert [path.name for path in tmp_path.iterdir()] == ["records"]
+
+
+@cache
+def _bench_of(procedure: str) -> tuple[BenchRecord, ...]:
+    coax = sp.vehicle("coax")
+    return virtual_bench(coax, planned(coax, [procedure]), seed=4)
 
 
 def test_real_bench_files_are_evaluated_and_shown(shared_data: Path, tmp_path: Path) -> None:

@@ -2,9 +2,9 @@
 
     (alpha, beta)_up = l_up R (alpha, beta)_bar             (Fankhauser et al., sec. IV-A5, eqs 10, 11 and Fig. 7)
 
-Forces and moments are split as for the lower rotor (eq. 18). What spoils it: vibration (told by the samples'
-scatter), ground effect on the thrust that is held, a magnet that lets the bar wobble, a deflection that is read off with
-the rotor at rest, and the downwash on the magnet's arm.
+Forces and moments are split as for the lower rotor (eq. 18). What spoils it: vibration (told by the samples' scatter),
+ground effect on the thrust that is held, a magnet that lets the bar wobble, a deflection that is read off with the
+rotor at rest, and the downwash on the magnet's arm.
 """
 
 from __future__ import annotations

@@ -219,6 +219,10 @@ def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card
         card = card.with_values(
             {"k_zeta_upper": value.value}, status="derived", sigma=value.sigma, source="derived: k_zeta_lower"
         )
+    for name in set(MEASURED) - set(joint.measured):
+        entry = card.parameters[name]
+        note = "; ".join(filter(None, (entry.note, "kept as published: the bench has no record of it")))
+        card = replace(card, parameters={**card.parameters, name: replace(entry, note=note)})
     done = ", ".join(result.procedure for result in results)
     return replace(
         card,

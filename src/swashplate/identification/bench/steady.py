@@ -1,7 +1,6 @@
 """Steady points of a bench record and straight-line fits to them.
 
-Sensor bias and steady drift are unknowns of every fit. What they cannot take up shows in the residuals: ground effect
-and recirculation bend them, a warm motor or a drifting sensor spreads repeats, vibration spreads samples.
+Sensor bias and steady drift are unknowns of every fit; what else can spoil a point is looked for in `checks`.
 """
 
 from __future__ import annotations
