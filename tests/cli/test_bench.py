@@ -37,7 +37,7 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_records_become_a_card_and_a_report(records: Path, tmp_path: Path) -> None:
     done = swash("bench", records, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
     assert (done.code, done.err) == (0, "")
-    assert "bench: drive_steps from steps_lower.csv, steps_upper.csv" in done.out
+    assert "bench: drive_steps from steps_upper.csv" in done.out
     assert "Kept as published, no record: k_drive_voltage" in done.out
     card = sp.vehicle(tmp_path / "card.toml").card  # a vehicle like any other
     entry = card.parameters["tau_drive_upper"]

@@ -101,8 +101,9 @@ def _card(bench: Bench) -> Section:
             )
         )
     note = (
-        "σ: from the scatter of the measurements about the formula. It does not hold what all measurements share: the "
-        "calibration of the sensor, the position of the CG, the hub heights. Correlations are on the card."
+        "σ: from the scatter of the measurements about the formula and from the bounds of what a procedure holds as "
+        "known, where the card gives one. It does not hold the calibration of the sensor, nor the position of the CG. "
+        "Correlations are on the card."
     )
     columns = ("parameter", "unit", "published", "measured", "σ", "change / σ", "source")
     return Section("card", "The card", (Table("Published and measured values", columns, tuple(rows), note=note),))

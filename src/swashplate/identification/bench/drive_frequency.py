@@ -119,6 +119,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
     )
 
 

@@ -54,6 +54,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         BenchError: where no motor was stepped, or a speed does not follow its steps.
     """
     fits: dict[str, list[LagFit]] = {}
+    files: dict[str, tuple[str, ...]] = {}
     curves: list[Curve] = []
     checks: list[Check] = []
     for record in records:
@@ -75,6 +76,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
 
         fit = fit_lag(response, speed, dt=record.dt, bounds=_BOUNDS, where=record.name)
         fits.setdefault(rotor, []).append(fit)
+        files[f"tau_drive_{rotor}"] = (*files.get(f"tau_drive_{rotor}", ()), record.name)
         size = np.ptp(fit.linear)
         checks += [_check_both_ways(record.name, rotor, fit, levels, record.dt), _check_order(record.name, fit, size)]
         shown = slice(0, min(speed.size, round(8.0 / record.dt)))
@@ -102,6 +104,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of=files,
     )
 
 

@@ -205,7 +205,9 @@ def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card
     sigma = dict(zip(joint.names, np.sqrt(np.diag(joint.covariance)), strict=True))
     for name in joint.measured:
         sources = joint.sources[name]
-        files = ", ".join(dict.fromkeys(file for result in sources for file in result.records))
+        files = ", ".join(
+            dict.fromkeys(file for result in sources for file in result.records_of.get(name, result.records))
+        )
         how = ", ".join(result.procedure for result in sources)
         _refuse_impossible(published, name, joint.values[name], files)
         card = card.with_values(

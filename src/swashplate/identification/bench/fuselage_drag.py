@@ -94,11 +94,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             check_vibration(found, force),
             *check_structure(line, level, what=f"{record.name}: {force} [N]"),
         ]
-        order = np.argsort(found[speed])
+        blowing = np.linspace(found[speed].min(), found[speed].max(), 60)
         fitted = line.values[0] * pushed
         curves.append(
             Curve(f"Drag against {speed}", "speed of the air [m/s]", "drag [mN]", found[speed],
-                  1e3 * (fitted - line.residuals), found[speed][order], 1e3 * fitted[order])
+                  1e3 * (fitted - line.residuals), blowing, 1e3 * density * line.values[0] * blowing * np.abs(blowing))
         )  # fmt: skip
     checks.append(Check("The mount's own drag is in these numbers unless it was measured alone and subtracted."))
     return BenchResult(
@@ -111,4 +111,5 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
     )

@@ -86,6 +86,7 @@ class BenchResult:
         values: shape (p,), in the card's units.
         covariance: shape (p, p), of this procedure's own measurements, what it holds taken as exact.
         records: the files it comes from.
+        records_of: those of a parameter that comes from some of them only, by its name.
         checks: drift, repeatability, structure of the residuals, and what else it looked at.
         curves: for the report.
         left_out: which points it did not use, and why.
@@ -108,6 +109,7 @@ class BenchResult:
     leans_on: Mapping[str, Array] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     tables: tuple[Rows, ...] = ()
+    records_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def sigma(self) -> Array:

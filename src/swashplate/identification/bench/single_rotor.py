@@ -94,7 +94,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             checks += check_structure(
                 line, found[f"motor_{rotor}"], what=f"{rotor} rotor alone, {name} [{channel_unit}]"
             )
-            order = np.argsort(squared)
+            turning = np.linspace(0.0, found[f"omega_{rotor}"].max(), 60)
             size, shown = (1.0, "N") if name == "thrust" else (1e3, "N mm")
             fitted = size * alone * squared
             curves.append(
@@ -104,8 +104,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                     f"{name} [{shown}]",
                     found[f"omega_{rotor}"],
                     fitted + size * line.residuals,
-                    found[f"omega_{rotor}"][order],
-                    fitted[order],
+                    turning,
+                    size * alone * density * turning**2,
                 )
             )
     checks.append(Check("The bound of the interference does not hold what remounting the blades changes."))

@@ -126,6 +126,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     names: list[str] = []
     values: list[float] = []
     leans: list[float] = []
+    files: dict[str, tuple[str, ...]] = {}
     blocks, checks, curves, left_out = [], [], [], []
     for rotor in ("upper", "lower"):
         swept = [r for r in records if np.ptp(r[f"motor_{rotor}"]) > 0.1 and _is_sweep(r, rotor)]
@@ -151,6 +152,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         leans += list(-fit_line(columns, np.concatenate(above)[kept], where=where).values)
         checks += check_structure(line, command[kept], what=f"{rotor} rotor speed [rad/s]")
         names += [f"k_drive_{rotor}", f"o_drive_{rotor}"]
+        files |= dict.fromkeys(names[-2:], tuple(record.name for record in swept))
         values += list(found_values)
         blocks.append(covariance)
         left_out += reasons
@@ -187,6 +189,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(curves),
         tuple(left_out),
         leans_on={"k_drive_voltage": np.array(leans)},
+        records_of=files,
     )
 
 
