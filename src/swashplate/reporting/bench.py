@@ -55,18 +55,20 @@ def compose_bench(bench: Bench) -> Report:
         else f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.results), 'procedure')}."
     )
     kept = f"Published, for want of a record: {listed(bench.kept, most=30)}." if bench.kept else "None."
+    card: tuple[Section, ...] = (_card(bench),) if bench.names else ()
+    keeping = (("Kept", kept, "caution" if bench.kept else "good"),) if bench.names else ()
     agreement = " ".join(c.words for c in bench.disagreements) or "No parameter was measured in two ways."
     summary = (
         ("Records", f"{counted(len(files), 'file')}: {listed(files, most=5)}.", "plain"),
         ("Measured", measured, "plain"),
-        ("Kept", kept, "caution" if bench.kept else "good"),
+        *keeping,
         ("Checks", _doubts(doubts), "caution" if doubts else "good"),
         ("Agreement", agreement, "caution" if apart else "plain"),
     )
-    sections = (_card(bench), *(_procedure(result, bench) for result in bench.results), _made(bench))
+    sections = (*card, *(_procedure(result, bench) for result in bench.results), _made(bench))
     picture = next((b for r in bench.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
     return Report(
-        title=f"{bench.card.vehicle} on the test bench",
+        title=f"{bench.card.vehicle} on the test bench" if bench.names else "On the test bench",
         banners=(),
         summary=summary,
         picture=picture,

@@ -92,17 +92,12 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         dense = np.geomspace(frequency[0], frequency[-1], 60)
         a = np.exp(-record.dt / tau)
         line = found.x[0] * (1.0 - a) / (np.exp(2j * np.pi * dense * record.dt) - a)
-        curves.append(
-            Curve(
-                f"Frequency response of the {rotor} drive train",
-                "frequency [Hz]",
-                "phase [deg]",
-                frequency,
-                np.degrees(np.angle(mean_y / mean_u)),
-                dense,
-                np.degrees(np.angle(line)),
-            )
-        )
+        measured = mean_y / mean_u
+        curves += [
+            Curve(f"{what.capitalize()} of the {rotor} drive train", "frequency [Hz]", f"{what} [{unit}]",
+                  frequency, of(measured), dense, of(line))
+            for what, unit, of in (("gain", "rad/s", np.abs), ("phase", "deg", lambda h: np.degrees(np.angle(h))))
+        ]  # fmt: skip
     if len(set(names)) < len(names):
         raise BenchError(
             "two records excite the same motor.",

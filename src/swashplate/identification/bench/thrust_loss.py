@@ -203,7 +203,7 @@ def _curves(name: str, runs: Sequence[BenchRecord]) -> list[Curve]:
     return [
         Curve(f"{what.capitalize()} of {name}", "pulse width [us]", f"{what} [{unit}]",
               1e6 * np.concatenate([run["pwm"] for run in runs]), np.concatenate([run[what] for run in runs]),
-              1e6 * levels, _by_level(runs, levels, what).mean(axis=0))
+              1e6 * levels, _by_level(runs, levels, what).mean(axis=0), name="mean of the runs")
         for what, unit in (("thrust", "N"), ("power", "W"))
     ]  # fmt: skip
 
