@@ -40,7 +40,7 @@ def evaluate(
     records: Annotated[
         list[str],
         typer.Argument(
-            metavar="RECORDS...",
+            metavar="RECORDS",
             help="Folder with one file a record, files, or a data set's name (coax_rig, coax56/bench_input_to_rpm).",
         ),
     ],

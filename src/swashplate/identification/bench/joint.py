@@ -63,7 +63,7 @@ class Joint:
             for f in result.findings
             for row in [self._row(f.leans_on)]
         )
-        checks = (*result.checks, *self._taken_as_known(leant))
+        checks = (*result.checks, *self._taken_as_known(leant, result))
         across = slopes @ self.covariance
         own = result.covariance + across @ slopes.T
         twice = [(name, place) for place, name in enumerate(result.names) if name in self.names]
@@ -102,8 +102,8 @@ class Joint:
         """Derivatives in the order of the names; what is exact has none."""
         return np.array([float(slopes.get(name, 0.0)) for name in self.names])
 
-    def _taken_as_known(self, leant: Mapping[str, None]) -> list[Check]:
-        """What was held, with its bound or for want of one as exact."""
+    def _taken_as_known(self, leant: Mapping[str, None], result: BenchResult) -> list[Check]:
+        """What was held, with its bound or for want of one as exact: then what a percent of it would do."""
         words = []
         for name in leant:
             if name in self.names:
@@ -111,8 +111,13 @@ class Joint:
                 sigma = float(np.sqrt(self.covariance[place, place]))
                 words.append(f"{name} = {self.values[name]:.4g} +- {sigma:.2g}")
             else:
-                words.append(f"{name} = {self._published.parameters[name].value:.4g} (its card gives no bound: exact)")
-        return [Check(f"Held, and propagated into the bounds: {', '.join(words)}.")] if words else []
+                value = self._published.parameters[name].value
+                moved = np.abs(np.asarray(result.leans_on.get(name, ())) * value / result.values)
+                would = ""
+                if moved.size:
+                    would = f", 1 % of it moves {result.names[int(moved.argmax())]} by {moved.max():.2g} %"
+                words.append(f"{name} = {value:.4g} (its card gives no bound: taken as exact{would})")
+        return [Check(f"Held: {', '.join(words)}.")] if words else []
 
 
 def _equal(values: Array, covariance: Array, first: int, second: int) -> tuple[Array, Array, float]:
