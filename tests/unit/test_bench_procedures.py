@@ -244,6 +244,26 @@ def test_vibration_is_told(coax: Vehicle) -> None:
     assert any("as much as what is measured" in check.words for check in strong)
 
 
+def test_a_moment_that_bends_with_the_tilt_is_told(coax: Vehicle, records: Records) -> None:
+    """A hub that stiffens by a tenth at the largest deflection: no straight line of eq. 18 fits it."""
+    record = records["swashplate"]
+    stiffer = 1.0 + 0.1 * (np.hypot(record["servo_roll"], record["servo_pitch"]) / 0.75) ** 2
+    for change, good in ((1.0 + 0.0 * stiffer, True), (stiffer, False)):
+        found = evaluate([_changed(record, Mx=change * record["Mx"], My=change * record["My"])], coax)
+        doubts = [check.words for check in found.results[0].checks if not check.good]
+        assert (doubts == []) == good
+    assert any("My [N m]: the residuals have a structure beyond the repeats" in words for words in doubts)
+
+
+def test_a_drift_of_the_sensor_is_told(coax: Vehicle, records: Records) -> None:
+    record = records["swashplate"]
+    found = evaluate([_changed(record, Fx=record["Fx"] + 0.1 / 60.0 * record["time"])], coax)
+    words = [check.words for check in found.results[0].checks]
+    assert any("Fx [N] drifted by 0.1" in told and "takes a steady drift out" in told for told in words)
+    entry, truth = found.card.parameters["linkage_lower"], coax.card.values()["linkage_lower"]
+    assert abs(entry.value - truth) < 4.0 * (entry.sigma or 0.0)
+
+
 def test_a_rotor_at_a_multiple_of_the_sample_rate_is_told(coax: Vehicle) -> None:
     number = np.repeat([1.0, 2.0], 200)
     time = np.arange(400) / 100.0

@@ -44,7 +44,13 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         card: `k_thrust_upper`, `hub_height_upper`, `air_density` are held.
     """
     return tilt_result(
-        (NAME, TITLE, SOURCE), records, card, _deflections, rotor_name="upper", channels=COLUMNS[1 : -len(CHANNELS)]
+        (NAME, TITLE, SOURCE),
+        records,
+        card,
+        _deflections,
+        rotor_name="upper",
+        channels=COLUMNS[1 : -len(CHANNELS)],
+        settings=("bar_alpha", "bar_beta"),
     )
 
 

@@ -88,6 +88,16 @@ def check_drift(value: float, sigma: float, *, span: float, what: str) -> Check:
     return Check(f"{what} {words} over {span:.0f} s" + ("; the fit takes a steady drift out." if sure else "."))
 
 
+def check_line_drift(points: Points, line: Line, place: int, *, what: str) -> Check:
+    """As `check_drift`, where the drift is an unknown of a fit at `place`."""
+    return check_drift(
+        float(line.values[place]),
+        float(np.sqrt(line.covariance[place, place])),
+        span=float(np.ptp(points.time)),
+        what=f"{points.where}: {what}",
+    )
+
+
 def check_vibration(points: Points, channel: str) -> Check:
     """How much samples scatter within a point, and whether a rotor's vibration can look like a steady load.
 

@@ -16,7 +16,7 @@ import numpy as np
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.checks import check_settled, check_structure, check_vibration
+from swashplate.identification.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve
 from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
@@ -92,6 +92,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         checks += [
             check_settled(found, force),
             check_vibration(found, force),
+            check_line_drift(found, line, 2, what=f"{force} [N]"),
             *check_structure(line, level, what=f"{record.name}: {force} [N]"),
         ]
         blowing = np.linspace(found[speed].min(), found[speed].max(), 60)

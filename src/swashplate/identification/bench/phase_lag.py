@@ -19,7 +19,7 @@ from scipy import stats
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.checks import check_settled, check_vibration
+from swashplate.identification.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
 from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
@@ -74,6 +74,10 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         sigmas += list(np.sqrt(noise))
         speeds += [float(found["omega_lower"][column > 0.5].mean()) for column in inside.T]
         checks += [check(found, name) for name in ("Mx", "My") for check in (check_settled, check_vibration)]
+        level = 1e3 * found["motor_lower"] + np.round(found["servo_pitch"], 3)
+        for fitted, name in ((roll, "Mx [N m]"), (pitch, "My [N m]")):
+            checks.append(check_line_drift(found, fitted, 2 * k, what=name))
+            checks += check_structure(fitted, level, what=f"{record.name}: {name}")
         if np.any(sigmas[-k:] > np.radians(3.0)):
             checks.append(Check(f"{record.name}: the lag is uncertain by more than 3 deg at some speed.", good=False))
     omega, lag, sigma = np.array(speeds), np.array(lags), np.array(sigmas)

@@ -17,7 +17,13 @@ import numpy as np
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import COLUMNS as RECORD_COLUMNS
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.checks import check_ground, check_settled, check_structure, check_vibration
+from swashplate.identification.bench.checks import (
+    check_ground,
+    check_line_drift,
+    check_settled,
+    check_structure,
+    check_vibration,
+)
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
 from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
@@ -91,6 +97,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                     leans_on={f"k_{name}_{rotor}": -alone / coaxial**2},
                 ),
             ]
+            checks.append(check_line_drift(found, line, 2, what=f"{channel} [{channel_unit}]"))
             checks += check_structure(
                 line, found[f"motor_{rotor}"], what=f"{rotor} rotor alone, {name} [{channel_unit}]"
             )

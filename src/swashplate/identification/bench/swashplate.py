@@ -41,7 +41,13 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         card: `k_thrust_lower`, `hub_height_lower`, `air_density` are held.
     """
     return tilt_result(
-        (NAME, TITLE, SOURCE), records, card, _deflections, rotor_name="lower", channels=COLUMNS[1 : -len(CHANNELS)]
+        (NAME, TITLE, SOURCE),
+        records,
+        card,
+        _deflections,
+        rotor_name="lower",
+        channels=COLUMNS[1 : -len(CHANNELS)],
+        settings=("servo_roll", "servo_pitch"),
     )
 
 

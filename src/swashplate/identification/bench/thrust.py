@@ -17,8 +17,8 @@ import numpy as np
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.identification.bench.checks import (
-    check_drift,
     check_ground,
+    check_line_drift,
     check_settled,
     check_structure,
     check_vibration,
@@ -63,17 +63,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     for place, (points, record) in enumerate(zip(found, records, strict=True)):
         checks += [check_settled(points, "Fz"), check_vibration(points, "Fz"), check_vibration(points, "Mz")]
         checks.append(check_ground(record, card))
-        span = float(np.ptp(points.time))
-        at = 3 + 2 * place
         for line, what in ((thrust, "-Fz [N]"), (torque, "Mz [N m]")):
-            checks.append(
-                check_drift(
-                    float(line.values[at]),
-                    float(np.sqrt(line.covariance[at, at])),
-                    span=span,
-                    what=f"{points.where}: {what}",
-                )
-            )
+            checks.append(check_line_drift(points, line, 3 + 2 * place, what=what))
     level = np.concatenate(
         [1e6 * i + 1e3 * p["motor_lower"] + p["motor_upper"] for i, p in enumerate(found)]  # equal for repeats only
     )

@@ -18,9 +18,9 @@ from scipy.optimize import least_squares
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.checks import check_settled, check_vibration
+from swashplate.identification.bench.checks import check_drift, check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
-from swashplate.identification.bench.steady import Points, nuisance, steady_points
+from swashplate.identification.bench.steady import Line, Points, nuisance, steady_points
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rotor import TipPathPlane
@@ -47,6 +47,7 @@ class TiltFit:
             shape (3,).
         corrected: measured channels with bias and drift taken out, shape (n, 4).
         residuals: shape (n, 4), bias and drift taken out.
+        drift: of each channel, per minute, and its standard deviation, shape (2, 4).
         tilt: size of the fitted tilt at each point [rad].
     """
 
@@ -56,6 +57,7 @@ class TiltFit:
     by_height: Array
     corrected: Array
     residuals: Array
+    drift: Array
     tilt: Array
 
 
@@ -113,7 +115,13 @@ def fit_tilt(points: Points, steering: Steering, thrust: Array, *, hub_height: f
     fitted = model(values)
     tilt = np.array([abs(complex(*steering(i, values[0], values[1]))) for i in range(n)])
     corrected = without(measured) + (fitted - without(fitted))
-    return TiltFit(values, np.asarray(covariance), by_held(lift=1e-4), by_held(raised=1e-4), corrected, left, tilt)
+    columns = np.column_stack(nuisance(points))
+    unbiased = np.linalg.lstsq(columns, measured - fitted, rcond=None)[0]
+    sure = spread * float(np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1]))
+    drift = np.array([unbiased[1], sure])
+    return TiltFit(
+        values, np.asarray(covariance), by_held(lift=1e-4), by_held(raised=1e-4), corrected, left, drift, tilt
+    )
 
 
 def _loads(plane: TipPathPlane, thrust: float, hub_height: float, stiffness: float) -> tuple[float, ...]:
@@ -182,9 +190,20 @@ def torques(tilt: Array, *, stiffness: float, thrust: float, hub_height: float) 
     return flapping + tilting, flapping, tilting
 
 
-def _checks(points: Points, fit: TiltFit) -> list[Check]:
-    """Settling, and the residuals against what the sensor's own noise could leave."""
+def _checks(points: Points, fit: TiltFit, setting: Array) -> list[Check]:
+    """Settling, vibration, drift, repeats, and the residuals against what the sensor's own noise could leave.
+
+    Args:
+        setting: what was set at each point, equal for repeats, shape (n,).
+    """
     checks = [check(points, name) for name in ("Fx", "Mx") for check in (check_settled, check_vibration)]
+    span, freedom = float(np.ptp(points.time)), len(points) - 3
+    for i, (name, unit) in enumerate(zip(CHANNELS, ("N", "N", "N m", "N m"), strict=True)):
+        value, sigma = (float(number) for number in fit.drift[:, i])
+        what, left = f"{points.where}: {name} [{unit}]", fit.residuals[:, i]
+        checks.append(check_drift(value, sigma, span=span, what=what))
+        line = Line(np.zeros(0), np.zeros((0, 0)), left, float(left.std()), freedom)
+        checks += check_structure(line, setting, what=what)
     force, moment = (np.sqrt(np.mean(fit.residuals[:, pair] ** 2)) for pair in ([0, 1], [2, 3]))
     checks.append(Check(f"{points.where}: residuals {1e3 * force:.2g} mN and {1e3 * moment:.2g} N mm."))
     curvature = np.polyfit(fit.tilt, np.sum(fit.residuals[:, 2:] * np.sign(fit.corrected[:, 2:]), axis=1), 2)[0]
@@ -207,6 +226,7 @@ def tilt_result(
     *,
     rotor_name: str,
     channels: Sequence[str],
+    settings: tuple[str, str],
 ) -> BenchResult:
     """Linkage and hub stiffness of one rotor from its record; the phase lag is a finding.
 
@@ -217,6 +237,7 @@ def tilt_result(
         deflections: what steers the rotor.
         rotor_name: "upper" or "lower".
         channels: that the steady points need beside the loads.
+        settings: the two of them that are set.
 
     Raises:
         BenchError: as `fit_tilt`, or for more than one record.
@@ -235,6 +256,7 @@ def tilt_result(
     lag = card[f"k_zeta_{rotor_name}"] * float(speed.mean()) + card[f"o_zeta_{rotor_name}"]
     start = np.array([card[names[0]], lag, card[names[1]]])
     fit = fit_tilt(points, deflections(points), thrust, hub_height=card[height], start=start)
+    setting = np.round(points[settings[0]], 3) + 1e3 * np.round(points[settings[1]], 3)
     pair, leans = [0, 2], {factor: fit.by_thrust / card[factor], height: fit.by_height / card[height]}
     return BenchResult(
         *module,
@@ -242,7 +264,7 @@ def tilt_result(
         fit.values[pair],
         fit.covariance[np.ix_(pair, pair)],
         (record.name,),
-        tuple(_checks(points, fit)),
+        tuple(_checks(points, fit, setting)),
         tuple(figure_6(fit, float(thrust.mean()), hub_height=card[height], rotor_name=rotor_name)),
         leans_on={name: slope[pair] for name, slope in leans.items()},
         findings=(
