@@ -70,6 +70,7 @@ def test_the_plan_says_what_to_measure_and_how_often() -> None:
     document = json.loads(swash("bench", "plan", "--only", "supply", "--json").out)
     assert document["parameters"][0]["name"] == "k_drive_voltage"
     assert "no such procedure" in one_message(swash("bench", "plan", "--only", "weighing"))
+    assert "thrust_loss: is for records that exist" in one_message(swash("bench", "plan", "--only", "thrust_loss"))
 
 
 def test_repeats_sharpen_what_comes_out(tmp_path: Path) -> None:
