@@ -13,7 +13,8 @@ from swashplate.errors import BenchError, CardError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.identification.bench import checks, fuselage_drag, lag, speed_map, steady, supply
 from swashplate.identification.bench.evaluate import PROCEDURES, Bench, evaluate, hover_commands, schedules
-from swashplate.identification.bench.result import BenchResult, Check
+from swashplate.identification.bench.joint import Joint
+from swashplate.identification.bench.result import BenchResult, Check, Finding
 from swashplate.simulation.bench import Setup, virtual_bench
 from swashplate.vehicles.card import parse_card
 from swashplate.vehicles.vehicle import Vehicle
@@ -119,6 +120,38 @@ def test_two_slopes_that_disagree_widen_their_mean() -> None:
 def test_a_result_is_asked_by_name() -> None:
     result = BenchResult("p", "t", "s", ("a", "b"), np.array([1.0, 2.0]), np.diag([4.0, 9.0]), ())
     assert result["b"] == (2.0, 3.0)
+
+
+def _result(procedure: str, values: dict[str, float], variance: float, **leans: float) -> BenchResult:
+    size = len(values)
+    return BenchResult(
+        procedure,
+        "t",
+        "s",
+        tuple(values),
+        np.array(list(values.values())),
+        variance * np.eye(size),
+        ("r.csv",),
+        leans_on={name: np.full(size, slope) for name, slope in leans.items()},
+        findings=(Finding("f", 1.0, 0.3, "1", leans),),
+    )
+
+
+def test_what_is_held_carries_its_error_and_a_second_measurement_moves_what_leant_on_it(coax: Vehicle) -> None:
+    card = coax.card.with_values({"hub_height_lower": 0.103}, sigma=0.5)
+    joint = Joint(card)
+    joint.add(_result("one", {"drag_x": 1.0}, 1.0))
+    second, _ = joint.add(_result("two", {"drag_y": 5.0}, 0.1, drag_x=2.0, hub_height_lower=3.0))
+    assert joint.measured == ("drag_x", "drag_y")
+    assert joint.held == ["hub_height_lower"]
+    np.testing.assert_allclose(joint.among(("drag_x", "drag_y")), [[1.0, 2.0], [2.0, 0.1 + 4.0 + 9.0 * 0.25]])
+    assert joint.among(("hub_height_lower", "drag_y"))[0, 1] == pytest.approx(3.0 * 0.25)
+    assert second.findings[0].sigma == pytest.approx((0.09 + 4.0 + 9.0 * 0.25) ** 0.5)
+    # Measured again, 1 higher and as well: the mean moves by a half, and what leant on it by twice that.
+    (told,) = joint.add(_result("three", {"drag_x": 2.0}, 1.0))[1]
+    assert (joint.values["drag_x"], joint.values["drag_y"]) == pytest.approx((1.5, 6.0))
+    np.testing.assert_allclose(joint.among(("drag_x", "drag_y")), [[0.5, 1.0], [1.0, 0.1 + 2.0 + 9.0 * 0.25]])
+    assert told.words == f"drag_x: three and one are {0.5**0.5:+.1f} sigmas apart."
 
 
 def _clip(record: BenchRecord) -> BenchRecord:
