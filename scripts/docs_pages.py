@@ -354,6 +354,26 @@ def thresholds_text() -> str:
     return _table(("verdict", "condition"), rows)
 
 
+def bench_columns_text() -> str:
+    """The columns of a bench record."""
+    from swashplate.flights.bench_record import COLUMNS
+
+    return _table(
+        ("column", "unit", "meaning and sign"), [(f"`{n}`", unit, words) for n, (unit, words) in COLUMNS.items()]
+    )
+
+
+def bench_procedures_text() -> str:
+    """The bench's procedures with what they need."""
+    from swashplate.identification.bench.evaluate import PROCEDURES
+
+    rows = [
+        (f"`{name}`", module.TITLE, ", ".join(f"`{column}`" for column in module.COLUMNS), module.SOURCE)
+        for name, module in PROCEDURES.items()
+    ]
+    return _table(("procedure", "measures", "needs the columns", "by"), rows)
+
+
 GENERATED: Mapping[str, Callable[[], str]] = {
     "commands": commands_text,
     "parameters": parameters_text,
@@ -361,6 +381,8 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "choices": choices_text,
     "channels": channels_text,
     "thresholds": thresholds_text,
+    "bench_columns": bench_columns_text,
+    "bench_procedures": bench_procedures_text,
 }
 
 

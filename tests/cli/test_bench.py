@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import one_message, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
+from swashplate.flights.bench_record import BenchRecord, write_record
 from swashplate.identification.bench.evaluate import MEASURED, evaluate
 from swashplate.identification.bench.plan import plan, planned
 from swashplate.reporting.bench import compose_bench
@@ -32,7 +37,7 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_records_become_a_card_and_a_report(records: Path, tmp_path: Path) -> None:
     done = swash("bench", records, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
     assert (done.code, done.err) == (0, "")
-    assert "bench: drive_steps from steps_lower.csv, steps_upper.csv" in done.out
+    assert "bench: drive_steps from steps_upper.csv" in done.out
     assert "Kept as published, no record: k_drive_voltage" in done.out
     card = sp.vehicle(tmp_path / "card.toml").card  # a vehicle like any other
     entry = card.parameters["tau_drive_upper"]
@@ -65,6 +70,7 @@ def test_the_plan_says_what_to_measure_and_how_often() -> None:
     document = json.loads(swash("bench", "plan", "--only", "supply", "--json").out)
     assert document["parameters"][0]["name"] == "k_drive_voltage"
     assert "no such procedure" in one_message(swash("bench", "plan", "--only", "weighing"))
+    assert "thrust_loss: is for records that exist" in one_message(swash("bench", "plan", "--only", "thrust_loss"))
 
 
 def test_repeats_sharpen_what_comes_out(tmp_path: Path) -> None:
@@ -81,7 +87,7 @@ def test_the_report_shows_every_procedure_with_its_figures() -> None:
     coax = sp.vehicle("coax")
     report = compose_bench(evaluate(virtual_bench(coax, planned(coax), seed=2), coax))
     titles = [section.title for section in report.sections]
-    assert len(titles) == 14  # the card, twelve procedures, what it was made with
+    assert len(titles) == 14  # the card, the twelve procedures of the plan, what it was made with
     assert report.picture is not None
     assert [key.words for key in report.picture.keys] == ["total", "flapping", "tilt of the thrust"]
     assert len(figures_of(report)) > 18
@@ -113,10 +119,90 @@ def test_a_bad_record_ends_without_a_card(records: Path, tmp_path: Path, spoil: 
     assert [path.name for path in tmp_path.iterdir()] == ["records"]
 
 
+def _cells(change: Callable[[dict[str, np.ndarray]], None]) -> Callable[[BenchRecord], BenchRecord]:
+    """A record with its columns changed in place."""
+
+    def spoiled(record: BenchRecord) -> BenchRecord:
+        channels = {name: values.copy() for name, values in record.channels.items()}
+        change(channels)
+        return replace(record, channels=channels)
+
+    return spoiled
+
+
+@pytest.mark.parametrize(
+    ("procedure", "file", "spoil", "message"),
+    [
+        ("thrust", "sweep_lower.csv", lambda c: c.pop("Mz"), "Mz: the column is missing"),
+        ("thrust", "sweep_lower.csv", lambda c: c.update(Fz=-c["Fz"]), "Turn the sign of Fz"),
+        ("thrust", "sweep_upper.csv", lambda c: c.update(Mz=-c["Mz"]), "Turn the sign of Mz"),
+        ("thrust", "sweep_lower.csv", lambda c: c.update(Fz=np.maximum(c["Fz"], -4.0)), "the sensor is saturated"),
+        (
+            "thrust",
+            "sweep_upper.csv",
+            lambda c: c.update(omega_upper=0.4 * c["omega_upper"]),
+            "did not reach its speed",
+        ),
+        (
+            "thrust",
+            "sweep_upper.csv",
+            lambda c: c.update({name: values[:1200] for name, values in c.items()}),
+            "expected at least 5",
+        ),
+        ("bar_linkage", "bar_linkage.csv", lambda c: c.update(Fy=-c["Fy"]), "Turn the sign of the lateral forces"),
+    ],
+)
+def test_what_spoils_a_measurement_ends_in_words_without_a_card(
+    tmp_path: Path, procedure: str, file: str, spoil: Callable[[dict[str, np.ndarray]], None], message: str
+) -> None:
+    """Every way of the issue, from files as a user has them: exit code 2, one message, neither card nor report."""
+    folder = tmp_path / "records"
+    folder.mkdir()
+    for record in _bench_of(procedure):
+        write_record(_cells(spoil)(record) if record.name == file else record, folder / record.name)
+    done = swash("bench", folder, "--out", tmp_path / "card.toml", "--report", tmp_path / "report.html")
+    words = one_message(done)
+    assert file in words
+    assert message in words
+    assert [path.name for path in tmp_path.iterdir()] == ["records"]
+
+
+@cache
+def _bench_of(procedure: str) -> tuple[BenchRecord, ...]:
+    coax = sp.vehicle("coax")
+    return virtual_bench(coax, planned(coax, [procedure]), seed=4)
+
+
+def test_real_bench_files_are_evaluated_and_shown(shared_data: Path, tmp_path: Path) -> None:
+    folder = shared_data / "coax56"
+    card = tmp_path / "card.toml"
+    done = swash("bench", folder / "bench_input_to_rpm.mat", folder / "bench_voltage_to_rpm.mat", "--out", card)
+    assert (done.code, done.err) == (0, "")
+    assert "Left out: upper at 0.8: saturation" in done.out
+    assert "k_drive_voltage of the lower rotor by itself" in done.out
+    assert set(read_card(card).correlations) <= {"k_drive_upper", "k_drive_lower", "o_drive_upper", "o_drive_lower"}
+    rig = swash("bench", shared_data / "coax_rig", "--report", tmp_path / "rig.html")
+    assert (rig.code, rig.err) == (0, "")
+    assert "loses at equal power" in rig.out
+    assert "Thrust that xoar 18-160-6.5 over xoar" in (tmp_path / "rig.html").read_text(encoding="utf-8")
+    assert "is a parameter of the card" in one_message(swash("bench", shared_data / "coax_rig", "--out", card))
+    assert "is no bench record" in one_message(swash("bench", folder / "flight_2011-08-01_vertical.mat"))
+    shown = swash("inspect", folder / "bench_input_to_rpm.mat")
+    assert "bench record for speed_map; 11 averaged points without a time base" in shown.out
+    told = json.loads(swash("inspect", folder / "stabilizer_bar_orientation.mat", "--json").out)
+    assert (told["rows"], told["rate"], told["procedures"]) == (1000, None, ["bar_orientation"])
+
+
+def test_inspect_shows_a_record_of_the_virtual_bench(records: Path) -> None:
+    shown = swash("inspect", records / "fan_front.csv")
+    assert "bench record for fuselage_drag" in shown.out
+    assert "anemometer: speed of the air from the front" in shown.out
+
+
 def test_places_that_cannot_be_written_to_are_found_first(records: Path, tmp_path: Path) -> None:
     assert "expected .toml" in one_message(swash("bench", records, "--out", tmp_path / "card.json"))
     assert "the folder does not exist" in one_message(swash("bench", records, "--report", tmp_path / "no" / "r.html"))
-    assert "is not a folder" in one_message(swash("bench", tmp_path / "nothing"))
+    assert "is not a folder and not a file" in one_message(swash("bench", tmp_path / "nothing"))
 
 
 def test_a_bench_card_is_the_prior_of_a_flight(records: Path, simulated: Path, tmp_path: Path) -> None:

@@ -11,10 +11,11 @@ import pytest
 import swashplate as sp
 from swashplate.errors import BenchError, CardError
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench import fuselage_drag, lag, speed_map, steady, supply
-from swashplate.identification.bench.evaluate import PROCEDURES, evaluate, hover_commands, schedules
-from swashplate.identification.bench.result import BenchResult
-from swashplate.simulation.bench import virtual_bench
+from swashplate.identification.bench import checks, fuselage_drag, lag, speed_map, steady, supply
+from swashplate.identification.bench.evaluate import PROCEDURES, Bench, evaluate, hover_commands, schedules
+from swashplate.identification.bench.joint import Joint
+from swashplate.identification.bench.result import BenchResult, Check, Finding
+from swashplate.simulation.bench import Setup, virtual_bench
 from swashplate.vehicles.card import parse_card
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -77,7 +78,7 @@ def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
     level = np.repeat(np.linspace(0.0, 1.0, 8), 2)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(16)
     straight, bent = (
-        steady.check_structure(
+        checks.check_structure(
             steady.fit_line([level, np.ones(16)], level + c * level**2 + noise, where="r"), level, what="y"
         )
         for c in (0.0, 0.1)
@@ -92,8 +93,8 @@ def test_a_bend_and_a_point_that_still_moves_are_told() -> None:
         for noise_of in [0.1 * np.random.default_rng(2).standard_normal(400)]
         for c in (0.0, 0.5)
     )
-    assert steady.check_settled(still, "y").good
-    assert not steady.check_settled(moving, "y").good
+    assert checks.check_settled(still, "y").good
+    assert not checks.check_settled(moving, "y").good
 
 
 @pytest.mark.parametrize(
@@ -121,6 +122,38 @@ def test_a_result_is_asked_by_name() -> None:
     assert result["b"] == (2.0, 3.0)
 
 
+def _result(procedure: str, values: dict[str, float], variance: float, **leans: float) -> BenchResult:
+    size = len(values)
+    return BenchResult(
+        procedure,
+        "t",
+        "s",
+        tuple(values),
+        np.array(list(values.values())),
+        variance * np.eye(size),
+        ("r.csv",),
+        leans_on={name: np.full(size, slope) for name, slope in leans.items()},
+        findings=(Finding("f", 1.0, 0.3, "1", leans),),
+    )
+
+
+def test_what_is_held_carries_its_error_and_a_second_measurement_moves_what_leant_on_it(coax: Vehicle) -> None:
+    card = coax.card.with_values({"hub_height_lower": 0.103}, sigma=0.5)
+    joint = Joint(card)
+    joint.add(_result("one", {"drag_x": 1.0}, 1.0))
+    second, _ = joint.add(_result("two", {"drag_y": 5.0}, 0.1, drag_x=2.0, hub_height_lower=3.0))
+    assert joint.measured == ("drag_x", "drag_y")
+    assert joint.held == ["hub_height_lower"]
+    np.testing.assert_allclose(joint.among(("drag_x", "drag_y")), [[1.0, 2.0], [2.0, 0.1 + 4.0 + 9.0 * 0.25]])
+    assert joint.among(("hub_height_lower", "drag_y"))[0, 1] == pytest.approx(3.0 * 0.25)
+    assert second.findings[0].sigma == pytest.approx((0.09 + 4.0 + 9.0 * 0.25) ** 0.5)
+    # Measured again, 1 higher and as well: the mean moves by a half, and what leant on it by twice that.
+    (told,) = joint.add(_result("three", {"drag_x": 2.0}, 1.0))[1]
+    assert (joint.values["drag_x"], joint.values["drag_y"]) == pytest.approx((1.5, 6.0))
+    np.testing.assert_allclose(joint.among(("drag_x", "drag_y")), [[0.5, 1.0], [1.0, 0.1 + 2.0 + 9.0 * 0.25]])
+    assert told.words == f"drag_x: three and one are {0.5**0.5:+.1f} sigmas apart."
+
+
 def _clip(record: BenchRecord) -> BenchRecord:
     return _changed(record, Fz=np.maximum(record["Fz"], -3.0))
 
@@ -139,6 +172,10 @@ def _flip(*names: str) -> Callable[[BenchRecord], BenchRecord]:
 
 def _swap_speeds(record: BenchRecord) -> BenchRecord:
     return _changed(record, omega_lower=record["omega_upper"], omega_upper=record["omega_lower"])
+
+
+def _swap(*pairs: tuple[str, str]) -> Callable[[BenchRecord], BenchRecord]:
+    return lambda record: _changed(record, **{a: record[b] for one in pairs for a, b in (one, one[::-1])})
 
 
 def _without(name: str) -> Callable[[BenchRecord], BenchRecord]:
@@ -177,15 +214,27 @@ def _not_removed(record: BenchRecord) -> BenchRecord:
         ("phase_lag", _short, "points for"),
         ("swashplate", _flip("Fx", "Fy"), "Fx, Fy: forces lean against the deflection"),
         ("swashplate", _flip("Mx", "My"), "Mx, My: moments point against the deflection"),
+        ("swashplate", _flip("Fy"), "Fy: forces lean against the deflection"),
+        ("swashplate", _flip("servo_pitch"), "against the deflection"),
+        ("swashplate", _swap(("Mx", "My")), "My: does not follow the deflection"),
+        ("bar_linkage", _flip("Fy"), "Fy: forces lean against the deflection"),
+        ("bar_linkage", _flip("bar_alpha"), "against the deflection"),
+        ("bar_linkage", _swap_speeds, "omega_upper, omega_lower: the rotors' speeds are"),
         ("swashplate", _weak, "Mx, My: moments are smaller than the tilted thrust"),
         ("swashplate", _short, "expected at least 8"),
         ("fan_front", _flip("Fx"), "Fx: grows with airspeed_x"),
+        ("fan_front", _swap(("Fx", "Fy")), "Fx: grows with airspeed_x less than Fy does"),
         ("fan_front", lambda r: _changed(r, omega_lower=r["omega_lower"] + 100.0), "a rotor turns"),
         ("fan_front", lambda r: _changed(r, airspeed_x=0.0 * r["time"]), "varies no single stream"),
         ("single_upper", _not_removed, "rotor_removed"),
         ("supply", lambda r: _changed(r, voltage=12.0 + 0.0 * r["time"]), "vary the supply"),
         ("steps_upper", lambda r: _changed(r, motor_upper=0.5 + 0.0 * r["time"]), "steps no motor, expected one"),
-        ("steps_upper", lambda r: _changed(r, omega_upper=200.0 + r["motor_upper"]), "no first-order response"),
+        ("steps_upper", _swap_speeds, "the rotors' speeds are"),
+        ("steps_upper", _flip("omega_upper"), "omega_upper: is -"),
+        ("steps_upper", _flip("motor_upper"), "motor_upper: is -"),
+        ("steps_upper", lambda r: _changed(r, omega_upper=200.0 + r["motor_upper"]), "omega_upper: moves by"),
+        ("steps_upper", lambda r: _changed(r, omega_upper=421.0 * r["motor_upper"]), "no first-order response"),
+        ("multisine_upper", _swap_speeds, "the rotors' speeds are"),
         ("multisine_upper", _short, "whole periods"),
         ("servo_steps_pitch", lambda r: _changed(r, servo_pitch=0.0 * r["time"]), "steps no servo"),
         ("bar_motion", lambda r: _changed(r, phi=0.0 * r["time"]), "phi: moves by 0 rad"),
@@ -200,11 +249,74 @@ def test_a_record_that_contradicts_what_it_measures_is_refused(
     assert message in str(error.value)
 
 
+def _thrust_checks(coax: Vehicle, setup: Setup) -> tuple[Bench, list[Check]]:
+    wanted = [s for s in schedules(hover_commands(coax.card.values())) if s.name.startswith("sweep")]
+    made = virtual_bench(coax, [replace(s, procedures=("thrust",)) for s in wanted], setup=setup, seed=2)
+    found = evaluate(made, coax)
+    return found, [check for check in found.results[0].checks if not check.good]
+
+
+def test_ground_effect_is_told_by_the_height_and_by_nothing_else(coax: Vehicle) -> None:
+    """At one height it scales thrust alike: residuals stay straight, the factor is too large by what is told."""
+    found, doubts = _thrust_checks(coax, Setup(height=0.2))
+    assert len(doubts) == 2
+    assert all("0.2 m above the floor, ground effect adds 4.8 % to the thrust" in check.words for check in doubts)
+    gained = found.card.values()["k_thrust_lower"] / coax.card.values()["k_thrust_lower"]
+    assert gained == pytest.approx(1.0 / (1.0 - (0.171 / 0.8) ** 2), abs=2e-3)
+    assert _thrust_checks(coax, Setup(height=2.0))[1] == []
+    free, doubts = _thrust_checks(coax, Setup())
+    assert doubts == []
+    assert any("does not say how high" in check.words for check in free.results[0].checks)
+
+
+def test_vibration_is_told(coax: Vehicle) -> None:
+    assert _thrust_checks(coax, Setup())[1] == []
+    found = _thrust_checks(coax, Setup())[0].results[0].checks
+    assert any("with the rotors off: the rest is vibration" in check.words for check in found)
+    strong = _thrust_checks(coax, Setup(force_vibration=4.0))[1]
+    assert any("as much as what is measured" in check.words for check in strong)
+
+
+def test_a_moment_that_bends_with_the_tilt_is_told(coax: Vehicle, records: Records) -> None:
+    """A hub that stiffens by a tenth at the largest deflection: no straight line of eq. 18 fits it."""
+    record = records["swashplate"]
+    stiffer = 1.0 + 0.1 * (np.hypot(record["servo_roll"], record["servo_pitch"]) / 0.75) ** 2
+    for change, good in ((1.0 + 0.0 * stiffer, True), (stiffer, False)):
+        found = evaluate([_changed(record, Mx=change * record["Mx"], My=change * record["My"])], coax)
+        doubts = [check.words for check in found.results[0].checks if not check.good]
+        assert (doubts == []) == good
+    assert any("My [N m]: the residuals have a structure beyond the repeats" in words for words in doubts)
+
+
+def test_a_drift_of_the_sensor_is_told(coax: Vehicle, records: Records) -> None:
+    record = records["swashplate"]
+    found = evaluate([_changed(record, Fx=record["Fx"] + 0.3 / 60.0 * record["time"])], coax)
+    words = [check.words for check in found.results[0].checks]
+    assert any("Fx [N] drifted by 0.3" in told and "takes a steady drift out" in told for told in words)
+    entry, truth = found.card.parameters["linkage_lower"], coax.card.values()["linkage_lower"]
+    assert abs(entry.value - truth) < 4.0 * (entry.sigma or 0.0)
+
+
+def test_a_rotor_at_a_multiple_of_the_sample_rate_is_told(coax: Vehicle) -> None:
+    number = np.repeat([1.0, 2.0], 200)
+    time = np.arange(400) / 100.0
+    for speed, good in ((2.0 * np.pi * 100.1, False), (240.0, True)):
+        noise = np.random.default_rng(1).standard_normal(400)
+        channels = {"time": time, "point": number, "Fz": 10.0 * number + noise, "omega_upper": speed + 0.0 * time}
+        found = steady.steady_points(BenchRecord("r", ("thrust",), channels), ("Fz", "omega_upper"))
+        check = checks.check_vibration(found, "Fz")
+        assert check.good == good
+        assert ("looks like a steady load" in check.words) != good
+
+
 def test_what_has_no_record_keeps_the_published_value(coax: Vehicle, records: Records) -> None:
     found = evaluate([records["fan_front"], records["supply"]], coax)
     assert set(found.names) == {"drag_x", "k_drive_voltage"}
     assert "tau_f_lower" in found.kept
-    assert found.card.parameters["tau_f_lower"] == coax.card.parameters["tau_f_lower"]
+    kept, published = (card.parameters["tau_f_lower"] for card in (found.card, coax.card))
+    assert replace(kept, note="") == replace(published, note="")
+    assert kept.note.endswith("kept as published: the bench has no record of it")
+    assert list(found.card.parameters) == list(coax.card.parameters)
     assert "k_drive_voltage" in repr(found)
 
 

@@ -124,10 +124,14 @@ def test_a_path_that_exists_wins(cache: Path) -> None:
     assert datasets.locate("toy/log", registry=_registry()) == Path("toy/log")
 
 
+PUBLIC = {"coax56": "mfaessle/coax-control", "coax_rig": "Aeronavics/coax-testrig"}
+
+
 def test_every_registered_address_is_pinned_to_a_commit() -> None:
-    for dataset in datasets.REGISTRY.values():
+    for data_set, dataset in datasets.REGISTRY.items():
         for entry in dataset.files.values():
             host, owner, name, commit = entry.address.removeprefix("https://").split("/")[:4]
-            assert (host, f"{owner}/{name}") == ("raw.githubusercontent.com", "mfaessle/coax-control")
+            assert (host, f"{owner}/{name}") == ("raw.githubusercontent.com", PUBLIC[data_set])
+            assert not set(entry.address) & set(" #+")  # quoted: a fragment or a space would fetch something else
             assert len(bytes.fromhex(commit)) == 20
             assert len(bytes.fromhex(entry.sha256)) == 32

@@ -9,7 +9,9 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import BenchError, UnitError
-from swashplate.flights.bench_record import BenchRecord, read_record, read_records, write_record
+from swashplate.flights.bench_files import read_records
+from swashplate.flights.bench_record import BenchRecord, read_record, write_record
+from swashplate.identification.bench.evaluate import evaluate
 from swashplate.simulation.bench import Schedule, Setup, points, repeated, virtual_bench
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -184,7 +186,24 @@ def test_a_wrong_unit_a_wrong_density_and_an_empty_folder_are_refused(tmp_path: 
     with pytest.raises(BenchError, match="air_density: is 'thin'"):
         read_record(path).number("air_density", 1.2)
     path.rename(tmp_path / "r.txt")
-    with pytest.raises(BenchError, match=r"holds no \.csv file"):
+    with pytest.raises(BenchError, match=r"holds no \.csv or \.mat file"):
         read_records(tmp_path)
-    with pytest.raises(BenchError, match="is not a folder"):
+    with pytest.raises(BenchError, match="is not a folder and not a file"):
         read_records(path)
+
+
+def test_a_table_of_averaged_points_needs_no_time(coax: Vehicle, tmp_path: Path) -> None:
+    """One line a point: the speed map of made points comes back, and what needs samples is refused."""
+    levels = np.repeat(np.arange(0.4, 0.76, 0.05), 2)
+    lines = [f"{u:.2f},{u:.2f},{400 * u:.4f},{430 * u - 2:.4f},12.22" for u in levels]
+    heads = "motor_lower [1],motor_upper [1],omega_upper [rad/s],omega_lower [rad/s],voltage [V]"
+    path = tmp_path / "map.csv"
+    path.write_text("\n".join(["# procedure: speed_map", "# averaged: yes", heads, *lines]))
+    (record,) = read_records(path, tmp_path, path)  # named three times, read once
+    found = evaluate([record], coax).card.values()
+    assert (found["k_drive_upper"], found["o_drive_lower"]) == pytest.approx((400.0, -2.0), abs=1e-3)
+    with pytest.raises(BenchError, match=r"map\.csv: has no time base: it is a table of points"):
+        _ = record.dt
+    path.write_text(path.read_text().replace("speed_map", "drive_steps"))
+    with pytest.raises(BenchError, match="drive_steps needs samples at a fixed rate"):
+        evaluate(read_records(path), coax)

@@ -15,7 +15,7 @@ _EVALUATE = "evaluate"
 
 
 class RecordsFirst(TyperGroup):
-    """A group that takes `swash bench RECORDS_DIR` as `swash bench evaluate RECORDS_DIR`."""
+    """A group that takes `swash bench RECORDS...` as `swash bench evaluate RECORDS...`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         known = {*self.commands, "--help", "-h"}
@@ -37,33 +37,46 @@ _Only = Annotated[
 
 @app.command(_EVALUATE)
 def evaluate(
-    records: Annotated[Path, typer.Argument(metavar="RECORDS_DIR", help="Folder with one CSV file a record.")],
+    records: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RECORDS",
+            help="Folder with one file a record, files, or a data set's name (coax_rig, coax56/bench_input_to_rpm).",
+        ),
+    ],
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The card (.toml).")] = None,
     report: Annotated[Path | None, typer.Option("--report", metavar="FILE", help="The report (.html).")] = None,
     vehicle: _Vehicle = "coax",
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Evaluate every record of a folder; a contradiction in one of them ends without a card.
+    """Evaluate records; a contradiction in one of them ends without a card.
 
     The card has value, standard deviation, source files and procedure of what was measured, and the published value
-    of what was not.
+    of what was not. Records are this project's CSV files, the CoaX-56's bench tables (.mat) or propeller-rig runs.
     """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, console, progress
-    from swashplate.cli.tables import table
-    from swashplate.flights.bench_record import read_records
+    from swashplate.flights.bench_files import read_records
     from swashplate.vehicles.catalogue import vehicle as find
 
     _check_places(out, report)
     aircraft = find(vehicle)
     with progress(quiet=quiet or json) as line:
         line.say("reading records")
-        read = read_records(records)
+        read = read_records(*records)
         line.say("evaluating the bench")
         from swashplate.identification.bench.evaluate import evaluate as run
 
         found = run(read, aircraft)
+        if out is not None and not found.names:
+            from swashplate.reporting.words import listed
+
+            raise SwashError(
+                f"nothing in {listed([record.name for record in read])} is a parameter of the card.",
+                channel="--out",
+                hint="Leave --out away; the findings are printed, and stand in the report.",
+            )
         if report is not None:
             line.say("writing the report")
             from swashplate.reporting.bench import bench_report
@@ -71,30 +84,35 @@ def evaluate(
             bench_report(found, path=report)
         if out is not None:
             write_text(out, found.card.to_toml())
-    measured = {name: found.card.parameters[name] for name in found.names}
     doubts = [check.words for result in found.results for check in result.checks if not check.good]
     doubts += [check.words for check in found.disagreements if not check.good]
+    doubts = list(dict.fromkeys(doubts))
     if json:
         document = {
-            "parameters": {name: vars(entry) for name, entry in measured.items()},
+            "parameters": {name: vars(found.card.parameters[name]) for name in found.names},
             "kept": found.kept,
             "doubts": doubts,
-            "findings": [finding for result in found.results for finding in result.findings],
+            "left_out": [words for result in found.results for words in result.left_out],
+            "findings": [
+                {"name": f.name, "value": f.value, "sigma": f.sigma, "unit": f.unit}
+                for result in found.results
+                for f in result.findings
+            ],
+            "tables": [vars(rows) for result in found.results for rows in result.tables],
         }
         typer.echo(as_json(document))
     elif not quiet:
-        published = found.published.parameters
-        rows = [
-            (name, f"{published[name].value:.5g}", f"{e.value:.5g}", f"{2.0 * (e.sigma or 0.0):.2g}", e.unit, e.source)
-            for name, e in measured.items()
-        ]
-        made = table(("parameter", "published", "measured", "+- 2 sigma", "unit", "source"), rows)
-        made.columns[4].justify = made.columns[5].justify = "left"
-        console().print(made)
+        from swashplate.cli.bench_tables import bench_tables
+
+        for made in bench_tables(found):
+            console().print(made)
         lines = [f"! {words}" for words in doubts]
-        lines += [f"Kept as published, no record: {', '.join(found.kept)}"] if found.kept else []
-        lines += [f"Card:   {out or 'not written (give --out FILE)'}"]
-        lines += [f"Report: {report or 'not written (give --report FILE)'}"]
+        lines += [f"Left out: {words}" for result in found.results for words in result.left_out]
+        if found.names and found.kept:
+            lines.append(f"Kept as published, no record: {', '.join(found.kept)}")
+        if found.names:
+            lines.append(f"Card:   {out or 'not written (give --out FILE)'}")
+        lines.append(f"Report: {report or 'not written (give --report FILE)'}")
         typer.echo("\n" + "\n".join(lines))
 
 

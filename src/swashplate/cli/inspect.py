@@ -19,13 +19,27 @@ def inspect(
 ) -> None:
     """Show a log's channels, units, rates, gaps and frequency sweeps, and the problems in it; nothing is changed.
 
+    Of a record of the test bench it shows the columns and the procedures that it is for.
+
     A log that is itself damaged (cut off, bytes lost, its clock set back) is shown as far as it could be read, and ends
     with an error.
     """
     from swashplate.cli.console import as_json, console
     from swashplate.cli.reading import read
+    from swashplate.flights.bench_files import is_bench, read_bench
+    from swashplate.flights.datasets import locate
     from swashplate.flights.inspect import inspect as look
 
+    if is_bench(place := locate(flight)):
+        from swashplate.cli.bench_tables import record_as_dict, record_table
+
+        record = read_bench(place)
+        if json:
+            typer.echo(as_json(record_as_dict(record)))
+        elif not quiet:
+            console().print(record_table(record))
+            typer.echo(f"\nEvaluate it with `swash bench {flight}`.")
+        return
     found = look(read(flight, how=Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)))
     if json:
         typer.echo(as_json(found.as_dict()))

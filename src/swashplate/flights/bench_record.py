@@ -8,7 +8,8 @@
 
 Lines before the column heads are `# key: value`: `procedure` is needed; `air_density` [kg/m^3], `rotor_removed` (upper
 or lower) and anything else may follow. `point` numbers the measuring points: samples of one number are one steady
-measurement, zero is "on the way". Forces and moments act on the vehicle at its CG in body axes (forward-right-down),
+measurement, zero is "on the way". With `# averaged: yes` every line is one measuring point, averaged already; it then
+needs neither `point` nor `time`. Forces and moments act on the vehicle at its CG in body axes (forward-right-down),
 tared so that the weight is not in them: a rotor's thrust is a negative Fz.
 """
 
@@ -53,6 +54,12 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "theta": ("rad", "pitch angle of the fuselage (motion capture)"),
     "eta_bar": ("rad", "roll angle of the bar against the local level (motion capture)"),
     "zeta_bar": ("rad", "pitch angle of the bar against the local level (motion capture)"),
+    "normal_x": ("1", "unit normal of the bar's plane, first component (motion capture)"),
+    "normal_y": ("1", "unit normal of the bar's plane, second component"),
+    "normal_z": ("1", "unit normal of the bar's plane, third component"),
+    "pwm": ("s", "pulse width of the motors' command (propeller rig)"),
+    "thrust": ("N", "thrust of everything that turns (propeller rig)"),
+    "power": ("W", "electrical power of everything that turns (propeller rig)"),
 }
 """Every column that a record may have, with the unit inside; others are ignored."""
 
@@ -94,8 +101,23 @@ class BenchRecord:
         return self.channels[name]
 
     @property
+    def averaged(self) -> bool:
+        """Whether every row is one measuring point instead of a sample."""
+        return self.header.get("averaged", "no").lower() in ("yes", "true", "1")
+
+    @property
     def dt(self) -> float:
-        """Sample interval [s]."""
+        """Sample interval [s].
+
+        Raises:
+            BenchError: where the record has no time base.
+        """
+        if self.averaged or "time" not in self.channels:
+            raise BenchError(
+                "has no time base: it is a table of points.",
+                where=self.name,
+                hint=f"{', '.join(self.procedures)} needs samples at a fixed rate.",
+            )
         time = self["time"]
         return float((time[-1] - time[0]) / (time.size - 1))
 
@@ -117,6 +139,19 @@ class BenchRecord:
         return value
 
 
+def head_of(text: str) -> tuple[dict[str, str], int]:
+    """The `# key: value` lines that a record starts with, and the number of the line after them."""
+    header: dict[str, str] = {}
+    lines = text.splitlines()
+    at = 0
+    while at < len(lines) and lines[at].startswith("#"):
+        key, colon, value = lines[at].lstrip("# ").partition(":")
+        if colon:
+            header[key.strip()] = value.strip()
+        at += 1
+    return header, at
+
+
 def read_record(path: str | Path) -> BenchRecord:
     """A bench record from its CSV file.
 
@@ -128,13 +163,7 @@ def read_record(path: str | Path) -> BenchRecord:
     source = open_source(path)
     where = source.path.name
     lines = (source.text or "").splitlines()
-    header: dict[str, str] = {}
-    at = 0
-    while at < len(lines) and lines[at].startswith("#"):
-        key, colon, value = lines[at].lstrip("# ").partition(":")
-        if colon:
-            header[key.strip()] = value.strip()
-        at += 1
+    header, at = head_of(source.text or "")
     procedures = tuple(name.strip() for name in header.pop("procedure", "").split(",") if name.strip())
     if not procedures:
         raise BenchError(
@@ -145,8 +174,12 @@ def read_record(path: str | Path) -> BenchRecord:
     if at >= len(lines):
         raise BenchError("there is nothing after the header.", where=where, hint="Record it again.")
     channels = _columns(lines[at], lines[at + 1 :], where=where, first=at + 2)
-    _check_time(channels, where)
-    return BenchRecord(where, procedures, channels, header)
+    record = BenchRecord(where, procedures, channels, header)
+    if not record.averaged:
+        _check_time(channels, where)
+    elif channels:
+        channels["point"] = np.arange(1.0, next(iter(channels.values())).size + 1)
+    return record
 
 
 def _columns(heads: str, lines: Sequence[str], *, where: str, first: int) -> dict[str, Array]:
@@ -195,7 +228,7 @@ def _check_time(channels: Mapping[str, Array], where: str) -> None:
         )
 
 
-_DIGITS = {"s": 4, "1": 5, "V": 4, "rad/s": 3, "N": 5, "N m": 6, "m/s": 4, "rad": 6}
+_DIGITS = {"s": 6, "1": 5, "V": 4, "rad/s": 3, "N": 5, "N m": 6, "m/s": 4, "rad": 6, "W": 3}
 
 
 def write_record(record: BenchRecord, path: str | Path) -> Path:
@@ -212,20 +245,3 @@ def write_record(record: BenchRecord, path: str | Path) -> Path:
     )
     columns = ",".join(f"{name} [{COLUMNS[name][0]}]" for name in names)
     return write_text(path, "\n".join([*head, columns, ""]) + body.getvalue())
-
-
-def read_records(folder: str | Path) -> tuple[BenchRecord, ...]:
-    """Every CSV file of a folder, in the order of their names.
-
-    Raises:
-        BenchError: where the folder is missing or holds none; and as `read_record`.
-    """
-    place = Path(folder)
-    if not place.is_dir():
-        raise BenchError("is not a folder.", where=place, hint="Give the folder with the bench records.")
-    paths = sorted(place.glob("*.csv"))
-    if not paths:
-        raise BenchError(
-            "holds no .csv file.", where=place, hint="`swash bench simulate DIR` makes records to look at."
-        )
-    return tuple(read_record(path) for path in paths)

@@ -1,19 +1,23 @@
 """Bench records in other people's forms: the CoaX-56's MATLAB tables and the propeller rig's text files.
 
-`coax56/bench_*.mat` hold one struct each, with rotor speeds in rpm (mfaessle/coax-control). `coax_rig/*.csv` are runs
-of single and coaxial propeller pairs (Aeronavics/coax-testrig): a line with the time, a line of heads, and five samples
-for each step of the pulse width; thrust is in kilograms.
+`coax56/bench_*.mat` hold one struct each: averaged points, rotor speeds in rpm (mfaessle/coax-control).
+`coax56/stabilizer_bar_orientation.mat` is a row of directions without a time base. `coax_rig/*.csv` are runs of single
+and coaxial propeller pairs (Aeronavics/coax-testrig): a line with the time, a line of heads, and five samples for each
+step of the pulse width; thrust is in kilograms, and the file's name says what turns.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from swashplate.errors import BenchError
+from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.flights.readers import mat, tables
 from swashplate.flights.readers.source import open_source
@@ -24,67 +28,104 @@ _IDLE = 1.0
 _GRAVITY = 9.80665
 """m/s^2, exact: what a scale in kilograms is calibrated by."""
 
+_SPEEDS = {"rpmUp": "omega_upper", "rpmLo": "omega_lower"}
+_NOT_RECORDED = "not recorded"
 
-def read_table(path: str | Path) -> dict[str, Array]:
-    """The columns of a CoaX-56 bench table; speeds `rpm*` become `omega_upper`, `omega_lower` in rad/s.
+
+def form_of(variables: Mapping[str, Any]) -> str:
+    """Which form a MATLAB file's variables have: "table" (a struct with `rpmUp`), "normals" (one row), or ""."""
+    if len(variables) != 1:
+        return ""
+    (value,) = variables.values()
+    if isinstance(value, dict):
+        return "table" if _SPEEDS.keys() <= value.keys() else ""
+    numbers = mat.numbers(value)
+    flat = numbers is not None and numbers.size >= 3 and numbers.size % 3 == 0 and numbers.size == max(numbers.shape)
+    return "normals" if flat else ""
+
+
+def read_table(path: str | Path) -> BenchRecord:
+    """A CoaX-56 bench table as averaged points: a speed map, speeds against the supply, or the same compensated.
+
+    The speed map is of both motors at the same input, at a supply that was not recorded. Where a table has the
+    measured voltage and the helicopter's own reading, the voltage is the measured one.
 
     Raises:
-        BenchError: where the file holds no single struct of numbers.
+        BenchError: where the file holds no struct of such columns.
         FlightError: where it cannot be read.
     """
     source = open_source(path)
     variables = mat.load(source)
-    structs = [value for value in variables.values() if isinstance(value, dict)]
-    if len(structs) != 1:
+    where = source.path.name
+    if form_of(variables) != "table":
         raise BenchError(
-            f"holds {', '.join(variables) or 'nothing'}; expected one struct of columns.",
-            where=source.path.name,
+            f"holds {', '.join(variables) or 'nothing'}; expected one struct of columns with rpmUp and rpmLo.",
+            where=where,
             hint="Is it one of the files coax56/bench_*.mat?",
         )
-    table = {}
-    for name, value in structs[0].items():
+    columns: dict[str, Array] = {}
+    for name, value in next(iter(variables.values())).items():
         numbers = mat.numbers(value)
-        if numbers is None:
-            raise BenchError("is not a column of numbers.", where=source.path.name, channel=name)
-        turned = {"rpmUp": "omega_upper", "rpmLo": "omega_lower"}.get(name)
-        table[turned or name] = np.atleast_1d(numbers * _RPM if turned else numbers)
-    return table
+        if numbers is None or not np.isfinite(numbers).all():
+            raise BenchError("is not a column of numbers.", where=where, channel=name)
+        columns[name] = np.ravel(numbers)
+    n = columns["rpmUp"].size
+    for name, numbers in columns.items():
+        if numbers.size not in (1, n):
+            raise BenchError(f"has {numbers.size} values, rpmUp has {n}.", where=where, channel=name)
+        columns[name] = np.broadcast_to(numbers, (n,)).copy()
+    channels = {ours: _RPM * columns[theirs] for theirs, ours in _SPEEDS.items()}
+    channels["point"] = np.arange(1.0, n + 1)
+    header = {"averaged": "yes"}
+    if "input" in columns:
+        channels |= {"motor_lower": columns["input"], "motor_upper": columns["input"]}
+        return BenchRecord(where, ("speed_map",), channels, {**header, "voltage": _NOT_RECORDED})
+    volts = next((name for name in ("measVoltage", "battState") if name in columns), None)
+    if volts is None:
+        raise BenchError(
+            f"has the columns {', '.join(columns)}; expected input, measVoltage or battState.", where=where
+        )
+    channels["voltage"] = columns[volts]
+    if {"inputUp", "inputLo"} <= columns.keys():
+        channels |= {"motor_lower": columns["inputLo"], "motor_upper": columns["inputUp"]}
+        return BenchRecord(where, ("supply",), channels, header)
+    return BenchRecord(where, ("supply_compensated",), channels, header)
 
 
-def read_normals(path: str | Path) -> Array:
-    """Unit normals of the bar, shape (n, 3), from `stabilizer_bar_orientation.mat`, which has no time base."""
+def read_normals(path: str | Path) -> BenchRecord:
+    """Unit normals of the bar from `stabilizer_bar_orientation.mat`, which has no time base.
+
+    Raises:
+        BenchError: where the file holds anything but one row of unit vectors.
+        FlightError: where it cannot be read.
+    """
     source = open_source(path)
-    flat = [numbers for value in mat.load(source).values() if (numbers := mat.numbers(value)) is not None]
-    if len(flat) != 1 or flat[0].size % 3:
-        raise BenchError("does not hold one row of directions.", where=source.path.name)
-    normals = flat[0].reshape(-1, 3)
+    variables = mat.load(source)
+    where = source.path.name
+    if form_of(variables) != "normals":
+        raise BenchError("does not hold one row of directions.", where=where)
+    numbers = mat.numbers(next(iter(variables.values())))
+    assert numbers is not None
+    normals = np.ravel(numbers).reshape(-1, 3)
     length = np.linalg.norm(normals, axis=1)
     if np.abs(length - 1.0).max() > 1e-3:
-        raise BenchError(f"has directions of length {length.min():.3g} to {length.max():.3g}.", where=source.path.name)
-    return np.asarray(normals)
+        raise BenchError(f"has directions of length {length.min():.3g} to {length.max():.3g}.", where=where)
+    channels = {f"normal_{axis}": normals[:, i].copy() for i, axis in enumerate("xyz")}
+    return BenchRecord(where, ("bar_orientation",), channels)
 
 
-@dataclass(frozen=True)
-class RigRun:
-    """One run of the propeller rig.
-
-    Attributes:
-        name: the file's name.
-        pwm: pulse width [us], shape (n,).
-        thrust: of everything that turns [N].
-        power: electrical, of everything that turns [W].
-        coaxial: True for a pair.
-    """
-
-    name: str
-    pwm: Array
-    thrust: Array
-    power: Array
-    coaxial: bool
+_WHAT_TURNS = re.compile(
+    r"(?:.*_)?(?P<maker>[^-_]+)-(?P<upper>[^-]+-[^-]+-[^-]+)-(?P<lower>[^-]+-[^-]+-[^-]+)-#\d+", re.IGNORECASE
+)
 
 
-def read_rig(path: str | Path) -> RigRun:
-    """A run of the propeller rig.
+def is_rig(text: str) -> bool:
+    """Whether a text is a run of the propeller rig: the line of heads is its second."""
+    return any("Motor PWM" in line for line in text[:2000].splitlines()[:3])
+
+
+def read_rig(path: str | Path) -> BenchRecord:
+    """A run of the propeller rig: pulse width, thrust and electrical power of everything that turns.
 
     Raises:
         BenchError: where a head is missing or a line is cut off.
@@ -111,6 +152,22 @@ def read_rig(path: str | Path) -> RigRun:
         raise BenchError(
             f"has the columns {', '.join(columns)}; expected thrust in kg, and voltages with currents.", where=where
         )
-    power = np.sum([columns[volts] * columns[amps] for volts, amps in pairs], axis=0)
-    turning = [amps for _, amps in pairs if columns[amps].max() > _IDLE]
-    return RigRun(where, columns["Motor PWM"], columns[thrust] * _GRAVITY, power, len(turning) > 1)
+    turning = [(volts, amps) for volts, amps in pairs if columns[amps].max() > _IDLE]
+    # A motor that stands draws 10 W for its electronics, which a pair does not have beside its two: left out.
+    power = np.sum([columns[volts] * columns[amps] for volts, amps in turning or pairs], axis=0)
+    channels = {"pwm": 1e-6 * columns["Motor PWM"], "thrust": columns[thrust] * _GRAVITY, "power": power}
+    return BenchRecord(
+        where, ("thrust_loss",), channels, {"propellers": str(len(turning)), **_what_turns(source.path.stem)}
+    )
+
+
+def _what_turns(stem: str) -> dict[str, str]:
+    """The propellers by the file's name, `[FOLDER_]MAKER-D-KV-PITCH-D-KV-PITCH-#RUN`: zeros for none below."""
+    found = _WHAT_TURNS.fullmatch(stem)
+    if found is None:
+        return {"propeller": re.sub(r"[-_ ]*#?\d+$", "", stem).lower()}
+    maker = found["maker"].lower()
+    told = {"propeller": f"{maker} {found['upper']}"}
+    if found["lower"] != "0-0-0":
+        told["propeller_lower"] = f"{maker} {found['lower']}"
+    return told

@@ -53,6 +53,7 @@ _UNITS: dict[str, tuple[str, float]] = {
     "N m": ("N m", 1.0),
     "N mm": ("N m", 1e-3),
     "mN m": ("N m", 1e-3),
+    "W": ("W", 1.0),
     "kg": ("kg", 1.0),
     "Hz": ("Hz", 1.0),
 }

@@ -21,6 +21,7 @@ from swashplate.reporting.words import counted, listed, sigma_words, value_words
 _COLORS = (MODEL, PUBLISHED, GREEN)
 _DASHES = ("solid", "dash", "dot")
 _HEIGHT = 300
+_MANY = 200  # samples, from which a line is clearer than markers
 
 
 def bench_report(bench: Bench, *, path: str | os.PathLike[str]) -> Path:
@@ -48,20 +49,26 @@ def compose_bench(bench: Bench) -> Report:
     files = list(dict.fromkeys(name for result in bench.results for name in result.records))
     doubts = [(result, check) for result in bench.results for check in result.checks if not check.good]
     apart = [check for check in bench.disagreements if not check.good]
-    measured = f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.results), 'procedure')}."
-    kept = f"Published, for want of a record: {listed(bench.kept, most=30)}."
+    measured = (
+        "No parameter of the card."
+        if not bench.names
+        else f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.results), 'procedure')}."
+    )
+    kept = f"Published, for want of a record: {listed(bench.kept, most=30)}." if bench.kept else "None."
+    card: tuple[Section, ...] = (_card(bench),) if bench.names else ()
+    keeping = (("Kept", kept, "caution" if bench.kept else "good"),) if bench.names else ()
     agreement = " ".join(c.words for c in bench.disagreements) or "No parameter was measured in two ways."
     summary = (
         ("Records", f"{counted(len(files), 'file')}: {listed(files, most=5)}.", "plain"),
         ("Measured", measured, "plain"),
-        ("Kept", kept, "caution" if bench.kept else "good"),
+        *keeping,
         ("Checks", _doubts(doubts), "caution" if doubts else "good"),
         ("Agreement", agreement, "caution" if apart else "plain"),
     )
-    sections = (_card(bench), *(_procedure(result, bench) for result in bench.results), _made(bench))
+    sections = (*card, *(_procedure(result, bench) for result in bench.results), _made(bench))
     picture = next((b for r in bench.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
     return Report(
-        title=f"{bench.card.vehicle} on the test bench",
+        title=f"{bench.card.vehicle} on the test bench" if bench.names else "On the test bench",
         banners=(),
         summary=summary,
         picture=picture,
@@ -96,8 +103,9 @@ def _card(bench: Bench) -> Section:
             )
         )
     note = (
-        "σ: from the scatter of the measurements about the formula. It does not hold what all measurements share: the "
-        "calibration of the sensor, the position of the CG, the hub heights. Correlations are on the card."
+        "σ: from the scatter of the measurements about the formula and from the bounds of what a procedure holds as "
+        "known, where the card gives one. It does not hold the calibration of the sensor, nor the position of the CG. "
+        "Correlations are on the card."
     )
     columns = ("parameter", "unit", "published", "measured", "σ", "change / σ", "source")
     return Section("card", "The card", (Table("Published and measured values", columns, tuple(rows), note=note),))
@@ -112,11 +120,16 @@ def _procedure(result: BenchResult, bench: Bench) -> Section:
         for n, v, s in zip(result.names, result.values, result.sigma, strict=True)
     ]  # fmt: skip
     rows += [
-        (Cell(f"{name} (not on the card)"), Cell(unit_words(unit)), Cell(value_words(value, sigma), number=True),
-         Cell(sigma_words(sigma), number=True))
-        for name, value, sigma, unit in result.findings
+        (Cell(f"{f.name} (not on the card)"), Cell(unit_words(f.unit)),
+         Cell(value_words(f.value, f.sigma), number=True), Cell(sigma_words(f.sigma), number=True))
+        for f in result.findings
     ]  # fmt: skip
-    blocks.append(Table(f"{result.title}: result", ("quantity", "unit", "value", "σ"), tuple(rows)))
+    if rows:
+        blocks.append(Table(f"{result.title}: result", ("quantity", "unit", "value", "σ"), tuple(rows)))
+    blocks += [
+        Table(rows.title, rows.columns, tuple(tuple(Cell(words, number=True) for words in row) for row in rows.rows))
+        for rows in result.tables
+    ]
     doubts = [check.words for check in result.checks if not check.good]
     if doubts:
         blocks += [Text(words, tone="caution") for words in doubts]
@@ -137,9 +150,10 @@ def _figures(result: BenchResult, prefix: str = "") -> list[Figure]:
 def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
     traces: list[dict[str, Any]] = []
     keys = []
-    for curve, color, dash in zip(curves, _COLORS, _DASHES, strict=False):
+    for number, curve in enumerate(curves):
+        color, dash = _COLORS[number % len(_COLORS)], _DASHES[number % len(_DASHES)]
         name = curve.name or "fit"
-        many = curve.x.size > 200
+        many = curve.x.size > _MANY
         traces.append(
             {
                 "type": "scatter",
@@ -151,17 +165,13 @@ def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
                 "name": f"{name}, measured",
             }
         )
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": packed(curve.line_x),
-                "y": packed(curve.line_y),
-                "line": {"color": color, "dash": dash, "width": 1.8},
-                "name": name,
-            }
-        )
-        keys.append(Key(name, color, dash))
+        if curve.line_x.size:
+            line = {"color": color, "dash": dash, "width": 1.8}
+            traces.append(
+                {"type": "scatter", "mode": "lines", "x": packed(curve.line_x), "y": packed(curve.line_y), "line": line,
+                 "name": name}
+            )  # fmt: skip
+            keys.append(Key(name, color, dash))
         if curve.out_x.size:
             marker = {"color": GREY, "symbol": "x", "size": 8}
             traces.append(

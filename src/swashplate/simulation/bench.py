@@ -20,6 +20,7 @@ from swashplate.flights.bench_record import LOADS, BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
+from swashplate.physics.ground_effect import thrust_gain
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
@@ -65,6 +66,7 @@ class Setup:
         dead_zone, saturation: motor commands below which the motor stands and above which it no longer follows.
         interference: thrust of a rotor alone over its thrust above or below the other, less one.
         air_density: [kg/m^3]; None for that of the card.
+        height: of the rotors above the floor [m], with its ground effect; None for free air.
     """
 
     force_noise: float = 0.02
@@ -85,6 +87,7 @@ class Setup:
     saturation: float = 0.78
     interference: float = 0.15
     air_density: float | None = None
+    height: float | None = None
 
 
 @dataclass(frozen=True)
@@ -267,6 +270,9 @@ def _parameter_row(vehicle: Vehicle, schedule: Schedule, setup: Setup) -> Array:
         card = {**card, f"k_thrust_{gone}": 0.0, f"k_torque_{gone}": 0.0, f"inertia_drive_{gone}": 0.0}
         card = {**card, f"k_thrust_{left}": alone * card[f"k_thrust_{left}"]}
     density = card["air_density"] if setup.air_density is None else setup.air_density
+    if setup.height is not None:
+        gain = thrust_gain(setup.height, radius=card["rotor_radius"])
+        card = {**card, **{name: gain * card[name] for name in ("k_thrust_upper", "k_thrust_lower")}}
     free = float(schedule.bar == "free")
     return np.array([*(card[name] for name in vehicle.parameter_names), free, density], dtype=np.float64)
 
@@ -321,6 +327,8 @@ def _observe(
     header = {"rotor_removed": schedule.removed} if schedule.removed else {}
     if setup.air_density is not None:
         header["air_density"] = f"{setup.air_density:g}"
+    if setup.height is not None:
+        header["height"] = f"{setup.height:g}"
     return BenchRecord(f"{schedule.name}.csv", schedule.procedures, channels, header)
 
 

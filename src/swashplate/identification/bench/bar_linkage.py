@@ -2,21 +2,19 @@
 
     (alpha, beta)_up = l_up R (alpha, beta)_bar             (Fankhauser et al., sec. IV-A5, eqs 10, 11 and Fig. 7)
 
-Forces and moments are split as for the lower rotor (eq. 18). What spoils it: a magnet that lets the bar wobble, a
-deflection that is read off with the rotor at rest, and the downwash on the magnet's arm.
+Forces and moments are split as for the lower rotor (eq. 18). What spoils it: vibration (told by the samples' scatter),
+ground effect on the thrust that is held, a magnet that lets the bar wobble, a deflection that is read off with the
+rotor at rest, and the downwash on the magnet's arm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.identification.bench.result import BenchResult
-from swashplate.identification.bench.steady import steady_points
-from swashplate.identification.bench.tilt import CHANNELS, XP, figure_6, fit_tilt, tilt_checks
+from swashplate.identification.bench.steady import Points
+from swashplate.identification.bench.tilt import CHANNELS, XP, Steering, tilt_result
 from swashplate.physics.frames import Euler
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar, upper_tip_path_plane
@@ -43,39 +41,24 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
 
     Args:
         records: one.
-        card: `k_thrust_upper`, `hub_height_upper`, `air_density` are taken as known.
+        card: `k_thrust_upper`, `hub_height_upper`, `air_density` are held.
     """
-    if len(records) != 1:
-        raise BenchError(
-            f"{len(records)} records, expected one.", where=", ".join(r.name for r in records), hint="Join them."
-        )
-    record = records[0]
-    found = steady_points(record, COLUMNS[1:])
-    density = record.number("air_density", card["air_density"]) / card["air_density"]
-    thrust = card["k_thrust_upper"] * density * found["omega_upper"] ** 2
+    return tilt_result(
+        (NAME, TITLE, SOURCE),
+        records,
+        card,
+        _deflections,
+        rotor_name="upper",
+        channels=COLUMNS[1 : -len(CHANNELS)],
+        settings=("bar_alpha", "bar_beta"),
+    )
+
+
+def _deflections(found: Points) -> Steering:
     alpha, beta = found["bar_alpha"], found["bar_beta"]
 
     def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
         bar = StabilizerBar(float(alpha[i]), float(beta[i]))
         return upper_tip_path_plane(bar, _LEVEL, linkage=linkage, lag=lag, mixing="rotation", xp=XP)
 
-    height = card["hub_height_upper"]
-    lag = card["k_zeta_upper"] * float(found["omega_upper"].mean()) + card["o_zeta_upper"]
-    start = np.array([card["linkage_upper"], lag, card["hub_stiffness_upper"]])
-    fit = fit_tilt(found, steering, thrust, hub_height=height, start=start)
-    kept = {name: card[name] for name in ("k_thrust_upper", "hub_height_upper")}
-    pair = [0, 2]
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        ("linkage_upper", "hub_stiffness_upper"),
-        fit.values[pair],
-        fit.covariance[np.ix_(pair, pair)],
-        (record.name,),
-        tuple(tilt_checks(found, fit, kept)),
-        tuple(figure_6(fit, float(thrust.mean()), hub_height=height, rotor_name="upper")),
-        leans_on={"k_thrust_upper": fit.by_thrust[pair] / card["k_thrust_upper"]},
-        findings=(("phase lag offset of the upper rotor", float(fit.values[1]),
-                   float(np.sqrt(fit.covariance[1, 1])), "rad"),),
-    )  # fmt: skip
+    return steering

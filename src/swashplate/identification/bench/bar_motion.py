@@ -84,17 +84,3 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         (Check(f"Roll and pitch give time constants {apart:+.1f} sigmas apart.", good=abs(apart) < 3.5),),
         tuple(curves),
     )
-
-
-def cone_of(normals: Array) -> tuple[float, float]:
-    """What directions of the bar's normal tell without a time base: mean and largest angle to their mean [rad].
-
-    No time constant can be had from them: samples in an order, at an unknown rate, fit any rate.
-
-    Args:
-        normals: unit vectors, shape (n, 3).
-    """
-    mean = normals.mean(axis=0)
-    mean = mean / np.linalg.norm(mean)
-    angles = np.arctan2(np.linalg.norm(np.cross(normals, mean), axis=1), normals @ mean)
-    return float(angles.mean()), float(angles.max())

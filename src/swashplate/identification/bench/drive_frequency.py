@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.refusals import refuse_idle
 from swashplate.identification.bench.result import BenchResult, Check, Curve
 from swashplate.simulation.bench import Schedule
 
@@ -53,6 +54,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     names, values, variances, checks, curves = [], [], [], [], []
     for record in records:
         rotor = "upper" if np.std(record["motor_upper"]) > np.std(record["motor_lower"]) else "lower"
+        refuse_idle(record, rotor, card)
         u, y = _coefficients(record, f"motor_{rotor}"), _coefficients(record, f"omega_{rotor}")
         periods = y.shape[0]
         frequency = np.array(HARMONICS) / PERIOD
@@ -90,17 +92,12 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         dense = np.geomspace(frequency[0], frequency[-1], 60)
         a = np.exp(-record.dt / tau)
         line = found.x[0] * (1.0 - a) / (np.exp(2j * np.pi * dense * record.dt) - a)
-        curves.append(
-            Curve(
-                f"Frequency response of the {rotor} drive train",
-                "frequency [Hz]",
-                "phase [deg]",
-                frequency,
-                np.degrees(np.angle(mean_y / mean_u)),
-                dense,
-                np.degrees(np.angle(line)),
-            )
-        )
+        measured = mean_y / mean_u
+        curves += [
+            Curve(f"{what.capitalize()} of the {rotor} drive train", "frequency [Hz]", f"{what} [{unit}]",
+                  frequency, of(measured), dense, of(line))
+            for what, unit, of in (("gain", "rad/s", np.abs), ("phase", "deg", lambda h: np.degrees(np.angle(h))))
+        ]  # fmt: skip
     if len(set(names)) < len(names):
         raise BenchError(
             "two records excite the same motor.",
@@ -117,6 +114,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
     )
 
 

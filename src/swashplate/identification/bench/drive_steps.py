@@ -17,6 +17,7 @@ from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.identification.bench.lag import LagFit, first_order, fit_lag
+from swashplate.identification.bench.refusals import refuse_idle
 from swashplate.identification.bench.result import BenchResult, Check, Curve
 from swashplate.simulation.bench import Schedule, points
 
@@ -53,6 +54,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         BenchError: where no motor was stepped, or a speed does not follow its steps.
     """
     fits: dict[str, list[LagFit]] = {}
+    files: dict[str, tuple[str, ...]] = {}
     curves: list[Curve] = []
     checks: list[Check] = []
     for record in records:
@@ -67,12 +69,14 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         levels, speed = held_levels(record[f"motor_{rotor}"]), record[f"omega_{rotor}"]
         if levels.shape[1] < 3:
             raise BenchError("has fewer than two steps.", where=record.name, hint="Step up and down, several times.")
+        refuse_idle(record, rotor, card)
 
         def response(tau: float, levels: Array = levels, dt: float = record.dt) -> tuple[Array, list[Array]]:
             return np.zeros(len(levels)), [*first_order(levels, tau, dt).T]
 
         fit = fit_lag(response, speed, dt=record.dt, bounds=_BOUNDS, where=record.name)
         fits.setdefault(rotor, []).append(fit)
+        files[f"tau_drive_{rotor}"] = (*files.get(f"tau_drive_{rotor}", ()), record.name)
         size = np.ptp(fit.linear)
         checks += [_check_both_ways(record.name, rotor, fit, levels, record.dt), _check_order(record.name, fit, size)]
         shown = slice(0, min(speed.size, round(8.0 / record.dt)))
@@ -100,6 +104,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of=files,
     )
 
 

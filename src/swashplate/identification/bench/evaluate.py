@@ -9,11 +9,12 @@ from types import ModuleType
 import numpy as np
 
 from swashplate.errors import BenchError
-from swashplate.flights.bench_record import LOADS, BenchRecord
+from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
 from swashplate.identification.bench import (
     bar_linkage,
     bar_motion,
+    bar_orientation,
     drive_frequency,
     drive_steps,
     fuselage_drag,
@@ -22,8 +23,17 @@ from swashplate.identification.bench import (
     single_rotor,
     speed_map,
     supply,
+    supply_compensated,
     swashplate,
     thrust,
+    thrust_loss,
+)
+from swashplate.identification.bench.joint import Joint
+from swashplate.identification.bench.refusals import (
+    refuse_exchanged,
+    refuse_out_of_range,
+    refuse_saturated,
+    refuse_stalled,
 )
 from swashplate.identification.bench.result import BenchResult, Check
 from swashplate.simulation.bench import Schedule
@@ -32,6 +42,7 @@ from swashplate.vehicles.vehicle import Vehicle
 
 _MODULES: tuple[ModuleType, ...] = (
     supply,
+    supply_compensated,
     speed_map,
     thrust,
     single_rotor,
@@ -42,10 +53,15 @@ _MODULES: tuple[ModuleType, ...] = (
     servo_steps,
     bar_linkage,
     bar_motion,
+    bar_orientation,
     fuselage_drag,
+    thrust_loss,
 )
 PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
 """Every procedure, in an order in which each finds what it takes as known already measured."""
+
+_IN_TIME = (drive_steps, drive_frequency, servo_steps, bar_motion)
+"""Procedures that need samples at a fixed rate."""
 
 MEASURED = (
     "k_drive_voltage",
@@ -65,8 +81,8 @@ MEASURED = (
 )
 """Every parameter that the bench can measure."""
 
-_CLIPPED = 8
-"""So many samples in a row at exactly the largest value of a channel are a sensor at its range."""
+_WORTH_KEEPING = 1e-4
+"""Smaller correlations are not written to the card."""
 
 
 @dataclass(frozen=True)
@@ -135,21 +151,31 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
     published = vehicle.card
     by_procedure = _sorted(records)
     for record in records:
+        refuse_out_of_range(record)
         refuse_saturated(record)
         refuse_stalled(record, published.values())
-    numbers, joint, results, disagreements = published.values(), _Joint(), [], []
+        refuse_exchanged(record, published.values())
+    numbers, joint, results, disagreements = published.values(), Joint(published), [], []
     for name, chosen in by_procedure.items():
-        result: BenchResult = PROCEDURES[name].estimate(chosen, numbers)
+        try:
+            estimated = PROCEDURES[name].estimate(chosen, numbers)
+        except np.linalg.LinAlgError:
+            raise BenchError(
+                f"{name} cannot tell its numbers from these records: something that has to be varied stood still.",
+                where=", ".join(record.name for record in chosen),
+                hint="`swash bench plan` says what to vary.",
+            ) from None
+        result, told = joint.add(estimated)
         results.append(result)
-        disagreements += joint.add(result)
+        disagreements += told
         numbers = {**numbers, **joint.values}
     return Bench(
         tuple(results),
         _card(published, joint, results),
         published,
-        tuple(name for name in MEASURED if name not in joint.names),
-        tuple(joint.names),
-        joint.covariance,
+        tuple(name for name in MEASURED if name not in joint.measured),
+        joint.measured,
+        joint.among(joint.measured),
         tuple(disagreements),
     )
 
@@ -165,123 +191,40 @@ def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
                     where=record.name,
                     hint="Correct the line '# procedure:' of its header.",
                 )
+            if PROCEDURES[name] in _IN_TIME:
+                _ = record.dt  # says that a table of points does not do
             for column in PROCEDURES[name].COLUMNS:
                 _ = record[column]  # says what is missing
             found.setdefault(name, []).append(record)
     return {name: found[name] for name in PROCEDURES if name in found}
 
 
-def refuse_saturated(record: BenchRecord) -> None:
-    """Raise where a force or moment stands at its largest value for several samples: the sensor is at its range.
-
-    Raises:
-        BenchError: naming the channel.
-    """
-    for channel in LOADS:
-        values = record.channels.get(channel)
-        if values is None or np.ptp(values) == 0.0:
-            continue
-        for limit in (values.max(), values.min()):
-            at = np.r_[False, values == limit, False]
-            edges = np.flatnonzero(np.diff(at.astype(int)))
-            longest = int((edges[1::2] - edges[::2]).max())
-            if longest >= _CLIPPED:
-                time = record["time"][edges[::2][np.argmax(edges[1::2] - edges[::2])]]
-                raise BenchError(
-                    f"stands at {limit:.4g} for {longest} samples from {time:.2f} s on: the sensor is saturated.",
-                    where=record.name,
-                    channel=channel,
-                    hint="Choose a larger range or smaller inputs, and damp vibration at the mount.",
-                )
-
-
-def refuse_stalled(record: BenchRecord, card: Mapping[str, float]) -> None:
-    """Raise where a motor is told to turn and its rotor does not, or hardly.
-
-    Raises:
-        BenchError: naming the rotor and the time.
-    """
-    removed = record.header.get("rotor_removed", "")
-    for rotor in ("upper", "lower"):
-        if rotor == removed or not {f"motor_{rotor}", f"omega_{rotor}"} <= record.channels.keys():
-            continue
-        command, speed = record[f"motor_{rotor}"], record[f"omega_{rotor}"]
-        expected = card[f"k_drive_{rotor}"] * command + card[f"o_drive_{rotor}"]
-        span = round(1.5 / record.dt)  # s: eight of the slower drive train's time constants
-        running = np.convolve(command > 0.42, np.ones(span), mode="full")[: command.size] >= span
-        slow = running & (speed < 0.6 * expected)
-        if slow.sum() > 0.2 / record.dt:
-            at = int(np.argmax(slow))
-            raise BenchError(
-                f"is {speed[at]:.0f} rad/s at {record['time'][at]:.2f} s where motor_{rotor} = {command[at]:.2f} "
-                f"should give about {expected[at]:.0f}: the motor did not reach its speed.",
-                where=record.name,
-                channel=f"omega_{rotor}",
-                hint="Check supply, motor and tachometer (and that the rotors' columns are not exchanged).",
-            )
-
-
-class _Joint:
-    """Values and joint covariance as procedures are added."""
-
-    def __init__(self) -> None:
-        self.names: list[str] = []
-        self.values: dict[str, float] = {}
-        self.sources: dict[str, list[BenchResult]] = {}
-        self.covariance: Array = np.zeros((0, 0))
-
-    def add(self, result: BenchResult) -> list[Check]:
-        """Add a result; what is known already is combined by its weights (told if it disagrees)."""
-        told = [self._combine(name, result) for name in result.names if name in self.names]
-        fresh = [i for i, name in enumerate(result.names) if name not in self.names]
-        if fresh:
-            lean = np.zeros((len(fresh), len(self.names)))
-            for known, slope in result.leans_on.items():
-                if known in self.names:
-                    lean[:, self.names.index(known)] = np.asarray(slope)[fresh]
-            across = lean @ self.covariance
-            own = result.covariance[np.ix_(fresh, fresh)] + across @ lean.T
-            self.covariance = np.block([[self.covariance, across.T], [across, own]])
-            self.names += [result.names[i] for i in fresh]
-            self.values |= {result.names[i]: float(result.values[i]) for i in fresh}
-        for name in result.names:
-            self.sources.setdefault(name, []).append(result)
-        return told
-
-    def _combine(self, name: str, result: BenchResult) -> Check:
-        place = self.names.index(name)
-        value, sigma = result[name]
-        before, variance = self.values[name], self.covariance[place, place]
-        apart = (value - before) / float(np.sqrt(sigma**2 + variance))
-        share = variance / (variance + sigma**2)
-        self.values[name] = before + share * (value - before)
-        self.covariance[place] *= 1.0 - share
-        self.covariance[:, place] *= 1.0 - share
-        self.covariance[place, place] = variance * sigma**2 / (variance + sigma**2)
-        first = self.sources[name][0].procedure
-        return Check(f"{name}: {result.procedure} and {first} are {apart:+.1f} sigmas apart.", good=abs(apart) < 3.0)
-
-
-def _card(published: Card, joint: _Joint, results: Sequence[BenchResult]) -> Card:
+def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card:
     """The published card with what was measured."""
     card = published
-    sigma = np.sqrt(np.diag(joint.covariance))
-    for place, name in enumerate(joint.names):
+    sigma = dict(zip(joint.names, np.sqrt(np.diag(joint.covariance)), strict=True))
+    for name in joint.measured:
         sources = joint.sources[name]
-        files = ", ".join(dict.fromkeys(file for result in sources for file in result.records))
+        files = ", ".join(
+            dict.fromkeys(file for result in sources for file in result.records_of.get(name, result.records))
+        )
         how = ", ".join(result.procedure for result in sources)
         _refuse_impossible(published, name, joint.values[name], files)
         card = card.with_values(
             {name: joint.values[name]},
             status="measured",
-            sigma=float(sigma[place]),
+            sigma=float(sigma[name]),
             source=f"bench: {how} from {files}",
         )
-    if "k_zeta_lower" in joint.names:  # both rotors alike (Fankhauser et al., sec. IV-A3)
+    if "k_zeta_lower" in joint.measured:  # both rotors alike (Fankhauser et al., sec. IV-A3)
         value = card.parameters["k_zeta_lower"]
         card = card.with_values(
             {"k_zeta_upper": value.value}, status="derived", sigma=value.sigma, source="derived: k_zeta_lower"
         )
+    for name in set(MEASURED) - set(joint.measured):
+        entry = card.parameters[name]
+        note = "; ".join(filter(None, (entry.note, "kept as published: the bench has no record of it")))
+        card = replace(card, parameters={**card.parameters, name: replace(entry, note=note)})
     done = ", ".join(result.procedure for result in results)
     return replace(
         card,
@@ -311,6 +254,6 @@ def _correlations(names: Sequence[str], covariance: Array) -> dict[str, dict[str
     for i, first in enumerate(names):
         for j in range(i + 1, len(names)):
             value = float(covariance[i, j] / (sigma[i] * sigma[j]))
-            if abs(value) > 1e-4:
+            if abs(value) > _WORTH_KEEPING:
                 made.setdefault(first, {})[names[j]] = round(value, 9)
     return made

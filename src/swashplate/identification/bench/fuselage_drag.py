@@ -15,8 +15,10 @@ import numpy as np
 
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
+from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
 from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, nuisance, steady_points
+from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "fuselage_drag"
@@ -37,6 +39,22 @@ def schedules(hover: Mapping[str, float]) -> list[Schedule]:
         text = f"rotors off; fan from the {words} at 0, 1, 2, 3, 4 m/s, up and down, twice"
         made.append(points(f"fan_{words}", (NAME,), settings, settle=1.0, hold=4.0, words=text))
     return made
+
+
+def _refuse_across(record: BenchRecord, speed: str, force: str, drag: float, pushed: Array) -> None:
+    """Raise where the force across the stream grows with it more than the force along it does."""
+    other = {"Fx": "Fy", "Fy": "Fx"}[force]
+    if other not in record.channels:
+        return
+    points = steady_points(record, (other,))
+    across = fit_line([-pushed, *nuisance(points)], points[other], where=record.name)
+    if abs(across.values[0]) > max(abs(drag), 5.0 * float(np.sqrt(across.covariance[0, 0]))):
+        raise BenchError(
+            f"grows with {speed} less than {other} does: the stream pushes along itself.",
+            where=record.name,
+            channel=force,
+            hint="Are Fx and Fy exchanged, or is the helicopter turned in the stream?",
+        )
 
 
 def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
@@ -66,16 +84,22 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 channel=force,
                 hint="Turn the sign of the force or of the air speed.",
             )
+        _refuse_across(record, speed, force, float(line.values[0]), pushed)
         names.append(name)
         values.append(float(line.values[0]))
         variances.append(float(line.covariance[0, 0]))
         level = np.round(found[speed] * 2.0) / 2.0
-        checks += [check_settled(found, force), *check_structure(line, level, what=f"{record.name}: {force} [N]")]
-        order = np.argsort(found[speed])
+        checks += [
+            check_settled(found, force),
+            check_vibration(found, force),
+            check_line_drift(found, line, 2, what=f"{force} [N]"),
+            *check_structure(line, level, what=f"{record.name}: {force} [N]"),
+        ]
+        blowing = np.linspace(found[speed].min(), found[speed].max(), 60)
         fitted = line.values[0] * pushed
         curves.append(
             Curve(f"Drag against {speed}", "speed of the air [m/s]", "drag [mN]", found[speed],
-                  1e3 * (fitted - line.residuals), found[speed][order], 1e3 * fitted[order])
+                  1e3 * (fitted - line.residuals), blowing, 1e3 * density * line.values[0] * blowing * np.abs(blowing))
         )  # fmt: skip
     checks.append(Check("The mount's own drag is in these numbers unless it was measured alone and subtracted."))
     return BenchResult(
@@ -88,4 +112,5 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        records_of={name: (record.name,) for name, record in zip(names, records, strict=True)},
     )

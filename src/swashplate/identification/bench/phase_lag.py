@@ -4,8 +4,9 @@
 
 With this project's signs (a lag turns the tilt in the rotor's sense) a pitch command s2 gives alpha = l s2 sin(D) and
 beta = -l s2 cos(D), so D = atan2(dMx/ds2, -dMy/ds2). Slopes over +-s2 at each speed take out trim and bias. What
-spoils it: a helicopter that is not aligned with the sensor and bends under load. Both turn the offset o_zeta, which is
-therefore not put on the card (the paper takes it from flight for that reason).
+spoils it: vibration as large as the moments (told), and a helicopter that is not aligned with the sensor or bends under
+load. These turn the offset o_zeta, which is therefore not put on the card (the paper takes it from flight for that
+reason).
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from scipy import stats
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, fit_line, nuisance, steady_points
+from swashplate.identification.bench.checks import check_line_drift, check_settled, check_structure, check_vibration
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "phase_lag"
@@ -71,7 +73,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         noise = (along**2 * np.diag(roll.covariance)[:k] + across**2 * np.diag(pitch.covariance)[:k]) / size**2
         sigmas += list(np.sqrt(noise))
         speeds += [float(found["omega_lower"][column > 0.5].mean()) for column in inside.T]
-        checks += [check_settled(found, "Mx"), check_settled(found, "My")]
+        checks += [check(found, name) for name in ("Mx", "My") for check in (check_settled, check_vibration)]
+        level = 1e3 * found["motor_lower"] + np.round(found["servo_pitch"], 3)
+        for fitted, name in ((roll, "Mx [N m]"), (pitch, "My [N m]")):
+            checks.append(check_line_drift(found, fitted, 2 * k, what=name))
+            checks += check_structure(fitted, level, what=f"{record.name}: {name}")
         if np.any(sigmas[-k:] > np.radians(3.0)):
             checks.append(Check(f"{record.name}: the lag is uncertain by more than 3 deg at some speed.", good=False))
     omega, lag, sigma = np.array(speeds), np.array(lags), np.array(sigmas)
@@ -106,7 +112,9 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         (curve,),
-        findings=(("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad"),),
+        findings=(
+            Finding("o_zeta_lower on the bench", float(line.values[1]), float(np.sqrt(covariance[1, 1])), "rad"),
+        ),
     )
 
 

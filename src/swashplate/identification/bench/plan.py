@@ -58,7 +58,7 @@ def planned(vehicle: Vehicle, only: Sequence[str] = ()) -> list[Schedule]:
     """The records of the whole bench, or of some procedures.
 
     Raises:
-        BenchError: for a procedure that is not known.
+        BenchError: for a procedure that is not known, or that is only for records that exist.
     """
     unknown = [name for name in only if name not in PROCEDURES]
     if unknown:
@@ -66,6 +66,13 @@ def planned(vehicle: Vehicle, only: Sequence[str] = ()) -> list[Schedule]:
             "there is no such procedure.", channel=", ".join(unknown), hint=f"Known are {', '.join(PROCEDURES)}."
         )
     made = schedules(hover_commands(vehicle.card.values()))
+    unplanned = set(only) - {name for record in made for name in record.procedures}
+    if unplanned:
+        raise BenchError(
+            "is for records that exist; it has no plan.",
+            channel=", ".join(sorted(unplanned)),
+            hint="Evaluate them with `swash bench RECORDS`.",
+        )
     return [record for record in made if not only or set(only) & set(record.procedures)]
 
 

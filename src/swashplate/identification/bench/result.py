@@ -43,6 +43,38 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class Rows:
+    """A table of what was measured, where a number or a curve does not say it all.
+
+    Attributes:
+        columns: heads with units.
+        rows: cells, in words.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A number that is no parameter of the card.
+
+    Attributes:
+        name, unit: what it is.
+        value: the number.
+        sigma: its standard deviation; `evaluate` adds what the held parameters' uncertainty makes of it.
+        leans_on: derivatives of `value` by parameters that the procedure holds.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str = "1"
+    leans_on: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class BenchResult:
     """What one procedure found.
 
@@ -52,13 +84,16 @@ class BenchResult:
         source: author, year and equation of its formula.
         names: the card's parameters that it estimates.
         values: shape (p,), in the card's units.
-        covariance: shape (p, p), of this procedure's own measurements.
+        covariance: shape (p, p), of this procedure's own measurements, what it holds taken as exact.
         records: the files it comes from.
+        records_of: those of a parameter that comes from some of them only, by its name.
         checks: drift, repeatability, structure of the residuals, and what else it looked at.
         curves: for the report.
         left_out: which points it did not use, and why.
-        leans_on: derivatives of `values` by other parameters that it takes as known, each (p,).
-        findings: numbers that are no parameters of the card: (name, value, sigma, unit).
+        leans_on: derivatives of `values` by the parameters that it holds, each (p,); `evaluate` propagates their
+            uncertainty with them.
+        findings: numbers that are no parameters of the card.
+        tables: of what was measured.
     """
 
     procedure: str
@@ -72,7 +107,9 @@ class BenchResult:
     curves: tuple[Curve, ...] = ()
     left_out: tuple[str, ...] = ()
     leans_on: Mapping[str, Array] = field(default_factory=dict)
-    findings: tuple[tuple[str, float, float, str], ...] = ()
+    findings: tuple[Finding, ...] = ()
+    tables: tuple[Rows, ...] = ()
+    records_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def sigma(self) -> Array:

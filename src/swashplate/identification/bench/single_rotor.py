@@ -1,9 +1,11 @@
-"""One rotor alone, the other taken off: what the coaxial set-up costs each rotor in thrust.
+"""One rotor alone, the other taken off: what the coaxial set-up costs each rotor in thrust and in torque.
 
-    T_alone / T_coaxial - 1 at the same speed = k_T,alone / k_T,coaxial - 1   (Fankhauser et al., sec. IV-A1, footnote)
+    T_alone / T_coaxial - 1 at the same speed = k_T,alone / k_T,coaxial - 1, and so for the torques
+    (Fankhauser et al., sec. IV-A1, footnote, and eqs 3, 4)
 
-The factors of the card are those of the coaxial set-up; the interference is a finding, not a parameter. What spoils it:
-another height above the floor, another battery voltage, blades that were taken off and put back with another pitch.
+The factors of the card are those of the coaxial set-up; the factors of the rotor alone and the interference are
+findings. What spoils it: another height above the floor (ground effect), vibration of a hub that is out of balance with
+one rotor off, another battery voltage, blades that were taken off and put back with another pitch.
 """
 
 from __future__ import annotations
@@ -13,15 +15,23 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from swashplate.errors import BenchError
+from swashplate.flights.bench_record import COLUMNS as RECORD_COLUMNS
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, nuisance, steady_points
+from swashplate.identification.bench.checks import (
+    check_ground,
+    check_line_drift,
+    check_settled,
+    check_structure,
+    check_vibration,
+)
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import fit_line, nuisance, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "single_rotor"
 TITLE = "Single rotors and the interference between the two"
-SOURCE = "Fankhauser et al., sec. IV-A1 (footnote) and eq. 3"
-COLUMNS = ("point", "omega_lower", "omega_upper", "motor_lower", "motor_upper", "Fz")
+SOURCE = "Fankhauser et al., sec. IV-A1 (footnote) and eqs 3, 4"
+COLUMNS = ("point", "omega_lower", "omega_upper", "motor_lower", "motor_upper", "Fz", "Mz")
 
 
 def schedules(hover: Mapping[str, float]) -> list[Schedule]:
@@ -35,13 +45,21 @@ def schedules(hover: Mapping[str, float]) -> list[Schedule]:
     return made
 
 
-def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
-    """The interference of each rotor that was measured alone, by the coaxial factors in `card`.
+_LOADS = (("thrust", "Fz", "N s^2/rad^2", {"upper": -1.0, "lower": -1.0}),
+          ("torque", "Mz", "N m s^2/rad^2", {"upper": 1.0, "lower": -1.0}))  # fmt: skip
+"""What is measured, its channel, the factor's unit, and the channel's sign for each rotor."""
 
-    Its bound is that of the single rotor; the coaxial factor's own is added when the bench is put together.
+
+def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+    """Factors of each rotor that was measured alone, and its interference by the coaxial factors, as findings.
+
+    Args:
+        records: one for each rotor; `rotor_removed` in the header.
+        card: `k_thrust`, `k_torque` of the rotors (coaxial) are held; `evaluate` adds what their uncertainty makes of
+            the interference. `air_density`.
 
     Raises:
-        BenchError: where the header does not say which rotor was taken off.
+        BenchError: where the header does not say which rotor was taken off, or a factor comes out with a wrong sign.
     """
     findings, checks, curves = [], [], []
     for record in records:
@@ -57,27 +75,46 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         found = steady_points(record, COLUMNS[1:])
         density = record.number("air_density", card["air_density"]) / card["air_density"]
         squared = density * found[f"omega_{rotor}"] ** 2
-        line = fit_line([squared, *nuisance(found)], -found["Fz"], where=record.name)
-        coaxial = card[f"k_thrust_{rotor}"]
-        share, sigma = line.values[0] / coaxial - 1.0, float(np.sqrt(line.covariance[0, 0])) / coaxial
-        findings.append((f"thrust of the {rotor} rotor alone over coaxial, less one", float(share), sigma, "1"))
-        checks += [
-            check_settled(found, "Fz"),
-            *check_structure(line, found[f"motor_{rotor}"], what=f"{rotor} rotor alone, thrust [N]"),
-        ]
-        fitted = line.values[0] * squared
-        order = np.argsort(squared)
-        curves.append(
-            Curve(
-                f"Thrust of the {rotor} rotor alone",
-                "rotor speed [rad/s]",
-                "thrust [N]",
-                found[f"omega_{rotor}"],
-                fitted + line.residuals,
-                found[f"omega_{rotor}"][order],
-                fitted[order],
+        checks += [check_settled(found, "Fz"), check_vibration(found, "Fz"), check_ground(record, card)]
+        for name, channel, unit, signs in _LOADS:
+            channel_unit = RECORD_COLUMNS[channel][0]
+            line = fit_line([squared, *nuisance(found)], signs[rotor] * found[channel], where=record.name)
+            alone, sigma = float(line.values[0]), float(np.sqrt(line.covariance[0, 0]))
+            if alone < 0.0:
+                raise BenchError(
+                    f"comes out with the wrong sign for the {name} of the {rotor} rotor alone.",
+                    where=record.name,
+                    channel=channel,
+                    hint="Turn its sign (axes are forward-right-down), or correct rotor_removed.",
+                )
+            coaxial = card[f"k_{name}_{rotor}"]
+            findings += [
+                Finding(f"k_{name}_{rotor} alone", alone, sigma, unit),
+                Finding(
+                    f"{name} of the {rotor} rotor alone over coaxial, less one",
+                    alone / coaxial - 1.0,
+                    sigma / coaxial,
+                    leans_on={f"k_{name}_{rotor}": -alone / coaxial**2},
+                ),
+            ]
+            checks.append(check_line_drift(found, line, 2, what=f"{channel} [{channel_unit}]"))
+            checks += check_structure(
+                line, found[f"motor_{rotor}"], what=f"{rotor} rotor alone, {name} [{channel_unit}]"
             )
-        )
+            turning = np.linspace(0.0, found[f"omega_{rotor}"].max(), 60)
+            size, shown = (1.0, "N") if name == "thrust" else (1e3, "N mm")
+            fitted = size * alone * squared
+            curves.append(
+                Curve(
+                    f"{name.capitalize()} of the {rotor} rotor alone",
+                    "rotor speed [rad/s]",
+                    f"{name} [{shown}]",
+                    found[f"omega_{rotor}"],
+                    fitted + size * line.residuals,
+                    turning,
+                    size * alone * density * turning**2,
+                )
+            )
     checks.append(Check("The bound of the interference does not hold what remounting the blades changes."))
     return BenchResult(
         NAME,

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
+from swashplate.identification.bench.checks import check_settled, check_structure
 from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import check_settled, check_structure, fit_line, steady_points
+from swashplate.identification.bench.steady import fit_line, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 Mask = NDArray[np.bool_]
@@ -25,7 +26,9 @@ Mask = NDArray[np.bool_]
 NAME = "speed_map"
 TITLE = "Speed maps of the drive trains"
 SOURCE = "Fankhauser et al., sec. IV-A1 and eq. 22"
-COLUMNS = ("point", "motor_lower", "motor_upper", "omega_lower", "omega_upper", "voltage")
+COLUMNS = ("point", "motor_lower", "motor_upper", "omega_lower", "omega_upper")
+NOT_RECORDED = "not recorded"
+"""What a header's line `voltage` says instead of the column `voltage`."""
 
 LEVELS = (0.0, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85)
 BEND = 0.25
@@ -118,31 +121,38 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
 
     Args:
         records: each varies one motor.
-        card: `k_drive_voltage` and `voltage_nominal` are taken as known for the small rest of the voltage.
+        card: `k_drive_voltage` and `voltage_nominal` are held, for the small rest of the voltage.
     """
     names: list[str] = []
     values: list[float] = []
+    leans: list[float] = []
+    files: dict[str, tuple[str, ...]] = {}
     blocks, checks, curves, left_out = [], [], [], []
     for rotor in ("upper", "lower"):
         swept = [r for r in records if np.ptp(r[f"motor_{rotor}"]) > 0.1 and _is_sweep(r, rotor)]
         if not swept:
             continue
-        u, speed, where = [], [], ", ".join(r.name for r in swept)
+        u, speed, above, where = [], [], [], ", ".join(r.name for r in swept)
         for record in swept:
-            found = steady_points(record, COLUMNS[1:])
+            known = record.header.get("voltage") != NOT_RECORDED
+            found = steady_points(record, (*COLUMNS[1:], *(["voltage"] if known else [])))
             found = found.where_true(found[f"motor_{rotor}"] > 0.0)
-            rest = card["k_drive_voltage"] * (found["voltage"] - card["voltage_nominal"])
+            above.append(found["voltage"] - card["voltage_nominal"] if known else np.zeros(len(found)))
             u.append(found[f"motor_{rotor}"])
-            speed.append(found[f"omega_{rotor}"] - rest)
+            speed.append(found[f"omega_{rotor}"] - card["k_drive_voltage"] * above[-1])
             checks.append(check_settled(found, f"omega_{rotor}"))
-            other = "lower" if rotor == "upper" else "upper"
-            held = float(np.ptp(found[f"omega_{other}"]))
-            checks.append(Check(f"{record.name}: the {other} rotor held its speed within {held:.1f} rad/s."))
+            checks += [
+                _check_supply(record, known=known),
+                _check_other(record, rotor, float(np.ptp(found[f"omega_{_OTHER[rotor]}"]))),
+            ]
         command, turned = np.concatenate(u), np.concatenate(speed)
         found_values, covariance, kept, reasons = fit_map(command, turned, where=where, rotor=rotor)
-        line = fit_line([command[kept], np.ones(int(kept.sum()))], turned[kept], where=where)
+        columns = [command[kept], np.ones(int(kept.sum()))]
+        line = fit_line(columns, turned[kept], where=where)
+        leans += list(-fit_line(columns, np.concatenate(above)[kept], where=where).values)
         checks += check_structure(line, command[kept], what=f"{rotor} rotor speed [rad/s]")
         names += [f"k_drive_{rotor}", f"o_drive_{rotor}"]
+        files |= dict.fromkeys(names[-2:], tuple(record.name for record in swept))
         values += list(found_values)
         blocks.append(covariance)
         left_out += reasons
@@ -178,7 +188,30 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(checks),
         tuple(curves),
         tuple(left_out),
+        leans_on={"k_drive_voltage": np.array(leans)},
+        records_of=files,
     )
+
+
+_OTHER = {"upper": "lower", "lower": "upper"}
+
+
+def _check_supply(record: BenchRecord, *, known: bool) -> Check:
+    """Whether the map can be brought to the nominal voltage."""
+    if known:
+        return Check(f"{record.name}: the measured voltage brings its points to the nominal one.")
+    return Check(
+        f"{record.name}: the voltage was not recorded; the map is that of the day's supply, and its offset is off by "
+        "k_drive_voltage for every volt that it was above or below the nominal one.",
+        good=False,
+    )
+
+
+def _check_other(record: BenchRecord, rotor: str, moved: float) -> Check:
+    """Whether the other rotor held its speed."""
+    if _is_sweep(record, _OTHER[rotor]):
+        return Check(f"{record.name}: both motors were swept together; a supply that sags bends the map.")
+    return Check(f"{record.name}: the {_OTHER[rotor]} rotor held its speed within {moved:.1f} rad/s.")
 
 
 def _is_sweep(record: BenchRecord, rotor: str) -> bool:

@@ -16,8 +16,9 @@ from scipy import stats
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import Line, check_settled, check_structure, fit_line, steady_points
+from swashplate.identification.bench.checks import check_settled, check_structure
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import Line, fit_line, steady_points
 from swashplate.simulation.bench import Schedule, points
 
 NAME = "supply"
@@ -60,7 +61,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     """
     slopes: list[float] = []
     sigmas: list[float] = []
-    checks, curves = [], []
+    checks, curves, findings = [], [], []
     for record in records:
         found = steady_points(record, COLUMNS[1:])
         moved = max(np.ptp(found["motor_lower"]), np.ptp(found["motor_upper"]))
@@ -75,6 +76,9 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             line = fit_supply(found["voltage"], speed, where=record.name)
             slopes.append(float(line.values[0]))
             sigmas.append(float(np.sqrt(line.covariance[0, 0])))
+            findings.append(
+                Finding(f"k_drive_voltage of the {rotor} rotor by itself", slopes[-1], sigmas[-1], "rad/s/V")
+            )
             level = np.round(found["voltage"] * 8.0) / 8.0
             checks += [
                 check_settled(found, f"omega_{rotor}"),
@@ -103,4 +107,5 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         tuple(record.name for record in records),
         tuple(checks),
         tuple(curves),
+        findings=tuple(findings),
     )

@@ -16,17 +16,15 @@ import numpy as np
 
 from swashplate.errors import BenchError
 from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.identification.bench.steady import (
-    Line,
-    check_drift,
+from swashplate.identification.bench.checks import (
+    check_ground,
+    check_line_drift,
     check_settled,
     check_structure,
-    fit_line,
-    nuisance,
-    stacked,
-    steady_points,
+    check_vibration,
 )
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import Line, fit_line, nuisance, stacked, steady_points
 
 NAME = "thrust"
 TITLE = "Thrust and torque factors, coaxial"
@@ -62,19 +60,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     torque = fit_line([upper, -lower, *unknown], turn, where=where)
     _refuse_signs(thrust, torque, where)
     checks: list[Check] = []
-    for place, points in enumerate(found):
-        checks.append(check_settled(points, "Fz"))
-        span = float(np.ptp(points.time))
-        at = 3 + 2 * place
+    for place, (points, record) in enumerate(zip(found, records, strict=True)):
+        checks += [check_settled(points, "Fz"), check_vibration(points, "Fz"), check_vibration(points, "Mz")]
+        checks.append(check_ground(record, card))
         for line, what in ((thrust, "-Fz [N]"), (torque, "Mz [N m]")):
-            checks.append(
-                check_drift(
-                    float(line.values[at]),
-                    float(np.sqrt(line.covariance[at, at])),
-                    span=span,
-                    what=f"{points.where}: {what}",
-                )
-            )
+            checks.append(check_line_drift(points, line, 3 + 2 * place, what=what))
     level = np.concatenate(
         [1e6 * i + 1e3 * p["motor_lower"] + p["motor_upper"] for i, p in enumerate(found)]  # equal for repeats only
     )
@@ -98,7 +88,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             _curve("Total thrust", "thrust [N]", upper, lower, thrust, 1.0),
             _curve("Total torque", "torque [N mm]", upper, -lower, torque, 1000.0),
         ),
-        findings=(("thrust in Omega_up Omega_lw, share at hover", share, share_sigma, "1"),),
+        findings=(Finding("thrust in Omega_up Omega_lw, share at hover", share, share_sigma),),
     )
 
 

@@ -9,25 +9,31 @@ with a bias and a drift each; the magnitudes of eq. 18 are for the plot.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from swashplate.errors import BenchError
+from swashplate.flights.bench_record import BenchRecord
 from swashplate.flights.flight import Array
-from swashplate.identification.bench.result import Check, Curve
-from swashplate.identification.bench.steady import Points, check_settled, nuisance
+from swashplate.identification.bench.checks import check_drift, check_settled, check_structure, check_vibration
+from swashplate.identification.bench.result import BenchResult, Check, Curve, Finding
+from swashplate.identification.bench.steady import Line, Points, nuisance, steady_points
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.rotor import TipPathPlane
 
+_UNLIKE = 0.25
+"""Largest share of a channel's square that the fitted tilt may leave."""
 CHANNELS = ("Fx", "Fy", "Mx", "My")
 XP = FloatBackend()
 
 Steering = Callable[[int, float, float], TipPathPlane]
 """The tilt at a point for a linkage and a lag."""
+Deflections = Callable[[Points], Steering]
+"""The steering that the points of a record make."""
 
 
 @dataclass(frozen=True)
@@ -36,18 +42,22 @@ class TiltFit:
 
     Attributes:
         values: linkage, lag [rad] and hub stiffness [N m/rad].
-        covariance: shape (3, 3).
-        by_thrust: derivatives of `values` by the logarithm of the thrust factor, shape (3,).
+        covariance: shape (3, 3), thrust and hub height taken as exact.
+        by_thrust, by_height: derivatives of `values` by the logarithms of the thrust factor and of the hub height,
+            shape (3,).
         corrected: measured channels with bias and drift taken out, shape (n, 4).
         residuals: shape (n, 4), bias and drift taken out.
+        drift: of each channel, per minute, and its standard deviation, shape (2, 4).
         tilt: size of the fitted tilt at each point [rad].
     """
 
     values: Array
     covariance: Array
     by_thrust: Array
+    by_height: Array
     corrected: Array
     residuals: Array
+    drift: Array
     tilt: Array
 
 
@@ -73,37 +83,45 @@ def fit_tilt(points: Points, steering: Steering, thrust: Array, *, hub_height: f
     def without(columns: Array) -> Array:
         return np.asarray(columns - basis @ (basis.T @ columns))
 
-    def model(x: Array, lifted: Array) -> Array:
-        return np.array([_loads(steering(i, x[0], x[1]), lifted[i], hub_height, x[2]) for i in range(n)])
+    def model(x: Array, *, lift: float = 1.0, raised: float = 1.0) -> Array:
+        planes = (steering(i, x[0], x[1]) for i in range(n))
+        return np.array([_loads(p, lift * t, raised * hub_height, x[2]) for p, t in zip(planes, thrust, strict=True)])
 
     if np.ptp([abs(complex(*steering(i, 1.0, 0.0))) for i in range(n)]) == 0.0:
         raise BenchError("steers nothing.", where=points.where, hint="Deflect servos or bar between the points.")
-    _refuse_against(without(measured), without(model(start, thrust)), points.where)
+    _refuse_against(without(measured), without(model(start)), points.where)
     scale = np.abs(start) + np.array([0.0, 0.1, 0.0])
     spread = np.array([1e-3, 1e-3, 1e-4, 1e-4])
 
-    def solved(lifted: Array, begin: Array) -> tuple[Array, Array, Array]:
-        nonlocal spread
-        for _ in range(3):
+    values = start
+    for _ in range(3):
 
-            def off(x: Array, by: Array = spread) -> Array:
-                return np.asarray((without(measured - model(x, lifted)) / by).ravel())
+        def off(x: Array, by: Array = spread) -> Array:
+            return np.asarray((without(measured - model(x)) / by).ravel())
 
-            found = least_squares(off, begin, x_scale=scale, xtol=1e-12)
-            left = found.fun.reshape(n, 4) * spread
-            spread, begin = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75)), found.x
-        return found.x, found.jac, left
-
-    values, jacobian, left = solved(thrust, start)
+        found = least_squares(off, values, x_scale=scale, xtol=1e-12)
+        values, used = found.x, spread
+        left = found.fun.reshape(n, 4) * used
+        spread = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75))
+    _refuse_unlike(without(measured), left, points.where)
     _refuse(values, points.where)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    step = 1e-3
-    higher, lower = (solved(thrust * (1.0 + s), values)[0] for s in (step, -step))
-    fitted = model(values, thrust)
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+
+    def by_held(**shift: float) -> Array:
+        """How the estimate moves with what it holds: what a wrong lift or height adds to the model, fitted back."""
+        added = (model(values, **{k: 1.0 + s for k, s in shift.items()}) - model(values)) / sum(shift.values())
+        return np.asarray(-covariance @ found.jac.T @ (-without(added) / used).ravel())
+
+    fitted = model(values)
     tilt = np.array([abs(complex(*steering(i, values[0], values[1]))) for i in range(n)])
-    by_thrust = np.asarray((higher - lower) / (2.0 * step))
     corrected = without(measured) + (fitted - without(fitted))
-    return TiltFit(values, np.asarray(covariance), by_thrust, corrected, left, tilt)
+    columns = np.column_stack(nuisance(points))
+    unbiased = np.linalg.lstsq(columns, measured - fitted, rcond=None)[0]
+    sure = spread * float(np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1]))
+    drift = np.array([unbiased[1], sure])
+    return TiltFit(
+        values, np.asarray(covariance), by_held(lift=1e-4), by_held(raised=1e-4), corrected, left, drift, tilt
+    )
 
 
 def _loads(plane: TipPathPlane, thrust: float, hub_height: float, stiffness: float) -> tuple[float, ...]:
@@ -113,20 +131,31 @@ def _loads(plane: TipPathPlane, thrust: float, hub_height: float, stiffness: flo
 
 
 def _refuse_against(measured: Array, expected: Array, where: str) -> None:
-    """Raise where forces point against the deflection that was commanded."""
-    if np.sum(measured[:, :2] * expected[:, :2]) < 0.0:
+    """Raise where forces or moments point against the commanded deflection, on one axis or on both."""
+    for pair, what, hint in (
+        ([0, 1], "forces lean", "Turn the sign of the lateral forces, or that of servos or bar"),
+        ([2, 3], "moments point", "Turn the sign of the moments"),
+    ):
+        along = np.sum(measured * expected, axis=0)
+        against = [CHANNELS[i] for i in pair if along[i] < 0.0]
+        if along[pair].sum() < 0.0 or against:
+            raise BenchError(
+                f"{what} against the deflection that was commanded.",
+                where=where,
+                channel=", ".join(against or [CHANNELS[i] for i in pair]),
+                hint=f"{hint}; axes are forward-right-down.",
+            )
+
+
+def _refuse_unlike(measured: Array, left: Array, where: str) -> None:
+    """Raise where a channel does not follow the deflection at all: exchanged columns, or another axis' sensor."""
+    share = np.sum(left**2, axis=0) / np.sum(measured**2, axis=0)
+    if share.max() > _UNLIKE:
         raise BenchError(
-            "forces lean against the deflection that was commanded.",
+            f"does not follow the deflection: {100 * share.max():.0f} % of its square is left.",
             where=where,
-            channel="Fx, Fy",
-            hint="Turn the sign of the lateral forces, or that of servos or bar; axes are forward-right-down.",
-        )
-    if np.sum(measured[:, 2:] * expected[:, 2:]) < 0.0:
-        raise BenchError(
-            "moments point against the deflection that was commanded.",
-            where=where,
-            channel="Mx, My",
-            hint="Turn the sign of the moments; axes are forward-right-down.",
+            channel=CHANNELS[int(share.argmax())],
+            hint="Are two columns exchanged, or do they refer to other axes than forward-right-down?",
         )
 
 
@@ -161,9 +190,20 @@ def torques(tilt: Array, *, stiffness: float, thrust: float, hub_height: float) 
     return flapping + tilting, flapping, tilting
 
 
-def tilt_checks(points: Points, fit: TiltFit, kept: Mapping[str, float]) -> list[Check]:
-    """Settling, and the residuals against what the sensor's own noise could leave."""
-    checks = [check_settled(points, name) for name in ("Fx", "Mx")]
+def _checks(points: Points, fit: TiltFit, setting: Array) -> list[Check]:
+    """Settling, vibration, drift, repeats, and the residuals against what the sensor's own noise could leave.
+
+    Args:
+        setting: what was set at each point, equal for repeats, shape (n,).
+    """
+    checks = [check(points, name) for name in ("Fx", "Mx") for check in (check_settled, check_vibration)]
+    span, freedom = float(np.ptp(points.time)), len(points) - 3
+    for i, (name, unit) in enumerate(zip(CHANNELS, ("N", "N", "N m", "N m"), strict=True)):
+        value, sigma = (float(number) for number in fit.drift[:, i])
+        what, left = f"{points.where}: {name} [{unit}]", fit.residuals[:, i]
+        checks.append(check_drift(value, sigma, span=span, what=what))
+        line = Line(np.zeros(0), np.zeros((0, 0)), left, float(left.std()), freedom)
+        checks += check_structure(line, setting, what=what)
     force, moment = (np.sqrt(np.mean(fit.residuals[:, pair] ** 2)) for pair in ([0, 1], [2, 3]))
     checks.append(Check(f"{points.where}: residuals {1e3 * force:.2g} mN and {1e3 * moment:.2g} N mm."))
     curvature = np.polyfit(fit.tilt, np.sum(fit.residuals[:, 2:] * np.sign(fit.corrected[:, 2:]), axis=1), 2)[0]
@@ -175,6 +215,65 @@ def tilt_checks(points: Points, fit: TiltFit, kept: Mapping[str, float]) -> list
             good=not bent,
         )
     )
-    known = ", ".join(f"{name} = {value:.4g}" for name, value in kept.items())
-    checks.append(Check(f"Taken as known: {known}."))
     return checks
+
+
+def tilt_result(
+    module: tuple[str, str, str],
+    records: Sequence[BenchRecord],
+    card: Mapping[str, float],
+    deflections: Deflections,
+    *,
+    rotor_name: str,
+    channels: Sequence[str],
+    settings: tuple[str, str],
+) -> BenchResult:
+    """Linkage and hub stiffness of one rotor from its record; the phase lag is a finding.
+
+    Args:
+        module: name, title and source of the procedure.
+        records: one; more than one would need the lag at each speed.
+        card: `k_thrust`, `hub_height` of the rotor and `air_density` are held.
+        deflections: what steers the rotor.
+        rotor_name: "upper" or "lower".
+        channels: that the steady points need beside the loads.
+        settings: the two of them that are set.
+
+    Raises:
+        BenchError: as `fit_tilt`, or for more than one record.
+    """
+    if len(records) != 1:
+        raise BenchError(
+            f"{len(records)} records, expected one.", where=", ".join(r.name for r in records), hint="Join them."
+        )
+    (record,) = records
+    points = steady_points(record, (*channels, *CHANNELS))
+    names = (f"linkage_{rotor_name}", f"hub_stiffness_{rotor_name}")
+    factor, height = f"k_thrust_{rotor_name}", f"hub_height_{rotor_name}"
+    density = record.number("air_density", card["air_density"]) / card["air_density"]
+    speed = points[f"omega_{rotor_name}"]
+    thrust = card[factor] * density * speed**2
+    lag = card[f"k_zeta_{rotor_name}"] * float(speed.mean()) + card[f"o_zeta_{rotor_name}"]
+    start = np.array([card[names[0]], lag, card[names[1]]])
+    fit = fit_tilt(points, deflections(points), thrust, hub_height=card[height], start=start)
+    setting = np.round(points[settings[0]], 3) + 1e3 * np.round(points[settings[1]], 3)
+    pair, leans = [0, 2], {factor: fit.by_thrust / card[factor], height: fit.by_height / card[height]}
+    return BenchResult(
+        *module,
+        names,
+        fit.values[pair],
+        fit.covariance[np.ix_(pair, pair)],
+        (record.name,),
+        tuple(_checks(points, fit, setting)),
+        tuple(figure_6(fit, float(thrust.mean()), hub_height=card[height], rotor_name=rotor_name)),
+        leans_on={name: slope[pair] for name, slope in leans.items()},
+        findings=(
+            Finding(
+                f"phase lag offset of the {rotor_name} rotor at {speed.mean():.0f} rad/s",
+                float(fit.values[1]),
+                float(np.sqrt(fit.covariance[1, 1])),
+                "rad",
+                {name: float(slope[1]) for name, slope in leans.items()},
+            ),
+        ),
+    )
