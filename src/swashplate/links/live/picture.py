@@ -8,7 +8,7 @@ from typing import Any
 
 from swashplate.physics import rotor, stabilizer_bar
 from swashplate.physics.backend import FloatBackend
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.vehicles import coax, conventional
 from swashplate.vehicles.structure import rebuild
@@ -20,12 +20,12 @@ _XP = FloatBackend()
 
 
 def picture(vehicle: Vehicle) -> dict[str, Any]:
-    """Shapes in body axes (forward, right, down) [m]: rotors, bar, tail, fuselage and skids.
+    """Shapes in body axes (forward, right, down) [m]: rotors, bar, tail, fin and skids; size [m] and weight [N].
 
     What a card does not say (the fuselage's outline) is a plain shape of the rotor's size.
     """
     card = vehicle.card.values()
-    radius = card["rotor_radius"]
+    radius, weight = card["rotor_radius"], card["mass"] * LABORATORY_GRAVITY
     if _is_coaxial(vehicle):
         hubs = {"upper": (-1, card["hub_height_upper"]), "lower": (1, card["hub_height_lower"])}
         rotors = [
@@ -35,7 +35,8 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
         height = card["hub_height_upper"] + 0.25 * radius
         bar = {"hub": [0.0, 0.0, -height], "radius": 0.55 * radius} if vehicle.card.options.get("bar", True) else None
         skids = {"length": 0.45 * radius, "width": 0.35 * radius, "depth": 0.55 * radius}
-        return {"size": radius, "rotors": rotors, "bar": bar, "tail": None, "skids": skids, "fin": None}
+        parts = {"rotors": rotors, "bar": bar, "tail": None, "skids": skids, "fin": None}
+        return {"size": radius, "weight": weight, **parts}
     hub = [card["hub_x"], card["hub_y"], -card["hub_height"]]
     sense = 1 if vehicle.card.options.get("rotation", "ccw") == "cw" else -1
     main = {"name": "main", "hub": hub, "radius": radius, "blades": round(card["rotor_blades"]), "sense": sense}
@@ -52,7 +53,8 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
     if min(skids.values()) <= 0.0:
         skids = {"length": 0.3 * radius, "width": 0.2 * radius, "depth": 0.3 * radius}
     fin = {"x": -card["fin_arm"], "z": -card["fin_height"], "side": math.sqrt(max(card["fin_area"], 0.0))}
-    return {"size": radius, "rotors": [main], "bar": bar, "tail": tail, "skids": skids, "fin": fin}
+    parts = {"rotors": [main], "bar": bar, "tail": tail, "skids": skids, "fin": fin}
+    return {"size": radius, "weight": weight, **parts}
 
 
 def pose_of(vehicle: Vehicle) -> Pose:
