@@ -57,6 +57,15 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
     return {"size": radius, "weight": weight, **parts}
 
 
+def inputs_of(vehicle: Vehicle) -> list[dict[str, Any]]:
+    """Name, unit and limits of each input: commands of a coaxial helicopter are pure numbers, blade pitch is in rad."""
+    plain = (*coax.CoaxInputs._fields, "throttle")
+    return [
+        {"name": name, "unit": "1" if name in plain else "rad", "low": low, "high": high}
+        for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True)
+    ]
+
+
 def pose_of(vehicle: Vehicle) -> Pose:
     """A function from state row, input row and surroundings to how the moving parts stand.
 

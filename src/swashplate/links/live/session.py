@@ -12,10 +12,9 @@ from typing import Any
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
-from swashplate.flights.schema import channel
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import Identifying
-from swashplate.links.live.picture import Pose, picture, pose_of
+from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
 from swashplate.links.live.pilots import MODES, STICKS
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
@@ -195,10 +194,7 @@ class Session:
             "trust": vehicle.card.trust,
             "controller": world.pilot.title,
             "picture": picture(vehicle),
-            "inputs": [
-                {"name": name, "unit": channel(name).unit or "1", "low": low, "high": high}
-                for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True)
-            ],
+            "inputs": inputs_of(vehicle),
             "modes": list(MODES),
             "voltages": None if world.nominal_voltage is None else _voltages(world.nominal_voltage),
             "rate": 1.0 / world.period,

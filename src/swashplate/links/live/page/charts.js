@@ -49,13 +49,22 @@ class Chart {
     const axis = { stroke: "#444", font: "11px system-ui", grid: { stroke: "#e3e6e8" }, ticks: { show: false } };
     this.plot = new uPlot({
       width: 300, height: 110, legend: { show: false }, cursor: { show: false }, series,
-      scales: { x: { time: false }, y: { range: (_, low, high) => spread(low, high) } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => this.fixed ?? spread(low, high) } },
+      hooks: { draw: [(plot) => this.#mark(plot)] },
       axes: [{ ...axis, size: 22, space: 60 }, { ...axis, size: 46, space: 24 }],
     }, this.data, this.canvas);
   }
   resize() {
     const width = this.canvas.clientWidth, height = Math.max(80, this.box.clientHeight - this.box.firstChild.clientHeight - 2);
     if (width && (width !== this.plot.width || height !== this.plot.height)) this.plot.setSize({ width, height });
+  }
+  // A line at the time that is shown (replay).
+  #mark(plot) {
+    if (this.marker === undefined) return;
+    const x = Math.round(plot.valToPos(this.marker, "x", true)), { top, height, left, width } = plot.bbox;
+    if (x < left || x > left + width) return;
+    plot.ctx.fillStyle = "#111";
+    plot.ctx.fillRect(x, top, 1.5, height);
   }
   told(craft) {
     const now = this.panel.read(craft);
@@ -107,21 +116,30 @@ export class Charts {
       });
     }
   }
-  // A whole flight: rows of columns as `read` gives them.
+  // A whole flight; a craft that is null is a gap. What is predicted does not widen the scale.
   fill(times, crafts, ghosts) {
     for (const chart of this.charts) {
       const { panel } = chart, n = panel.names.length;
-      const own = crafts.map((craft) => panel.read(craft));
+      const own = crafts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null)));
+      const values = own.flat().filter((value) => value !== null);
+      const low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
+      chart.fixed = spread(low - 0.2 * (high - low), high + 0.2 * (high - low));
       const other = panel.ghost ? ghosts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null))) : [];
       chart.data = [times, ...panel.names.map((_, i) => own.map((row) => row[i]))];
       if (panel.ghost) chart.data.push(...panel.names.map((_, i) => other.map((row) => row[i])));
       chart.plot.setData(chart.data);
     }
   }
-  window(low, high) {
-    for (const { plot } of this.charts) plot.setScale("x", { min: low, max: high });
+  mark(time, craft) {
+    for (const chart of this.charts) {
+      chart.marker = time;
+      chart.told(craft);
+      chart.plot.redraw(false, false);
+    }
   }
-  tell(craft) {
-    for (const chart of this.charts) chart.told(craft);
+  // Calls back with the time that is clicked on.
+  onPick(pick) {
+    for (const { plot } of this.charts)
+      plot.over.addEventListener("click", (event) => pick(plot.posToVal(event.offsetX, "x")));
   }
 }
