@@ -12,7 +12,7 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any free one.", min=0, max=65535)]
-Host = Annotated[str, typer.Option("--host", help="Address to listen on; beyond this machine with --allow-remote only.")]
+Host = Annotated[str, typer.Option("--host", help="Address to listen on; other than loopback with --allow-remote.")]
 Remote = Annotated[bool, typer.Option("--allow-remote", help="Let other machines open the page and fly.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the page in the browser.")]
 

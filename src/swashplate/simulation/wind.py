@@ -97,7 +97,7 @@ _NAMES = ("wind_north", "wind_east", "wind_down")
 
 
 class _Filter(NamedTuple):
-    """White noise to one component: `x -> step x + noise n`, what comes out is `output x`; `start` makes the first x."""
+    """White noise to one component: `x -> step x + noise n`, out comes `output x`; `start` makes the first x."""
 
     step: Array
     noise: Array

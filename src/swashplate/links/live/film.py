@@ -15,7 +15,7 @@ from swashplate.atomic import replaced_when_complete
 from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
 from swashplate.links.live.picture import inputs_of, picture, pose_of
-from swashplate.links.live.replay import Replay, gaps
+from swashplate.links.live.replay import Replay, floor, gaps
 from swashplate.links.live.wireframe import Camera, ground, helicopter
 from swashplate.physics.environment import Environment
 
@@ -117,7 +117,8 @@ class _Page:
         self._pose, self._around = pose_of(shown.vehicle), Environment()
         dpi = 100
         figure = Figure(figsize=(SIZE[0] / dpi, SIZE[1] / dpi), dpi=dpi, facecolor="white")
-        self._canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
+        self._canvas: Any = canvas
         self._scene: Any = figure.add_axes((0.0, 0.0, 0.64, 1.0), facecolor="#dbe8f2")
         aspect = 0.64 * SIZE[0] / SIZE[1]
         self._scene.set(xlim=(-aspect, aspect), ylim=(-1.0, 1.0), xticks=[], yticks=[])
@@ -134,10 +135,10 @@ class _Page:
                 color="#0072B2",
             )
         self._markers = self._charts(figure)
-        self._canvas.draw()
-        self._still = self._canvas.copy_from_bbox(figure.bbox)
+        canvas.draw()
+        self._still: Any = canvas.copy_from_bbox(figure.bbox)
         cell = 1.0 if self._picture["size"] < 0.4 else 5.0 if self._picture["size"] < 2.0 else 50.0
-        self._cell, self._heading = cell, float(shown.states[0, 8])
+        self._cell, self._floor, self._heading = cell, floor(shown), float(shown.states[0, 8])
 
     def _charts(self, figure: Any) -> list[Any]:
         shown = self._shown
@@ -153,7 +154,9 @@ class _Page:
             panels.append((f"{title} [{unit}]", curves))
         units = inputs_of(shown.vehicle)
         turns = [np.degrees(1.0) if each["unit"] == "rad" else 1.0 for each in units]
-        commands = [(each["name"], turns[i] * shown.inputs[:, i], None) for i, each in enumerate(units)]
+        commands: list[tuple[str, Array, Array | None]] = [
+            (each["name"], turns[i] * shown.inputs[:, i], None) for i, each in enumerate(units)
+        ]
         words = {("rad",): "deg", ("1",): "1"}.get(tuple({each["unit"] for each in units}), "deg, 1")
         panels.append((f"inputs [{words}]", commands))
         broken = gaps(shown.time)
@@ -165,7 +168,15 @@ class _Page:
                 if other is not None:
                     axes.plot(time, other, color=color, lw=0.8, ls="--")
             axes.set_title(title, fontsize=8, loc="left", pad=3)
-            axes.legend(fontsize=6, ncols=len(curves), loc="lower right", bbox_to_anchor=(1.0, 0.98), frameon=False, handlelength=1.0, columnspacing=1.0)
+            axes.legend(
+                fontsize=6,
+                ncols=len(curves),
+                loc="lower right",
+                bbox_to_anchor=(1.0, 0.98),
+                frameon=False,
+                handlelength=1.0,
+                columnspacing=1.0,
+            )
             axes.tick_params(labelsize=7)
             axes.grid(color="#e3e6e8", lw=0.6)
             axes.set_xlim(time[0], time[-1])
@@ -181,12 +192,12 @@ class _Page:
         self._heading += 0.1 * float(np.arctan2(np.sin(gap), np.cos(gap)))
         size = self._picture["size"]
         camera = Camera(x[:3], heading=self._heading, distance=9.0 * size)
-        canvas: Any = self._canvas
+        canvas = self._canvas
         canvas.restore_region(self._still)
-        for kind, points in ground(x[:3], self._cell):
+        for kind, points in ground(x[:3], self._cell, floor=self._floor):
             self._line(kind, camera.project(points))
         self._line("trail", camera.project(shown.states[max(0, k - 400) : k + 1, :3]))
-        plumb = np.array([[x[0], x[1], x[2]], [x[0], x[1], 0.0]])
+        plumb = np.array([[x[0], x[1], x[2]], [x[0], x[1], self._floor]])
         self._line("grid", camera.project(plumb))
         parts = self._pose(x, shown.inputs[k], self._around)
         if shown.predicted is not None and np.all(np.isfinite(shown.predicted[k])):

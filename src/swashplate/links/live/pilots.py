@@ -197,7 +197,5 @@ def single_rotor_step(
     held = jnp.concatenate([jnp.stack([x, y]), wanted[2 : len(REFERENCES)]])
     # The hold works on deviations: what is asked for is taken from what is measured.
     seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5])
-    memory, commands = state_hold_step(
-        memory, time, seen, held, gains[1 + 4 * inputs :], inputs=inputs, states=states
-    )
+    memory, commands = state_hold_step(memory, time, seen, held, gains[1 + 4 * inputs :], inputs=inputs, states=states)
     return memory, commands + mixing @ wanted[6:10]

@@ -33,7 +33,8 @@ def save_recording(
     """
     if len(rows) * period < SHORTEST:
         raise FlightError(f"the recording has {len(rows) * period:.1f} s, expected at least {SHORTEST:g} s.")
-    table, n = np.array(rows), len(vehicle.state_names)
+    table: NDArray[np.float64] = np.stack(rows)
+    n = len(vehicle.state_names)
     truth = simulated_flight(
         vehicle, np.arange(len(rows)) * period, table[:, :n], table[:, n:], details={"flown": "by hand, live"}
     )

@@ -191,6 +191,11 @@ def gaps(time: Array) -> NDArray[np.bool_]:
     return np.concatenate([[False], np.diff(time) > 2.5 * np.median(np.diff(time))])
 
 
+def floor(shown: Replay) -> float:
+    """How far down the ground is drawn [m]: at the origin, or under the skids where the flight goes lower."""
+    return max(0.0, float(np.max(shown.states[:, 2])) + float(picture(shown.vehicle)["skids"]["depth"]))
+
+
 def as_json(shown: Replay) -> dict[str, Any]:
     """What the page draws: shapes, and per moment body state, inputs, discs and the predicted body state."""
     vehicle = shown.vehicle
@@ -207,7 +212,7 @@ def as_json(shown: Replay) -> dict[str, Any]:
         "vehicle": vehicle.card.title,
         "simulated": shown.simulated,
         "ahead": shown.ahead if shown.predicted is not None else None,
-        "picture": picture(vehicle),
+        "picture": {**picture(vehicle), "floor": floor(shown)},
         "inputs": inputs_of(vehicle),
         "time": _short(shown.time - shown.time[0]),
         "moments": moments,

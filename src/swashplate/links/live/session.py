@@ -1,4 +1,4 @@
-"""One flight on the live page: the world, its clock, recordings and identifications, and what the page hears of them."""
+"""One flight on the live page: the world, its clock, recordings and identifications, and what a page hears of it."""
 
 from __future__ import annotations
 
@@ -209,7 +209,7 @@ class Session:
             around, pose, vehicle = self.world.environment(), self._pose, self.world.vehicle
         crafts = {}
         for name, (x, u) in now.crafts.items():
-            parts = pose(x, u, around)
+            parts = pose(x.tolist(), u.tolist(), around)
             crafts[name] = {"x": _short(x[:_BODY]), "u": _short(u), **{k: _short(v) for k, v in parts.items()}}
         time, job = self.clock.punctuality, self.identifying.job
         failed = self.clock.failure

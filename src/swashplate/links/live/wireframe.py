@@ -55,18 +55,18 @@ def helicopter(picture: dict[str, Any], x: Array, parts: dict[str, Any], *, time
         found.append(("body", [[-0.3 * R, 0.0, -0.05 * R], hub]))
         found.append(("tail", np.stack([radius * np.cos(_TURN), 0.0 * _TURN, radius * np.sin(_TURN)], axis=1) + hub))
         if parts["tail"]:
-            found.append(("thrust", [hub, hub + [0.0, 3.0 * per * parts["tail"][1], 0.0]]))
+            found.append(("thrust", [hub, hub + np.array([0.0, 3.0 * per * parts["tail"][1], 0.0])]))
     attitude = Rotation.from_euler("ZYX", [x[8], x[7], x[6]])
     return [(kind, attitude.apply(np.asarray(points, dtype=np.float64)) + x[:3]) for kind, points in found]
 
 
-def ground(center: Array, cell: float, cells: int = 12) -> Lines:
-    """Grid lines on z = 0 about a place."""
+def ground(center: Array, cell: float, *, floor: float = 0.0, cells: int = 12) -> Lines:
+    """Grid lines at a depth [m] about a place, a line every `cell` [m]."""
     north, east = (np.round(value / cell) * cell for value in center[:2])
     steps = np.arange(-cells, cells + 1) * cell
     fine = np.linspace(-cells * cell, cells * cell, 2 * cells + 1)
-    lines: Lines = [("grid", np.stack([north + fine, east + 0 * fine + s, 0 * fine], axis=1)) for s in steps]
-    return lines + [("grid", np.stack([north + 0 * fine + s, east + fine, 0 * fine], axis=1)) for s in steps]
+    lines: Lines = [("grid", np.stack([north + fine, east + 0 * fine + s, floor + 0 * fine], axis=1)) for s in steps]
+    return lines + [("grid", np.stack([north + 0 * fine + s, east + fine, floor + 0 * fine], axis=1)) for s in steps]
 
 
 class Camera:

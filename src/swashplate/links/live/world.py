@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
-from swashplate.links.live.recording import LONGEST
 from swashplate.links.live.pilots import STICKS, WANTED, Mode, Pilot, pilot
+from swashplate.links.live.recording import LONGEST
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Step
 from swashplate.simulation.dynamics import (
@@ -304,4 +304,3 @@ class World:
         """Take over the switches of another world (a bar was put on or off)."""
         self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
         self.reset()
-

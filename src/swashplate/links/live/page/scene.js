@@ -100,8 +100,9 @@ export class Scene {
       new THREE.PlaneGeometry(400 * this.cell, 400 * this.cell),
       new THREE.MeshBasicMaterial({ color: 0xb9c8ae }),
     );
+    this.floor = picture.floor ?? 0; // down [m]: a log whose origin is the hover began on its ground, not in it
     this.ground.rotation.x = -Math.PI / 2;
-    this.ground.position.y = -0.004 * this.cell;
+    this.ground.position.y = -this.floor - 0.004 * this.cell;
     this.scene.add(this.ground, this.grid);
     this.scene.fog.near = 12 * this.cell;
     this.scene.fog.far = 34 * this.cell;
@@ -142,9 +143,9 @@ export class Scene {
       if (!this.crafts[name]) this.#add(name);
       const { model, shadow, plumb } = this.crafts[name], x = rows[name];
       model.pose(x, moment[name], elapsed);
-      shadow.position.set(x[0], x[1], -0.002 * this.cell);
+      shadow.position.set(x[0], x[1], this.floor - 0.002 * this.cell);
       plumb.position.set(x[0], x[1], x[2]);
-      plumb.scale.z = Math.max(-x[2], 1e-3);
+      plumb.scale.z = Math.max(this.floor - x[2], 1e-3);
     }
     this.#look(rows.own);
     this.renderer.render(this.scene, this.camera);
@@ -157,7 +158,7 @@ export class Scene {
 
   #look(x) {
     const at = new THREE.Vector3(x[0], -x[2], x[1]), { turn, lift, zoom } = this.orbit;
-    this.grid.position.set(Math.round(at.x / this.cell) * this.cell, 0, Math.round(at.z / this.cell) * this.cell);
+    this.grid.position.set(Math.round(at.x / this.cell) * this.cell, -this.floor, Math.round(at.z / this.cell) * this.cell);
     this.ground.position.x = at.x;
     this.ground.position.z = at.z;
     if (this.view === "above") {
@@ -171,7 +172,7 @@ export class Scene {
       this.heading += 0.08 * gap;
       const distance = 9 * this.size * zoom, around = this.heading + turn, flat = distance * Math.cos(lift);
       this.camera.position.set(
-        at.x - flat * Math.cos(around), Math.max(at.y + distance * Math.sin(lift), 0.1 * this.size), at.z - flat * Math.sin(around),
+        at.x - flat * Math.cos(around), Math.max(at.y + distance * Math.sin(lift), 0.1 * this.size - this.floor), at.z - flat * Math.sin(around),
       );
       this.camera.up.set(0, 1, 0);
     }
