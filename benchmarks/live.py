@@ -1,7 +1,7 @@
 """Real time on the live page: steps that come late, the processor's share, and how long a stick takes.
 
-A page here is a program that reads every update (what a browser on another machine costs this one), or headless Chromium
-that draws in software on the same cores.
+A page here is a program that reads every update (what a browser on another machine costs this one), or headless
+Chromium that draws in software on the same cores.
 """
 
 from __future__ import annotations
@@ -23,12 +23,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 MODEL = "coax"
-_SOFTWARE = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-]
+_SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+_STIR = "swash.sticks.scripted = {roll: 0.05 * Math.sign(Math.random() - 0.5), pitch: 0, yaw: 0, heave: 0}"
 
 
 @dataclass(frozen=True)
@@ -144,9 +140,7 @@ def _drawn(seconds: float, chromium: str) -> Punctual:
         delays = []
         begun = time.monotonic()
         while time.monotonic() - begun < seconds:
-            page.evaluate(
-                "swash.sticks.scripted = {roll: 0.05 * Math.sign(Math.random() - 0.5), pitch: 0, yaw: 0, heave: 0}"
-            )
+            page.evaluate(_STIR)
             page.wait_for_timeout(1000)
             delays.append(page.evaluate("swash.latency") or float("nan"))
         last, spent = page.evaluate("swash.now"), time.monotonic() - begun

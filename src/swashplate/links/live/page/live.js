@@ -19,7 +19,7 @@ try {
 }
 const instruments = new Instruments($("instruments"));
 let charts = null, hello = null, now = null, before = null, arrived = 0, drawn = 0, drawnTime = 0, chartsAt = 0;
-let number = 0, sent = "", latency = null;
+let updates = 0, number = 0, sent = "", latency = null;
 const underway = new Map(); // stick messages by number and when they were sent
 
 const connection = new Connection({ heard, lost: () => ($("state").textContent = "connection lost, trying again …") });
@@ -55,7 +55,8 @@ function heard(message) {
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
   }
   panel.show(now, latency);
-  if (scene?.software && (now.steps & 1)) draw();
+  updates += 1;
+  if (scene?.software && updates % 3 === 0) draw();
 }
 
 // Where a body state will be a few milliseconds after it was told, from its last two.

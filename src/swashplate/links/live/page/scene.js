@@ -39,7 +39,7 @@ export class Scene {
     const gl = this.renderer.getContext(), told = gl.getExtension("WEBGL_debug_renderer_info");
     const name = String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
     this.software = SOFTWARE.test(name); // drawn by the processor that also simulates: fewer and coarser pictures
-    this.renderer.setPixelRatio(this.software ? 0.75 : Math.min(window.devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.software ? 0.6 : Math.min(window.devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0xdbe8f2);
     this.scene.fog = new THREE.Fog(0xdbe8f2, 10, 100);
