@@ -107,7 +107,7 @@ class Visit:
 
     def flies(self) -> Visit:
         self.until("window.swash?.now?.t > 0 && Number(document.documentElement.dataset.drawn) > 3")
-        self.page.click("#reset")
+        self.of("document.getElementById('reset').click()")  # where it stands: on a telephone that is far below
         self.until("window.swash.now.t < 1.5")
         return self
 
@@ -232,7 +232,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...]) -> None:
         visit.page.click("#job a")
     report = opened.value
     report.wait_for_selector("html[data-drawn=all]", state="attached", timeout=_WAIT)
-    assert report.locator(".banner", has_text="SIMULATED").count() == 1
+    assert report.locator(".canvas svg.main-svg").count() > 0
     report.close()
 
 

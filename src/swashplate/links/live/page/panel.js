@@ -22,7 +22,7 @@ export class Panel {
     this.#slider("east", " m/s", blow);
     this.#slider("gusts", " m/s", (value) => say("gusts", { value }));
     this.#slider("voltage", " V", (value) => say("voltage", { value }));
-    $("pause").onclick = () => this.shortcut("Space");
+    $("pause").onclick = () => this.#pause();
     $("step").onclick = () => say("step");
     $("reset").onclick = () => say("reset");
     $("slower").onclick = () => this.#faster(-1);
@@ -43,6 +43,10 @@ export class Panel {
     input.show = show;
   }
 
+  #pause() {
+    this.say("pause", { value: Boolean(this.now?.runs) });
+  }
+
   #faster(by) {
     const place = SPEEDS.indexOf(this.now?.speed ?? 1);
     const value = SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, (place < 0 ? 3 : place) + by))];
@@ -52,7 +56,7 @@ export class Panel {
   // A key that is no stick; true where it meant something.
   shortcut(code) {
     const does = {
-      Space: () => this.say("pause", { value: Boolean(this.now?.runs) }),
+      Space: () => this.#pause(),
       Period: () => this.say("step"),
       KeyR: () => this.say("reset"),
       Minus: () => this.#faster(-1),
@@ -60,8 +64,9 @@ export class Panel {
       NumpadAdd: () => this.#faster(1),
       NumpadSubtract: () => this.#faster(-1),
     }[code];
-    if (does && document.activeElement?.tagName !== "BUTTON") does();
-    return Boolean(does) && document.activeElement?.tagName !== "BUTTON";
+    if (!does || (code === "Space" && document.activeElement?.tagName === "BUTTON")) return false; // it presses that
+    does();
+    return true;
   }
 
   hello(hello) {
