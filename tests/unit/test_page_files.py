@@ -1,4 +1,4 @@
-"""The page's files: nothing from elsewhere, every import there, libraries pinned by hash and named with their licences."""
+"""The page's files: nothing from elsewhere, every import there, libraries pinned by hash, no address in the lock."""
 
 from __future__ import annotations
 

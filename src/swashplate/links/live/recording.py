@@ -33,11 +33,9 @@ def save_recording(
     """
     if len(rows) * period < SHORTEST:
         raise FlightError(f"the recording has {len(rows) * period:.1f} s, expected at least {SHORTEST:g} s.")
-    table: NDArray[np.float64] = np.stack(rows)
-    n = len(vehicle.state_names)
-    truth = simulated_flight(
-        vehicle, np.arange(len(rows)) * period, table[:, :n], table[:, n:], details={"flown": "by hand, live"}
-    )
+    table, n = np.stack(rows), len(vehicle.state_names)
+    time = np.asarray(np.arange(len(rows)) * period, dtype=np.float64)
+    truth = simulated_flight(vehicle, time, table[:, :n], table[:, n:], details={"flown": "by hand, live"})
     folder.mkdir(parents=True, exist_ok=True)
     truth.save(folder / f"recording-{number}-truth.nc")
     return observe(truth, vehicle, sensors=QUIET, seed=number).save(folder / f"recording-{number}.nc")
