@@ -58,5 +58,5 @@ proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
 
 clean:
-	rm -rf .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -205,6 +205,25 @@ def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
         moments(page, lambda m: m["runs"])
 
 
+def test_the_bar_comes_off_and_everything_else_stays(running: Running) -> None:
+    with running.socket() as page:
+        for message in ({"type": "mode", "value": "velocity"}, {"type": "bar", "value": False}):
+            page.send(json.dumps(message))
+        off = moments(page, lambda m: not m["setting"]["bar"], most=3000)
+        assert off["setting"]["mode"] == "velocity"
+        assert off["own"]["bar"] is None
+        page.send(json.dumps({"type": "bar", "value": True}))
+        assert moments(page, lambda m: m["setting"]["bar"], most=3000)["version"] == off["version"] + 1
+
+
+def test_a_message_that_fails_is_told_to_the_pilot(running: Running) -> None:
+    with running.socket() as page:
+        page.send(json.dumps({"type": "record", "value": True}))
+        moments(page, lambda m: m["recording"] is not None)
+        page.send(json.dumps({"type": "record", "value": False}))
+        assert "expected at least 2 s" in moments(page, lambda m: m["notice"])["notice"]
+
+
 def test_other_pages_and_other_names_are_refused(running: Running) -> None:
     port = running.host.rpartition(":")[2]
     assert httpx.get(running.url).status_code == 200

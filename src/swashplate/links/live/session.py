@@ -158,11 +158,16 @@ class Session:
             return
         await self._record(False)
         vehicle = from_card(replace(card, options={**card.options, "bar": on}))
-        world, pose = await asyncio.to_thread(self._make, vehicle)
-        with self.lock:
-            world.keep_setting(self.world)
-            self.world, self._pose = world, pose
-        self.version += 1
+        ran = self.clock.runs
+        self.clock.go(False)  # compiling takes seconds in which no step would be on time
+        try:
+            world, pose = await asyncio.to_thread(self._make, vehicle)
+            with self.lock:
+                world.keep_setting(self.world)
+                self.world, self._pose = world, pose
+            self.version += 1
+        finally:
+            self.clock.go(ran)
 
     async def _record(self, on: bool) -> None:
         with self.lock:
