@@ -5,12 +5,12 @@ const DEG = 180 / Math.PI;
 const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
 const wrapped = (angle) => DEG * Math.atan2(Math.sin(angle), Math.cos(angle));
 
-export function panels(inputs) {
+export function panels(inputs, angle) {
   const body = (first, names, unit, shown) => ({
     names, unit, read: (craft) => names.map((_, i) => shown(craft.x[first + i])), ghost: true,
   });
   return [
-    { title: "Attitude", ...body(6, ["roll", "pitch", "heading"], "deg", wrapped) },
+    { title: "Attitude", ...body(6, ["roll", "pitch", "heading"], "deg", angle) },
     { title: "Rates", ...body(9, ["p", "q", "r"], "deg/s", (v) => DEG * v) },
     { title: "Velocities", ...body(3, ["u", "v", "w"], "m/s", (v) => v) },
     {
@@ -81,10 +81,10 @@ function spread(low, high) {
 }
 
 export class Charts {
-  constructor(home, inputs, { seconds = 20 } = {}) {
+  constructor(home, inputs, { seconds = 20, whole = false } = {}) {
     home.replaceChildren();
     this.seconds = seconds;
-    this.charts = panels(inputs).map((panel) => new Chart(home, panel));
+    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped).map((panel) => new Chart(home, panel));
     this.pending = false;
     new ResizeObserver(() => this.charts.forEach((chart) => chart.resize())).observe(home);
   }
