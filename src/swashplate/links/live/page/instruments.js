@@ -44,7 +44,7 @@ export class Instruments {
     this.number("height", `${(-z).toFixed(2)} m`);
     this.number("climb", `${climb.toFixed(2)} m/s`);
     this.number("speed", `${Math.hypot(u, v, w).toFixed(2)} m/s`);
-    this.number("heading", `${((((DEG * psi) % 360) + 360) % 360).toFixed(0)}°`);
+    this.number("heading", `${((Math.round(DEG * psi) % 360) + 360) % 360}°`);
     this.number("rotor", craft.rotors.map((rotor) => `${((30 / Math.PI) * rotor[2]).toFixed(0)}`).join(" / ") + " rpm");
     if (around) this.number("battery", around);
   }
