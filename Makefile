@@ -6,7 +6,7 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 WORKERS ?= 2
 
-.PHONY: help demo test lint types layers unit speed proof clean
+.PHONY: help demo test page lint types layers unit speed proof clean
 .DEFAULT_GOAL := help
 
 help:
@@ -27,12 +27,16 @@ demo: $(STAMP)
 	$(BIN)/swash demo --out demo
 
 # In this order, one after the other (also under make -j): what fails fastest comes first.
-test: $(STAMP)
+test: $(STAMP) page
 	$(MAKE) --no-print-directory lint
 	$(MAKE) --no-print-directory types
 	$(MAKE) --no-print-directory layers
 	$(MAKE) --no-print-directory unit
 	$(MAKE) --no-print-directory speed
+
+# three.js and uPlot for `swash live`, by hash; without npm the tests of the page are skipped with the reason.
+page:
+	$(PYTHON) scripts/vendor_page.py --if-npm
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -54,5 +58,5 @@ proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
 
 clean:
-	rm -rf .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

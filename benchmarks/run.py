@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import export, frequency, helicopter, identifying, link, many, peers, single
+from benchmarks import export, frequency, helicopter, identifying, link, live, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -97,11 +97,31 @@ def main() -> None:
             span.name, f"{span.seconds:.2f}", f"{span.target:.2f}", "met" if span.met else "MISSED", span.note
         )
     Console().print(table)
+    flown = live.measure(short=options.short)
+    table = Table(title="Live: 500 Hz physics and 100 Hz controller in real time")
+    for heading in (
+        "page",
+        "late %",
+        "promised",
+        "",
+        "server's core %",
+        "updates/s",
+        "stick ms",
+        "for s",
+        "load before",
+    ):
+        table.add_column(heading, justify="left" if heading == "page" else "right")
+    for run in flown:
+        numbers = [f"{run.processor:.1f}", f"{run.updates:.1f}", f"{run.latency:.0f}", f"{run.seconds:.0f}"]
+        verdict = "met" if run.met else "MISSED"
+        table.add_row(run.name, f"{run.late:.3f}", f"{run.target:g}", verdict, *numbers, f"{run.load:.1f}")
+    Console().print(table)
     if options.out is not None:
         document = {
             "machine": where,
             "results": [result.as_json() for result in results],
             "spans": [span.as_json() for span in spans],
+            "live": [run.as_json() for run in flown],
         }
         options.out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 

@@ -89,7 +89,7 @@ class Command:
 
     @property
     def runs(self) -> bool:
-        return self.words[0] == "swash" and not self.line.startswith("swash data fetch")
+        return self.words[0] == "swash" and not self.line.startswith(("swash data fetch", "swash live", "swash replay"))
 
 
 def commands(fence: Fence) -> list[Command]:

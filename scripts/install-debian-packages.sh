@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# Installs what the tests need from Debian: Chromium (the report is opened in it), a C compiler, make and venv.
+# Installs what the tests need from Debian: Chromium (the report and the live page are opened in it), npm (it
+# fetches the live page's libraries), a C compiler, make and venv.
 # Does nothing where all of it is there; asks sudo where it is not run by root.
 set -euo pipefail
 
 missing=()
 command -v chromium > /dev/null || missing+=(chromium)
+command -v npm > /dev/null || missing+=(nodejs npm)
 command -v gcc > /dev/null || missing+=(gcc libc6-dev)
 command -v make > /dev/null || missing+=(make)
 python3 -c 'import ensurepip, venv' 2> /dev/null || missing+=(python3-venv)

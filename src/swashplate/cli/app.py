@@ -20,7 +20,9 @@ from swashplate.cli import (
     identify,
     inspect,
     link,
+    live,
     maneuver,
+    replay,
     respond,
     simulate,
     trim,
@@ -69,6 +71,8 @@ app.command("respond", short_help="Frequency responses from logs of sweeps.")(re
 app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
+app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
+app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)

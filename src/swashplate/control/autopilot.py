@@ -205,6 +205,15 @@ class Autopilot:
     def step(self) -> Step:
         return row_step
 
+    def in_mode(self, mode: Mode) -> Autopilot:
+        """The same in another mode; loops that its own mode leaves out get the default numbers."""
+        if mode not in MODES:
+            raise SwashError(f"is '{mode}', expected {', '.join(MODES)}.", channel="mode")
+        usual = CyclicGains()
+        restored = {name: getattr(usual, name) for name in _MODE_GAINS[self.mode]}
+        cyclic = self.numbers.cyclic._replace(**{**restored, **_MODE_GAINS[mode]})
+        return replace(self, mode=mode, numbers=self.numbers._replace(cyclic=cyclic))
+
     def with_gains(self, **changes: float) -> Autopilot:
         """Another with some numbers changed, by their names in `HeightYawGains`, `CyclicGains` and `Decoupler`."""
         numbers, left = self.numbers, dict(changes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -58,8 +59,55 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
     """
     random = np.random.default_rng(seed)
     found = {}
-    names = ("wind_north", "wind_east", "wind_down")
-    for i, (name, sigma, length) in enumerate(zip(names, gusts.sigma, gusts.length, strict=True)):
+    for name, part in zip(_NAMES, _filters(gusts, rate), strict=True):
+        x = part.start @ random.standard_normal((part.step.shape[0], count))
+        series = np.empty((samples, count))
+        for k in range(samples):
+            series[k] = part.output @ x
+            x = part.step @ x + part.noise @ random.standard_normal(x.shape)
+        found[name] = series
+    return found
+
+
+class Turbulence:
+    """The same turbulence, one sample at a time, for a simulation whose end is not known.
+
+    Args:
+        gusts: the setting.
+        rate: samples per second [Hz].
+        seed: of the noise.
+    """
+
+    def __init__(self, gusts: Gusts, *, rate: float, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
+        self._filters = _filters(gusts, rate)
+        self._x = [part.start @ self._random.standard_normal(part.step.shape[0]) for part in self._filters]
+
+    def sample(self) -> Array:
+        """Wind towards north, east and down [m/s], shape (3,), and on to the next."""
+        now = np.array([part.output @ x for part, x in zip(self._filters, self._x, strict=True)])
+        self._x = [
+            part.step @ x + part.noise @ self._random.standard_normal(x.size)
+            for part, x in zip(self._filters, self._x, strict=True)
+        ]
+        return now
+
+
+_NAMES = ("wind_north", "wind_east", "wind_down")
+
+
+class _Filter(NamedTuple):
+    """White noise to one component: `x -> step x + noise n`, out comes `output x`; `start` makes the first x."""
+
+    step: Array
+    noise: Array
+    output: Array
+    start: Array
+
+
+def _filters(gusts: Gusts, rate: float) -> list[_Filter]:
+    found = []
+    for i, (sigma, length) in enumerate(zip(gusts.sigma, gusts.length, strict=True)):
         T = length / gusts.speed
         if i == 0:
             A, c = np.array([[-1.0 / T]]), np.array([1.0])
@@ -71,13 +119,7 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
         P = scipy.linalg.solve_continuous_lyapunov(A, -b @ b.T)
         P *= sigma**2 / (c @ P @ c)
         step = scipy.linalg.expm(A / rate)
-        noise = _root(P - step @ P @ step.T)
-        x = _root(P) @ random.standard_normal((A.shape[0], count))
-        series = np.empty((samples, count))
-        for k in range(samples):
-            series[k] = c @ x
-            x = step @ x + noise @ random.standard_normal(x.shape)
-        found[name] = series
+        found.append(_Filter(step, _root(P - step @ P @ step.T), c, _root(P)))
     return found
 
 

@@ -1,0 +1,102 @@
+"""What a page may say: every message is checked against this table before anything looks at it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from swashplate.errors import SwashError
+from swashplate.links.live.pilots import MODES, STICKS
+
+LONGEST = 2048
+"""Characters of a message."""
+
+Check = Callable[[Any], bool]
+
+
+def _number(low: float, high: float) -> Check:
+    def check(value: Any) -> bool:
+        return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
+
+    return check
+
+
+def _whole(low: int, high: int) -> Check:
+    return lambda value: isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
+
+
+def _one_of(*allowed: Any) -> Check:
+    return lambda value: isinstance(value, str) and value in allowed
+
+
+def _switch(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+SPEEDS = (0.1, 4.0)
+"""Slowest and fastest run of time."""
+SCHEMA: Mapping[str, Mapping[str, Check]] = {
+    "stick": {**dict.fromkeys(STICKS, _number(-1.0, 1.0)), "number": _whole(0, 2**53)},
+    "mode": {"value": _one_of(*MODES)},
+    "decoupled": {"value": _switch},
+    "ghost": {"value": _switch},
+    "bar": {"value": _switch},
+    "wind": dict.fromkeys(("north", "east", "down"), _number(-20.0, 20.0)),
+    "gusts": {"value": _number(0.0, 5.0)},
+    "voltage": {"value": _number(1.0, 100.0)},
+    "maneuver": {
+        "kind": _one_of("sweep", "doublet", "3211"),
+        "axis": _one_of(*STICKS),
+        "size": _number(0.1, 3.0),
+    },
+    "pause": {"value": _switch},
+    "step": {},
+    "speed": {"value": _number(*SPEEDS)},
+    "reset": {},
+    "record": {"value": _switch},
+    "identify": {"recording": _whole(1, 10_000)},
+    "stop_identifying": {},
+}
+"""Fields and their checks by type; a message has exactly these and its `type`."""
+
+
+class MessageError(SwashError):
+    """A message that the schema does not allow."""
+
+
+def parse(text: str) -> dict[str, Any]:
+    """A message as its fields, `type` among them.
+
+    Raises:
+        MessageError: saying in a word what is wrong; never anything else, whatever the text.
+    """
+    if len(text) > LONGEST:
+        raise MessageError("too long")
+    try:
+        message = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+    except (ValueError, RecursionError):
+        raise MessageError("no JSON") from None
+    if not isinstance(message, dict) or not isinstance(message.get("type"), str):
+        raise MessageError("no type")
+    schema = SCHEMA.get(message["type"])
+    if schema is None:
+        raise MessageError("unknown type")
+    if message.keys() != {"type", *schema}:
+        raise MessageError("missing or unknown fields")
+    for name, check in schema.items():
+        if not check(message[name]):
+            raise MessageError(f"{message['type']}: bad {name}")
+    return message
+
+
+def _refuse(word: str) -> float:
+    raise ValueError(word)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value

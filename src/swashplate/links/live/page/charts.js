@@ -1,0 +1,145 @@
+// Strip charts of the last seconds (live) or of a whole flight (replay), with the second copy dashed.
+import uPlot from "./vendor/uPlot.esm.js";
+
+const DEG = 180 / Math.PI;
+const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
+const wrapped = (angle) => DEG * Math.atan2(Math.sin(angle), Math.cos(angle));
+
+export function panels(inputs, angle) {
+  const body = (first, names, unit, shown) => ({
+    names, unit, read: (craft) => names.map((_, i) => shown(craft.x[first + i])), ghost: true,
+  });
+  return [
+    { title: "Attitude", ...body(6, ["roll", "pitch", "heading"], "deg", angle) },
+    { title: "Rates", ...body(9, ["p", "q", "r"], "deg/s", (v) => DEG * v) },
+    { title: "Velocities", ...body(3, ["u", "v", "w"], "m/s", (v) => v) },
+    {
+      title: "Inputs", names: inputs.map((i) => i.name), ghost: false,
+      unit: inputs.every((i) => i.unit === "rad") ? "deg" : inputs.every((i) => i.unit === "1") ? "1" : "deg, 1",
+      read: (craft) => craft.u.map((v, i) => (inputs[i].unit === "rad" ? DEG * v : v)),
+    },
+  ];
+}
+
+class Chart {
+  constructor(home, panel) {
+    this.panel = panel;
+    const n = panel.names.length;
+    this.data = Array.from({ length: 1 + n * (panel.ghost ? 2 : 1) }, () => []);
+    this.box = document.createElement("figure");
+    this.box.className = "chart";
+    this.box.dataset.chart = panel.title.toLowerCase();
+    const head = document.createElement("figcaption");
+    const title = document.createElement("strong");
+    title.textContent = `${panel.title} [${panel.unit}]`;
+    head.append(title);
+    this.values = panel.names.map((name, i) => {
+      const label = document.createElement("span"), value = document.createElement("output");
+      label.style.color = COLORS[i];
+      label.append(name, " ", value);
+      head.append(label);
+      return value;
+    });
+    this.canvas = document.createElement("div");
+    this.box.append(head, this.canvas);
+    home.append(this.box);
+    const series = [{}], line = (i, dash) => ({ stroke: COLORS[i], width: dash ? 1 : 1.5, dash, points: { show: false } });
+    for (let i = 0; i < n; i++) series.push(line(i));
+    if (panel.ghost) for (let i = 0; i < n; i++) series.push(line(i, [5, 4]));
+    const axis = { stroke: "#444", font: "11px system-ui", grid: { stroke: "#e3e6e8" }, ticks: { show: false } };
+    this.plot = new uPlot({
+      width: 300, height: 110, legend: { show: false }, cursor: { show: false }, series,
+      scales: { x: { time: false }, y: { range: (_, low, high) => this.fixed ?? spread(low, high) } },
+      hooks: { draw: [(plot) => this.#mark(plot)] },
+      axes: [{ ...axis, size: 22, space: 60 }, { ...axis, size: 46, space: 24 }],
+    }, this.data, this.canvas);
+  }
+  resize() {
+    const width = this.canvas.clientWidth, height = Math.max(80, this.box.clientHeight - this.box.firstChild.clientHeight - 2);
+    if (width && (width !== this.plot.width || height !== this.plot.height)) this.plot.setSize({ width, height });
+  }
+  // A line at the time that is shown (replay).
+  #mark(plot) {
+    if (this.marker === undefined) return;
+    const x = Math.round(plot.valToPos(this.marker, "x", true)), { top, height, left, width } = plot.bbox;
+    if (x < left || x > left + width) return;
+    plot.ctx.fillStyle = "#111";
+    plot.ctx.fillRect(x, top, 1.5, height);
+  }
+  told(craft) {
+    const now = this.panel.read(craft);
+    now.forEach((value, i) => (this.values[i].textContent = Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(2)));
+    return now;
+  }
+}
+
+function spread(low, high) {
+  if (low === null || high === null || !Number.isFinite(low + high)) return [-1, 1];
+  const least = 0.05 + 0.01 * Math.max(Math.abs(low), Math.abs(high)), middle = (low + high) / 2;
+  const half = Math.max((high - low) * 0.56, least);
+  return [middle - half, middle + half];
+}
+
+export class Charts {
+  constructor(home, inputs, { seconds = 20, whole = false } = {}) {
+    home.replaceChildren();
+    this.seconds = seconds;
+    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped).map((panel) => new Chart(home, panel));
+    this.pending = false;
+    new ResizeObserver(() => this.charts.forEach((chart) => chart.resize())).observe(home);
+  }
+  clear() {
+    for (const { data } of this.charts) data.forEach((column) => (column.length = 0));
+  }
+  // One more sample at time t; drawn when `draw` is called.
+  add(t, own, ghost) {
+    for (const chart of this.charts) {
+      const { data, panel } = chart, n = panel.names.length;
+      if (data[0].length && t <= data[0].at(-1)) continue;
+      data[0].push(t);
+      chart.told(own).forEach((value, i) => data[1 + i].push(value));
+      if (panel.ghost) {
+        const values = ghost ? panel.read(ghost) : Array(n).fill(null);
+        values.forEach((value, i) => data[1 + n + i].push(value));
+      }
+      let old = 0;
+      while (data[0][old] < t - this.seconds) old += 1;
+      if (old > 30) data.forEach((column) => column.splice(0, old));
+    }
+    this.latest = t;
+  }
+  draw() {
+    for (const { plot, data } of this.charts) {
+      plot.batch(() => {
+        plot.setData(data, false);
+        plot.setScale("x", { min: Math.max(this.latest - this.seconds, data[0][0] ?? 0), max: this.latest });
+      });
+    }
+  }
+  // A whole flight; a craft that is null is a gap. What is predicted does not widen the scale.
+  fill(times, crafts, ghosts) {
+    for (const chart of this.charts) {
+      const { panel } = chart, n = panel.names.length;
+      const own = crafts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null)));
+      const values = own.flat().filter((value) => value !== null);
+      const low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
+      chart.fixed = spread(low - 0.2 * (high - low), high + 0.2 * (high - low));
+      const other = panel.ghost ? ghosts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null))) : [];
+      chart.data = [times, ...panel.names.map((_, i) => own.map((row) => row[i]))];
+      if (panel.ghost) chart.data.push(...panel.names.map((_, i) => other.map((row) => row[i])));
+      chart.plot.setData(chart.data);
+    }
+  }
+  mark(time, craft) {
+    for (const chart of this.charts) {
+      chart.marker = time;
+      chart.told(craft);
+      chart.plot.redraw(false, false);
+    }
+  }
+  // Calls back with the time that is clicked on.
+  onPick(pick) {
+    for (const { plot } of this.charts)
+      plot.over.addEventListener("click", (event) => pick(plot.posToVal(event.offsetX, "x")));
+  }
+}

@@ -1,0 +1,107 @@
+// The live page: moments from the server to scene, instruments and charts; sticks and switches back.
+import { Connection } from "./connection.js";
+import { Charts } from "./charts.js";
+import { Instruments } from "./instruments.js";
+import { Panel } from "./panel.js";
+import { Scene } from "./scene.js";
+import { Sticks } from "./sticks.js";
+
+const $ = (id) => document.getElementById(id);
+const EXTRAPOLATED = 0.06; // s
+const CHARTS_EVERY = 100; // ms
+
+let scene;
+try {
+  scene = new Scene($("scene"));
+} catch (error) {
+  $("trouble").hidden = false;
+  $("trouble").textContent = "This browser draws no 3D (WebGL is off); charts, sticks and recordings work.";
+}
+const instruments = new Instruments($("instruments"));
+let charts = null, hello = null, now = null, before = null, arrived = 0, drawn = 0, drawnTime = 0, chartsAt = 0;
+let updates = 0, number = 0, sent = "", latency = null;
+const underway = new Map(); // stick messages by number and when they were sent
+
+const connection = new Connection({ heard, lost: () => ($("state").textContent = "connection lost, trying again …") });
+const panel = new Panel((type, fields) => connection.say(type, fields), { view: (name) => scene && (scene.view = name) });
+const sticks = new Sticks($("sticks"), { onShortcut: (code) => panel.shortcut(code) });
+
+function heard(message) {
+  if (message.type === "hello") {
+    hello = message;
+    $("title").textContent = hello.title;
+    document.title = `${hello.title} · swash live`;
+    charts = new Charts($("charts"), hello.inputs);
+    scene?.show(hello.picture);
+    panel.hello(hello);
+    now = before = null;
+    return;
+  }
+  if (now && (message.t < now.t || message.version !== now.version)) {
+    charts.clear();
+    scene?.clearTrails();
+    now = null;
+  }
+  before = now;
+  now = message;
+  arrived = performance.now();
+  if (underway.has(now.stick)) {
+    const taken = arrived - underway.get(now.stick);
+    latency = latency === null ? taken : 0.9 * latency + 0.1 * taken;
+    for (const old of underway.keys()) if (old <= now.stick) underway.delete(old);
+  }
+  if (!before || now.t > before.t) {
+    charts.add(now.t, now.own, now.ghost);
+    for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
+  }
+  panel.show(now, latency);
+  updates += 1;
+  if (scene?.software && updates % 3 === 0) draw();
+}
+
+// Where a body state will be a few milliseconds after it was told, from its last two.
+function ahead(name, seconds) {
+  const x = now[name].x, old = before?.[name]?.x, span = before ? now.t - before.t : 0;
+  if (!old || span <= 0 || span > 0.5 || seconds <= 0) return x;
+  return x.map((value, i) => (i < 3 || (i > 5 && i < 9) ? value + ((value - old[i]) * seconds) / span : value));
+}
+
+function draw() {
+  if (!now) return;
+  const late = now.runs ? Math.min((performance.now() - arrived) / 1000, EXTRAPOLATED) * now.speed : 0;
+  const time = now.t + late, elapsed = Math.min(Math.max(time - drawnTime, 0), 0.1);
+  drawnTime = time;
+  const rows = {};
+  for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
+  scene?.draw(rows, now, elapsed);
+  instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "");
+  document.documentElement.dataset.drawn = String(Number(document.documentElement.dataset.drawn ?? 0) + 1);
+}
+
+function frame(at) {
+  requestAnimationFrame(frame);
+  steer(Math.min((at - drawn) / 1000, 0.1));
+  drawn = at;
+  if (!now || !hello) return;
+  if (!scene?.software) draw();
+  if (at - chartsAt > (scene?.software ? 2 : 1) * CHARTS_EVERY) {
+    chartsAt = at;
+    charts.draw();
+  }
+}
+
+function steer(elapsed) {
+  const axes = sticks.read(elapsed);
+  for (const axis of Object.keys(axes)) axes[axis] = Math.round(1000 * axes[axis]) / 1000;
+  const text = JSON.stringify(axes);
+  panel.gamepad(sticks.gamepad);
+  if (text === sent) return;
+  sent = text;
+  number += 1;
+  underway.set(number, performance.now());
+  if (underway.size > 200) underway.clear();
+  connection.say("stick", { ...axes, number });
+}
+
+window.swash = { sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; } };
+requestAnimationFrame(frame);

@@ -1,0 +1,138 @@
+// Switches, sliders and buttons: what they say to the server, and how they stand by what the server says.
+const $ = (id) => document.getElementById(id);
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+
+export class Panel {
+  constructor(say, { view }) {
+    this.say = say;
+    this.now = null;
+    this.touched = new Map(); // sliders that a hand holds are not moved by the server
+    for (const button of document.querySelectorAll("[data-mode]"))
+      button.onclick = () => say("mode", { value: button.dataset.mode });
+    for (const name of ["decoupled", "ghost", "bar"]) $(name).onchange = () => say(name, { value: $(name).checked });
+    for (const button of document.querySelectorAll("[data-maneuver]"))
+      button.onclick = () => say("maneuver", { kind: button.dataset.maneuver, axis: $("axis").value, size: Number($("size").value) });
+    for (const button of document.querySelectorAll("[data-view]"))
+      button.onclick = () => {
+        view(button.dataset.view);
+        for (const other of document.querySelectorAll("[data-view]")) other.setAttribute("aria-pressed", other === button);
+      };
+    const blow = () => say("wind", { north: Number($("north").value), east: Number($("east").value), down: 0 });
+    this.#slider("north", " m/s", blow);
+    this.#slider("east", " m/s", blow);
+    this.#slider("gusts", " m/s", (value) => say("gusts", { value }));
+    this.#slider("voltage", " V", (value) => say("voltage", { value }));
+    $("pause").onclick = () => this.#pause();
+    $("step").onclick = () => say("step");
+    $("reset").onclick = () => say("reset");
+    $("slower").onclick = () => this.#faster(-1);
+    $("faster").onclick = () => this.#faster(1);
+    $("record").onclick = () => say("record", { value: this.now?.recording === null });
+    $("identify").onclick = () => say("identify", { recording: Number($("which").value) });
+    $("stop-identifying").onclick = () => say("stop_identifying");
+  }
+
+  #slider(id, unit, changed) {
+    const input = $(id);
+    const show = () => (input.nextElementSibling.textContent = Number(input.value).toFixed(1) + unit);
+    input.oninput = () => {
+      this.touched.set(id, performance.now());
+      show();
+      changed(Number(input.value));
+    };
+    input.show = show;
+  }
+
+  #pause() {
+    this.say("pause", { value: Boolean(this.now?.runs) });
+  }
+
+  #faster(by) {
+    const place = SPEEDS.indexOf(this.now?.speed ?? 1);
+    const value = SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, (place < 0 ? 3 : place) + by))];
+    this.say("speed", { value });
+  }
+
+  // A key that is no stick; true where it meant something.
+  shortcut(code) {
+    const does = {
+      Space: () => this.#pause(),
+      Period: () => this.say("step"),
+      KeyR: () => this.say("reset"),
+      Minus: () => this.#faster(-1),
+      Equal: () => this.#faster(1),
+      NumpadAdd: () => this.#faster(1),
+      NumpadSubtract: () => this.#faster(-1),
+    }[code];
+    if (!does || (code === "Space" && document.activeElement?.tagName === "BUTTON")) return false; // it presses that
+    does();
+    return true;
+  }
+
+  hello(hello) {
+    $("voltage-row").hidden = !hello.voltages;
+    if (hello.voltages) [$("voltage").min, $("voltage").max] = hello.voltages;
+    $("controller").textContent = `Controller: ${hello.controller}, ${hello.rate.toFixed(0)} Hz.`;
+    $("trust").textContent = `Where the card may be trusted: ${hello.trust}`;
+    $("folder").textContent = `Recordings and reports go to the folder ${hello.folder}.`;
+  }
+
+  gamepad(name) {
+    const text = name ? `Gamepad: ${name}` : "No gamepad: keyboard and the sticks on the screen fly.";
+    if ($("gamepad").textContent !== text) $("gamepad").textContent = text;
+  }
+
+  show(now, latency) {
+    this.now = now;
+    const { setting } = now;
+    for (const button of document.querySelectorAll("[data-mode]"))
+      button.setAttribute("aria-pressed", button.dataset.mode === setting.mode);
+    for (const name of ["decoupled", "ghost", "bar"]) $(name).checked = setting[name];
+    const values = { north: setting.wind[0], east: setting.wind[1], gusts: setting.gusts, voltage: setting.voltage };
+    for (const [id, value] of Object.entries(values)) {
+      if (performance.now() - (this.touched.get(id) ?? -1e9) > 800) $(id).value = value;
+      $(id).show();
+    }
+    $("pause").textContent = now.runs ? "Pause" : "Go on";
+    $("speed").textContent = `${now.speed}×`;
+    $("maneuver").textContent = now.maneuver > 0 ? `${now.maneuver.toFixed(0)} s left` : "";
+    $("record").textContent = now.recording === null ? "Record" : "Stop and save";
+    $("record").classList.toggle("on", now.recording !== null);
+    $("recorded").textContent = now.recording === null ? "" : `${now.recording.toFixed(0)} s`;
+    this.#recordings(now);
+    const words = now.trouble || now.notice;
+    $("trouble").hidden = !words;
+    if ($("trouble").textContent !== words) $("trouble").textContent = words;
+    const share = now.steps ? (100 * now.late) / now.steps : 0;
+    const state = [
+      `${now.t.toFixed(1)} s`, now.runs ? "" : "paused", `late ${share.toFixed(2)} %`, `busy ${(100 * now.busy).toFixed(0)} %`,
+      latency === null ? "" : `stick ${latency.toFixed(0)} ms`,
+    ];
+    $("state").textContent = state.filter(Boolean).join(" · ");
+  }
+
+  #recordings({ recordings, job }) {
+    $("identify-row").hidden = !recordings.length;
+    const which = $("which");
+    if (which.options.length !== recordings.length) {
+      which.replaceChildren(...recordings.map(([n, seconds]) => new Option(`recording ${n}, ${seconds.toFixed(0)} s`, n)));
+      which.value = recordings.at(-1)?.[0] ?? "";
+    }
+    const running = job?.[1] === "running";
+    $("identify").disabled = running;
+    $("stop-identifying").hidden = !running;
+    const key = JSON.stringify(job);
+    if (key === this.told) return;
+    this.told = key;
+    $("job").replaceChildren();
+    if (!job) return;
+    const [n, state, words, seconds] = job;
+    if (running) $("job").textContent = `identifying recording ${n}: ${seconds} s`;
+    else $("job").textContent = `recording ${n}: ${state === "done" ? `identified in ${seconds} s. ` : "failed. "}${words}`;
+    if (state === "done") {
+      const link = document.createElement("a");
+      Object.assign(link, { href: `/report/${n}`, target: "_blank", rel: "noopener", textContent: " Open the report" });
+      $("job").append(link);
+    }
+  }
+}

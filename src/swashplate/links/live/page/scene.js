@@ -1,0 +1,181 @@
+// The scene: ground and grid, one or two helicopters with trails and shadows, and three cameras.
+import * as THREE from "./vendor/three.module.min.js";
+import { Helicopter } from "./helicopter.js";
+
+const TRAIL = 900;
+const COLORS = { own: 0xd55e00, ghost: 0x56b4e9 };
+const SOFTWARE = /swiftshader|llvmpipe|software/i;
+
+class Trail {
+  constructor(color) {
+    this.points = new Float32Array(3 * TRAIL);
+    this.count = 0;
+    this.geometry = new THREE.BufferGeometry();
+    this.geometry.setAttribute("position", new THREE.BufferAttribute(this.points, 3));
+    this.line = new THREE.Line(this.geometry, new THREE.LineBasicMaterial({ color }));
+    this.line.frustumCulled = false;
+    this.clear();
+  }
+  clear() {
+    this.count = 0;
+    this.geometry.setDrawRange(0, 0);
+  }
+  add(x, y, z) {
+    if (this.count === TRAIL) {
+      this.points.copyWithin(0, 3);
+      this.count -= 1;
+    }
+    this.points.set([x, y, z], 3 * this.count);
+    this.count += 1;
+    this.geometry.setDrawRange(0, this.count);
+    this.geometry.attributes.position.needsUpdate = true;
+  }
+}
+
+export class Scene {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    const gl = this.renderer.getContext(), told = gl.getExtension("WEBGL_debug_renderer_info");
+    const name = String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    this.software = SOFTWARE.test(name); // drawn by the processor that also simulates: fewer and coarser pictures
+    this.renderer.setPixelRatio(this.software ? 0.6 : Math.min(window.devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color(0xdbe8f2);
+    this.scene.fog = new THREE.Fog(0xdbe8f2, 10, 100);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a9a7b, 2.2));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.6);
+    sun.position.set(3, 8, -4);
+    this.scene.add(sun);
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.01, 4000);
+    this.world = new THREE.Group(); // north, east, down inside: turned so that up is up
+    this.world.rotation.x = Math.PI / 2;
+    this.scene.add(this.world);
+    this.view = "chase";
+    this.orbit = { turn: 0, lift: 0.28, zoom: 1 };
+    this.heading = 0;
+    this.crafts = {};
+    this.size = 1;
+    this.#orbitByHand();
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  #orbitByHand() {
+    let held = null;
+    this.canvas.addEventListener("pointerdown", (event) => {
+      held = [event.clientX, event.clientY];
+      this.canvas.setPointerCapture(event.pointerId);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!held) return;
+      this.orbit.turn -= 0.008 * (event.clientX - held[0]);
+      this.orbit.lift = Math.min(1.5, Math.max(0.02, this.orbit.lift + 0.006 * (event.clientY - held[1])));
+      held = [event.clientX, event.clientY];
+    });
+    for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => (held = null));
+    this.canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.orbit.zoom = Math.min(6, Math.max(0.35, this.orbit.zoom * Math.exp(0.001 * event.deltaY)));
+    }, { passive: false });
+  }
+
+  // Another vehicle: everything that is drawn of the last one goes.
+  show(picture) {
+    for (const name of Object.keys(this.crafts)) this.#remove(name);
+    this.picture = picture;
+    this.size = picture.size;
+    if (this.grid) this.scene.remove(this.grid, this.ground);
+    this.cell = picture.size < 0.4 ? 1 : picture.size < 2 ? 5 : 50;
+    this.grid = new THREE.GridHelper(60 * this.cell, 60, 0x6f8a70, 0x9db09a);
+    this.ground = new THREE.Mesh(
+      new THREE.PlaneGeometry(400 * this.cell, 400 * this.cell),
+      new THREE.MeshBasicMaterial({ color: 0xb9c8ae }),
+    );
+    this.floor = picture.floor ?? 0; // down [m]: a log whose origin is the hover began on its ground, not in it
+    this.ground.rotation.x = -Math.PI / 2;
+    this.ground.position.y = -this.floor - 0.004 * this.cell;
+    this.scene.add(this.ground, this.grid);
+    this.scene.fog.near = 12 * this.cell;
+    this.scene.fog.far = 34 * this.cell;
+  }
+
+  #remove(name) {
+    const craft = this.crafts[name];
+    this.world.remove(craft.model.group, craft.trail.line, craft.shadow, craft.plumb);
+    delete this.crafts[name];
+  }
+
+  #add(name) {
+    const model = new Helicopter(this.picture, { ghost: name === "ghost", color: COLORS[name] });
+    const trail = new Trail(COLORS[name]);
+    const shadow = new THREE.Mesh(
+      new THREE.CircleGeometry(this.size, 24),
+      new THREE.MeshBasicMaterial({ color: 0x44543f, transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false }),
+    );
+    const plumb = new THREE.Line(
+      new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(0, 0, 1)]),
+      new THREE.LineBasicMaterial({ color: 0x44543f, transparent: true, opacity: 0.4 }),
+    );
+    this.world.add(model.group, trail.line, shadow, plumb);
+    this.crafts[name] = { model, trail, shadow, plumb };
+  }
+
+  clearTrails() {
+    for (const craft of Object.values(this.crafts)) craft.trail.clear();
+  }
+
+  // `rows` are body states by name, `moment` tells the discs; `elapsed` seconds of simulation since the last picture.
+  draw(rows, moment, elapsed) {
+    for (const name of ["own", "ghost"]) {
+      if (!rows[name]) {
+        if (this.crafts[name]) this.#remove(name);
+        continue;
+      }
+      if (!this.crafts[name]) this.#add(name);
+      const { model, shadow, plumb } = this.crafts[name], x = rows[name];
+      model.pose(x, moment[name], elapsed);
+      shadow.position.set(x[0], x[1], this.floor - 0.002 * this.cell);
+      plumb.position.set(x[0], x[1], x[2]);
+      plumb.scale.z = Math.max(this.floor - x[2], 1e-3);
+    }
+    this.#look(rows.own);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  leaveTrail(name, x) {
+    const craft = this.crafts[name];
+    if (craft) craft.trail.add(x[0], x[1], x[2]);
+  }
+
+  #look(x) {
+    const at = new THREE.Vector3(x[0], -x[2], x[1]), { turn, lift, zoom } = this.orbit;
+    this.grid.position.set(Math.round(at.x / this.cell) * this.cell, -this.floor, Math.round(at.z / this.cell) * this.cell);
+    this.ground.position.x = at.x;
+    this.ground.position.z = at.z;
+    if (this.view === "above") {
+      this.camera.position.set(at.x, at.y + 55 * this.size * zoom + 2, at.z);
+      this.camera.up.set(1, 0, 0);
+    } else if (this.view === "pilot") {
+      this.camera.position.set(-26 * this.size * zoom, 1.7 + 3 * this.size, 4 * this.size);
+      this.camera.up.set(0, 1, 0);
+    } else {
+      const gap = Math.atan2(Math.sin(x[8] - this.heading), Math.cos(x[8] - this.heading));
+      this.heading += 0.08 * gap;
+      const distance = 9 * this.size * zoom, around = this.heading + turn, flat = distance * Math.cos(lift);
+      this.camera.position.set(
+        at.x - flat * Math.cos(around), Math.max(at.y + distance * Math.sin(lift), 0.1 * this.size - this.floor), at.z - flat * Math.sin(around),
+      );
+      this.camera.up.set(0, 1, 0);
+    }
+    this.camera.lookAt(at);
+  }
+}

@@ -1,0 +1,201 @@
+"""What turns sticks into inputs on the live page: four modes, decoupling on or off, for every vehicle.
+
+Sticks are roll (right), pitch (stick ahead, nose down), yaw (nose right) and heave (up), each -1 to 1. In mode "raw"
+all four move the vehicle's inputs about the hover trim. In "held" heave and yaw move the height and heading that are
+held, roll and pitch the cyclic. In "velocity" roll and pitch ask for a speed, in "position" they move the place that is
+held. Modes differ in numbers only, so that a switch in flight compiles nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal, get_args
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.control.autopilot import Autopilot, autopilot, row_step
+from swashplate.control.linear_decoupling import static_decoupling
+from swashplate.control.state_hold import state_hold, state_hold_step
+from swashplate.errors import ControllerError
+from swashplate.flights.maneuvers import AXES, DEFAULT_AMPLITUDE
+from swashplate.simulation.closed_loop import REFERENCES, Step
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.coax import CoaxInputs
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Mode = Literal["raw", "held", "velocity", "position"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+STICKS = ("roll", "pitch", "yaw", "heave")
+WANTED = (*REFERENCES, "yaw", "heave")
+"""The reference row here: that of every controller, then the sticks of raw yaw and heave."""
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """A control law for the live loop.
+
+    Attributes:
+        step: `(memory, time, measured, wanted, gains) -> (memory, inputs)`; `wanted` is the row of `WANTED`.
+        memory: at the start.
+        gains: rows by mode and decoupling.
+        amplitude: of maneuvers by axis [unit of the inputs].
+        speed, climb, turn: what a full stick asks for where something is held [m/s], [m/s], [rad/s].
+        rate: of the controller [Hz].
+        title: what it is, in words.
+    """
+
+    step: Step
+    memory: Array
+    gains: Mapping[tuple[Mode, bool], Array]
+    amplitude: Mapping[str, float]
+    speed: float
+    climb: float
+    turn: float
+    rate: float = 100.0
+    title: str = ""
+
+
+def pilot(vehicle: Vehicle, trim: Trim, *, controller: Autopilot | None = None) -> Pilot:
+    """The law for a vehicle, from its own equations and hover.
+
+    Args:
+        vehicle: coaxial or single rotor.
+        trim: its hover.
+        controller: a designed controller of a coaxial helicopter instead of the default one.
+
+    Raises:
+        ControllerError: where the controller is for another vehicle, or does not run at a whole part of 500 Hz.
+    """
+    if controller is not None and controller.vehicle != vehicle.name:
+        raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
+    if vehicle.input_names == CoaxInputs._fields:
+        return _coaxial(vehicle, trim, controller)
+    return _single_rotor(vehicle, trim)
+
+
+# ---- coaxial ---------------------------------------------------------------------------------------------------------
+_COAX_TRAVEL = {"roll": 0.5, "pitch": 0.5, "yaw": 0.015, "heave": 0.06}
+_COAX_HEAD = 3 + len(STICKS)
+
+
+def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilot:
+    base = controller or autopilot(vehicle, trim)
+    plain = autopilot(vehicle, trim, decoupled=False).numbers.law
+    commands, gains = trim.commands(), {}
+    names: dict[Mode, Any] = {"raw": "manual", "held": "manual", "velocity": "speed", "position": "place"}
+    for mode, name in names.items():
+        for decoupled in (True, False):
+            chosen = base.in_mode(name)
+            if not decoupled:
+                chosen = chosen.with_gains(**plain._asdict())
+            head = [commands["motor_lower"], commands["motor_upper"], float(mode == "raw")]
+            travel = [_COAX_TRAVEL[axis] for axis in STICKS]
+            gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
+    if abs(500.0 / base.rate - round(500.0 / base.rate)) > 1e-9:
+        raise ControllerError(f"runs at {base.rate:g} Hz, expected a whole part of 500 Hz.", where=base.model)
+    return Pilot(
+        coaxial_step,
+        base.memory,
+        gains,
+        DEFAULT_AMPLITUDE,
+        speed=1.0,
+        climb=0.5,
+        turn=1.0,
+        rate=base.rate,
+        title=f"autopilot, {base.model}",
+    )
+
+
+def coaxial_step(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
+    """The CoaX's autopilot, with the motors on the sticks where the mode is raw."""
+    lower, upper, raw = gains[0], gains[1], gains[2]
+    roll, pitch, yaw, heave = (gains[3 + i] * wanted[6 + i] for i in range(len(STICKS)))
+    reference = jnp.concatenate([wanted[:6], jnp.stack([roll, pitch])])
+    after, commands = row_step(memory, time, measured, reference, gains[_COAX_HEAD:])
+    by_hand = jnp.stack([lower + heave - yaw, upper + heave + yaw, commands[2], commands[3]])
+    return jnp.where(raw > 0.5, memory, after), jnp.where(raw > 0.5, by_hand, commands)
+
+
+# ---- single rotor ----------------------------------------------------------------------------------------------------
+_OUTPUTS = {"roll": "p", "pitch": "q", "yaw": "r", "heave": "w"}
+_HELD = ("z", "w", "psi", "r")
+
+
+def _single_rotor(vehicle: Vehicle, trim: Trim) -> Pilot:
+    hold, model = state_hold(vehicle, trim, rate=100.0), linearize(vehicle, trim)
+    n, m = len(vehicle.state_names), len(vehicle.input_names)
+    limits = np.array(vehicle.input_limits)
+    moved = {axis: next(iter(next(s for s in AXES[axis] if s.keys() <= set(vehicle.input_names)))) for axis in STICKS}
+    half = {axis: 0.5 * float(np.ptp(limits[vehicle.input_names.index(name)])) for axis, name in moved.items()}
+    travel = {axis: share * half[axis] for axis, share in zip(STICKS, (0.2, 0.2, 0.4, 0.25), strict=True)}
+
+    # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
+    places = [vehicle.input_names.index(moved[axis]) for axis in STICKS]
+    linear = model.to_control()
+    outputs = tuple(_OUTPUTS[axis] for axis in STICKS)
+    matrix = static_decoupling(linear, inputs=[moved[a] for a in STICKS], outputs=outputs).matrix
+    signs = np.array(
+        [
+            np.sign(model.B[vehicle.index(out), place]) * sense
+            for out, place, sense in zip(outputs, places, (1.0, -1.0, 1.0, -1.0), strict=True)
+        ]
+    )
+    scale = np.diag(signs * np.array([travel[axis] for axis in STICKS]))
+    mixing = {True: np.zeros((m, 4)), False: np.zeros((m, 4))}
+    mixing[True][places], mixing[False][places] = matrix @ scale, scale
+
+    K = hold.gains[: m * n].reshape(m, n)
+    rest = hold.gains[m * n :]
+    keeping = np.zeros((m, n))
+    rows = [vehicle.input_names.index(moved[axis]) for axis in ("yaw", "heave")]
+    columns = [vehicle.index(name) for name in _HELD]
+    keeping[np.ix_(rows, columns)] = K[np.ix_(rows, columns)]
+    by_mode: dict[Mode, tuple[Array, float]] = {
+        "raw": (np.zeros((m, n)), 0.0),
+        "held": (keeping, 0.0),
+        "velocity": (K, 0.0),
+        "position": (K, 1.0),
+    }
+    gains = {
+        (mode, on): np.array([place, *mixing[on].ravel(), *feedback.ravel(), *rest])
+        for mode, (feedback, place) in by_mode.items()
+        for on in (True, False)
+    }
+    size = float(vehicle.card.values()["rotor_radius"])
+    return Pilot(
+        _step_of(m, n),
+        np.zeros(1),
+        gains,
+        {axis: 0.15 * half[axis] for axis in STICKS},
+        speed=3.0 * max(1.0, size**0.5),
+        climb=1.0,
+        turn=0.8,
+        title="linear-quadratic hold about hover",
+    )
+
+
+_STEPS: dict[tuple[int, int], Step] = {}
+
+
+def _step_of(inputs: int, states: int) -> Step:
+    """One function per size, so that other gains compile nothing anew."""
+    return _STEPS.setdefault((inputs, states), partial(single_rotor_step, inputs=inputs, states=states))
+
+
+def single_rotor_step(
+    memory: Any, time: Any, measured: Any, wanted: Any, gains: Any, *, inputs: int, states: int
+) -> tuple[Any, Any]:
+    """A state hold whose place follows the aircraft unless a place is held, with the sticks mixed on top."""
+    place, mixing = gains[0], gains[1 : 1 + 4 * inputs].reshape(inputs, 4)
+    x, y = jnp.where(place > 0.5, wanted[0], measured[0]), jnp.where(place > 0.5, wanted[1], measured[1])
+    held = jnp.concatenate([jnp.stack([x, y]), wanted[2 : len(REFERENCES)]])
+    # The hold works on deviations: what is asked for is taken from what is measured.
+    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5])
+    memory, commands = state_hold_step(memory, time, seen, held, gains[1 + 4 * inputs :], inputs=inputs, states=states)
+    return memory, commands + mixing @ wanted[6:10]

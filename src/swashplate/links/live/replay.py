@@ -1,0 +1,232 @@
+"""A logged flight as moments to look at, with a model's prediction beside it that starts anew every few seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import DivergenceError, FlightError, SwashError
+from swashplate.flights.flight import Flight
+from swashplate.identification.kinematics import PREDICTED, measured_states
+from swashplate.identification.records import records
+from swashplate.links.live.picture import inputs_of, picture, pose_of
+from swashplate.physics.environment import Environment
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.integrate import simulate
+from swashplate.simulation.trim import trim
+from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
+from swashplate.validation.prediction import predict
+from swashplate.validation.validate import observer_of
+from swashplate.vehicles.catalogue import vehicle as named_vehicle
+from swashplate.vehicles.coax import CoaxInputs
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+RATE = 50.0
+"""Moments per second [Hz]."""
+MOST = 30_000
+"""Moments that a page gets; longer flights get fewer per second."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A flight and a prediction of it at one rate.
+
+    Attributes:
+        vehicle: whose shape is drawn.
+        title: what is replayed, in words.
+        time: [s], shape (n,).
+        states: rows in the order of the vehicle's states, shape (n, n_states); what the log does not tell is as at
+            hover.
+        inputs: shape (n, n_inputs).
+        predicted: body states (n, 12) of the model, NaN where there is no prediction; None without a model.
+        ahead: seconds after which a prediction starts anew.
+        simulated: whether no aircraft flew.
+    """
+
+    vehicle: Vehicle
+    title: str
+    time: Array
+    states: Array
+    inputs: Array
+    predicted: Array | None
+    ahead: float
+    simulated: bool
+
+
+def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
+    """The vehicle that a flight is drawn as: the model, otherwise the packaged one that the log names or fits.
+
+    Raises:
+        FlightError: where neither is known.
+    """
+    if model is not None:
+        return model
+    for name in (flight.provenance.vehicle, "coax", "raptor50"):
+        try:
+            found = named_vehicle(name)
+        except SwashError:
+            continue
+        if all(entry in flight for entry in found.input_names):
+            return found
+    raise FlightError(
+        f"names no vehicle that is known, and its inputs fit none: {', '.join(flight.channels)}.",
+        where=flight.provenance.source,
+        hint="Say what flies with --model.",
+    )
+
+
+def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) -> Replay:
+    """What is shown of a conditioned flight.
+
+    Args:
+        flight: at one rate, see `Flight.condition`.
+        model: predicts the flight from its own inputs; None for no prediction.
+        ahead: how long each prediction runs [s]; then the next one starts from what an observer knew by then.
+
+    Raises:
+        FlightError: where a channel of the motion is missing, or the flight is too short to be predicted.
+    """
+    enable_double_precision()
+    if not ahead > 0.0:
+        raise SwashError(f"is {ahead:g} s, expected more than zero.", channel="--ahead")
+    vehicle = drawn_as(flight, model)
+    rate = flight.rate("phi")
+    stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))
+    body, time = flight.array(PREDICTED)[::stride], flight.time("phi")[::stride]
+    hover = trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal"))
+    states = np.tile(hover.state, (time.size, 1))
+    states[:, : len(PREDICTED)] = body
+    for i, name in enumerate(vehicle.state_names[len(PREDICTED) :], start=len(PREDICTED)):
+        if name in flight:
+            states[:, i] = np.interp(time, flight.time(name), flight.values(name))
+    inputs = np.tile(hover.inputs, (time.size, 1))
+    for i, name in enumerate(vehicle.input_names):
+        if name in flight:
+            inputs[:, i] = np.interp(time, flight.time(name), flight.values(name))
+    predicted = None
+    if model is not None:
+        observed = model.input_names == CoaxInputs._fields
+        predicted = _predicted(flight, model, ahead, time) if observed else _flown(model, time, states, inputs, ahead)
+    return Replay(
+        vehicle,
+        flight.provenance.source or "flight",
+        time,
+        states,
+        inputs,
+        predicted,
+        ahead,
+        flight.provenance.simulated,
+    )
+
+
+def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Array:
+    """The model's body states at the shown times, NaN before the first start and between pieces."""
+    noise, prior = observer_of(model)
+    found = np.full((time.size, len(PREDICTED)), np.nan)
+    longest = 0.0
+    for piece in records(flight, model):
+        length = float(piece.time[-1] - piece.time[0])
+        longest = max(longest, length)
+        settling = max(SHORTEST_CALIBRATION, min(CALIBRATION, 0.25 * length))
+        if length < settling + 1.0:
+            continue
+        nuisance = calibrate(model, piece, noise=noise, prior=prior, seconds=settling)
+        made = predict(model, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
+        rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
+        start = made.starts[0]
+        chain = made.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]
+        rows[start + 1 : start + 1 + len(chain)] = chain
+        # The prediction is of the centre of gravity; the log shows the tracked point.
+        rows += flight_at(flight, piece.time) - measured_states(piece, nuisance)
+        inside = (time >= piece.time[0]) & (time <= piece.time[-1])
+        nearest = np.clip(np.searchsorted(piece.time, time[inside] - 1e-6), 0, piece.time.size - 1)
+        found[inside] = rows[nearest]
+    if not np.any(np.isfinite(found)):
+        raise FlightError(
+            f"the longest unbroken piece has {longest:.1f} s, expected at least {SHORTEST_CALIBRATION + 1:g} s for a "
+            "prediction.",
+            where=flight.provenance.source,
+        )
+    return found
+
+
+def _flown(model: Vehicle, time: Array, states: Array, inputs: Array, ahead: float) -> Array:
+    """The model from the logged state on, anew every `ahead` seconds, on the logged inputs.
+
+    For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for.
+    """
+    step = float(np.median(np.diff(time)))
+    length, found = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
+    for first in range(0, time.size - length, length):
+        part = slice(first, first + length + 1)
+        if time[first + length] - time[first] > (length + 0.5) * step:
+            continue  # a gap in the log
+        try:
+            flown = simulate(
+                model,
+                inputs[part],
+                start=dict(zip(model.state_names, states[first].tolist(), strict=True)),
+                rate=1.0 / step,
+                substeps=max(1, round(500.0 * step)),
+            )
+        except DivergenceError:
+            continue  # where the model leaves what it is good for, nothing is shown
+        found[first + 1 : first + length + 1] = flown.array(PREDICTED)[1:]
+    return found
+
+
+def flight_at(flight: Flight, time: Array) -> Array:
+    """The logged body states at some times, shape (n, 12)."""
+    stamps, logged = flight.time("phi"), flight.array(PREDICTED)
+    return np.stack([np.interp(time, stamps, column) for column in logged.T], axis=1)
+
+
+def gaps(time: Array) -> NDArray[np.bool_]:
+    """True at samples before which the log has a gap."""
+    return np.concatenate([[False], np.diff(time) > 2.5 * np.median(np.diff(time))])
+
+
+def floor(shown: Replay) -> float:
+    """How far down the ground is drawn [m]: at the origin, or under the skids where the flight goes lower."""
+    return max(0.0, float(np.max(shown.states[:, 2])) + float(picture(shown.vehicle)["skids"]["depth"]))
+
+
+def as_json(shown: Replay) -> dict[str, Any]:
+    """What the page draws: shapes, and per moment body state, inputs, discs and the predicted body state."""
+    vehicle = shown.vehicle
+    pose, around = pose_of(vehicle), Environment()
+    moments = []
+    for k, (x, u) in enumerate(zip(shown.states, shown.inputs, strict=True)):
+        parts = pose(x, u, around)
+        ghost = None
+        if shown.predicted is not None and np.all(np.isfinite(shown.predicted[k])):
+            ghost = _short(shown.predicted[k])
+        moments.append([_short(x[: len(PREDICTED)]), _short(u), *(_nested(parts[key]) for key in PARTS), ghost])
+    return {
+        "title": shown.title,
+        "vehicle": vehicle.card.title,
+        "simulated": shown.simulated,
+        "ahead": shown.ahead if shown.predicted is not None else None,
+        "picture": {**picture(vehicle), "floor": floor(shown)},
+        "inputs": inputs_of(vehicle),
+        "time": _short(shown.time - shown.time[0]),
+        "moments": moments,
+    }
+
+
+PARTS = ("rotors", "bar", "tail")
+
+
+def _short(row: Array) -> list[float]:
+    return [float(f"{value:.6g}") for value in np.nan_to_num(row)]
+
+
+def _nested(part: Any) -> Any:
+    if part is None:
+        return None
+    return [_short(np.array(inner)) if isinstance(inner, list) else float(f"{inner:.6g}") for inner in part]

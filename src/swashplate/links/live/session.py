@@ -1,0 +1,267 @@
+"""One flight on the live page: the world, its clock, recordings and identifications, and what a page hears of it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from swashplate.control.autopilot import Autopilot
+from swashplate.errors import SwashError
+from swashplate.flights.maneuvers import Maneuver
+from swashplate.links.live.clock import Clock
+from swashplate.links.live.identifying import Identifying
+from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
+from swashplate.links.live.pilots import MODES, STICKS
+from swashplate.links.live.recording import save_recording
+from swashplate.links.live.world import World
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.vehicles.catalogue import from_card
+from swashplate.vehicles.vehicle import Vehicle
+
+_BODY = len(RigidBody._fields)
+_SWEEP_SECONDS, _SWEEP_BAND = 30.0, (0.3, 5.0)
+_UNIT_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording on disk: its number, length [s], and the vehicle that flew it."""
+
+    number: int
+    seconds: float
+    vehicle: Vehicle
+
+
+class Session:
+    """What `swash live` runs.
+
+    Args:
+        vehicle: what flies.
+        controller: a designed controller of a coaxial helicopter, or None.
+        folder: where recordings and results go; made with the first one.
+    """
+
+    def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None, folder: Path) -> None:
+        self.folder, self._controller = folder, controller
+        self.lock = threading.Lock()
+        self.world, self._pose = self._make(vehicle)
+        self.version = 1
+        self.speed = 1.0
+        self.clock = Clock(self._step, period=self.world.period, lock=self.lock)
+        self.identifying = Identifying(folder)
+        self.recordings: list[Recording] = []
+        self.notice = ""
+        self._jobs: set[asyncio.Task[None]] = set()
+        self._wanted_to_run = True
+
+    def _make(self, vehicle: Vehicle) -> tuple[World, Pose]:
+        world = World(vehicle, controller=self._controller)
+        world.step()  # compiles, so that the first second of flight does not
+        world.reset()
+        return world, pose_of(vehicle)
+
+    def _step(self) -> None:
+        self.world.step()
+
+    # ---- life --------------------------------------------------------------------------------------------------
+    def watched(self, count: int) -> None:
+        """So many pages are open: time stands still while nobody looks."""
+        self.clock.go(self._wanted_to_run and count > 0)
+
+    def let_go(self) -> None:
+        """Centre the sticks: whoever held them is gone."""
+        with self.lock:
+            self.world.setting.sticks = dict.fromkeys(STICKS, 0.0)
+
+    def close(self) -> None:
+        """End the thread and what runs beside it."""
+        self.clock.close()
+        self.identifying.stop()
+
+    # ---- what a page says --------------------------------------------------------------------------------------
+    async def obey(self, message: dict[str, Any]) -> None:
+        """Do what a checked message asks for.
+
+        Raises:
+            SwashError: in words for the pilot, where it cannot be done now.
+        """
+        kind = message["type"]
+        if kind == "stick":
+            with self.lock:
+                setting = self.world.setting
+                setting.sticks = {axis: float(message[axis]) for axis in STICKS}
+                setting.stick_number = message["number"]
+            return
+        self.notice = ""
+        if kind == "bar":
+            await self._set_bar(message["value"])
+        elif kind == "record":
+            await self._record(message["value"])
+        elif kind == "identify":
+            self._identify(message["recording"])
+        elif kind == "stop_identifying":
+            self.identifying.stop()
+        elif kind == "reset":
+            await self._record(False)
+            with self.lock:
+                self.world.reset()
+        elif kind == "pause":
+            self._wanted_to_run = not message["value"]
+            self.clock.go(self._wanted_to_run)
+        elif kind == "step":
+            self._wanted_to_run = False
+            self.clock.go(False)
+            with self.lock:
+                self.world.step()
+        elif kind == "speed":
+            self.speed = float(message["value"])
+            self.clock.period = self.world.period / self.speed
+        else:
+            with self.lock:
+                self._switch(kind, message)
+
+    def _switch(self, kind: str, message: dict[str, Any]) -> None:
+        world, value = self.world, message.get("value")
+        if kind == "mode":
+            world.set_mode(message["value"])
+        elif kind == "decoupled":
+            world.setting.decoupled = bool(value)
+        elif kind == "ghost":
+            world.set_ghost(bool(value))
+        elif kind == "wind":
+            world.setting.wind = tuple(float(message[name]) for name in ("north", "east", "down"))  # type: ignore[assignment]
+        elif kind == "gusts":
+            world.set_gusts(float(message["value"]))
+        elif kind == "voltage":
+            if world.nominal_voltage is None:
+                raise SwashError("This helicopter has no battery in its equations.")
+            low, high = _voltages(world.nominal_voltage)
+            world.setting.voltage = min(max(float(message["value"]), low), high)
+        elif kind == "maneuver":
+            world.fly_maneuver(self._maneuver(message["kind"], message["axis"], float(message["size"])))
+        else:
+            raise AssertionError(kind)
+
+    def _maneuver(self, kind: str, axis: str, size: float) -> Maneuver:
+        amplitude = size * self.world.pilot.amplitude[axis]
+        if kind == "sweep":
+            return Maneuver("sweep", (axis,), _SWEEP_SECONDS, amplitude, _SWEEP_BAND)
+        return Maneuver(kind, (axis,), _UNIT_SECONDS * {"doublet": 2, "3211": 7}[kind], amplitude)
+
+    async def _set_bar(self, on: bool) -> None:
+        card = self.world.vehicle.card
+        if card.options.get("bar", _has_bar(self.world.vehicle)) == on:
+            return
+        await self._record(False)
+        vehicle = from_card(replace(card, options={**card.options, "bar": on}))
+        ran = self.clock.runs
+        self.clock.go(False)  # compiling takes seconds in which no step would be on time
+        try:
+            world, pose = await asyncio.to_thread(self._make, vehicle)
+            with self.lock:
+                world.keep_setting(self.world)
+                self.world, self._pose = world, pose
+            self.version += 1
+        finally:
+            self.clock.go(ran)
+
+    async def _record(self, on: bool) -> None:
+        with self.lock:
+            rows, self.world.rows = self.world.rows, [] if on else None
+        if not rows or on:
+            return
+        number, vehicle = len(self.recordings) + 1, self.world.vehicle
+        await asyncio.to_thread(
+            save_recording, vehicle, rows, period=self.world.period, folder=self.folder, number=number
+        )
+        self.recordings.append(Recording(number, len(rows) * self.world.period, vehicle))
+
+    def _identify(self, number: int) -> None:
+        chosen = next((recording for recording in self.recordings if recording.number == number), None)
+        if chosen is None:
+            raise SwashError(f"There is no recording {number}.")
+        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number))
+        self._jobs.add(task)
+        task.add_done_callback(self._jobs.discard)
+
+    # ---- what a page hears -------------------------------------------------------------------------------------
+    def hello(self) -> dict[str, Any]:
+        """What does not change while one vehicle flies."""
+        vehicle, world = self.world.vehicle, self.world
+        return {
+            "type": "hello",
+            "version": self.version,
+            "title": vehicle.card.title,
+            "trust": vehicle.card.trust,
+            "controller": world.pilot.title,
+            "picture": picture(vehicle),
+            "inputs": inputs_of(vehicle),
+            "modes": list(MODES),
+            "voltages": None if world.nominal_voltage is None else _voltages(world.nominal_voltage),
+            "rate": 1.0 / world.period,
+            "folder": str(self.folder),
+        }
+
+    def moment(self) -> dict[str, Any]:
+        """What is flown now, for one update of the page."""
+        with self.lock:
+            now, setting, left = self.world.moment(), self.world.setting, self.world.maneuver_left
+            recorded = None if self.world.rows is None else len(self.world.rows) * self.world.period
+            around, pose, vehicle = self.world.environment(), self._pose, self.world.vehicle
+        crafts = {}
+        for name, (x, u) in now.crafts.items():
+            parts = pose(x.tolist(), u.tolist(), around)
+            crafts[name] = {"x": _short(x[:_BODY]), "u": _short(u), **{k: _short(v) for k, v in parts.items()}}
+        time, job = self.clock.punctuality, self.identifying.job
+        failed = self.clock.failure
+        return {
+            "type": "moment",
+            "version": self.version,
+            "t": round(now.time, 4),
+            **crafts,
+            "target": _short(now.target),
+            "stick": now.stick_number,
+            "trouble": now.trouble or ("" if failed is None else f"The simulation stopped: {failed}"),
+            "notice": self.notice,
+            "runs": self.clock.runs,
+            "speed": self.speed,
+            "steps": time.steps,
+            "late": time.late,
+            "skipped": round(time.skipped, 3),
+            "busy": round(time.busy, 4),
+            "maneuver": round(left, 1),
+            "recording": None if recorded is None else round(recorded, 1),
+            "recordings": [[r.number, round(r.seconds, 1)] for r in self.recordings],
+            "job": None if job is None else [job.recording, job.state, job.words, round(job.seconds)],
+            "setting": {
+                "mode": setting.mode,
+                "decoupled": setting.decoupled,
+                "ghost": setting.ghost,
+                "bar": _has_bar(vehicle),
+                "wind": list(setting.wind),
+                "gusts": setting.gusts,
+                "voltage": setting.voltage,
+            },
+        }
+
+
+def _has_bar(vehicle: Vehicle) -> bool:
+    return getattr(vehicle.state, "bar", None) is not None
+
+
+def _voltages(nominal: float) -> list[float]:
+    """Lowest and highest battery voltage of the slider [V]."""
+    return [round(0.8 * nominal, 1), round(1.08 * nominal, 1)]
+
+
+def _short(values: Any) -> Any:
+    """Numbers as short JSON, nested lists as they are; what is not finite as zero."""
+    if values is None:
+        return None
+    if isinstance(values, float | int):
+        return round(float(values), 5) if math.isfinite(values) else 0.0
+    return [_short(value) for value in (values.tolist() if hasattr(values, "tolist") else values)]

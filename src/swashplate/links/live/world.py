@@ -1,0 +1,306 @@
+"""The simulation behind the live page: one helicopter and perhaps its ghost, a controller step at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.control.autopilot import Autopilot
+from swashplate.errors import SwashError
+from swashplate.flights.maneuvers import Maneuver
+from swashplate.links.live.pilots import STICKS, WANTED, Mode, Pilot, pilot
+from swashplate.links.live.recording import LONGEST
+from swashplate.physics.environment import Environment
+from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    rk4_step_looped,
+    row_rates,
+)
+from swashplate.simulation.record import check_divergence
+from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import trim as find_trim
+from swashplate.simulation.wind import Gusts, Turbulence
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+PHYSICS_RATE = 500.0
+"""Runge-Kutta steps per second [Hz]."""
+_GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def advance(
+    equations: Equations,
+    law: Step,
+    substeps: int,
+    x: Any,
+    memory: Any,
+    wanted: Any,
+    around: Any,
+    added: Any,
+    gains: Any,
+    p: Any,
+    limits: Any,
+    dt: Any,
+) -> tuple[Any, Any, Any]:
+    """One controller step: the law, then `substeps` of physics [s each] with its inputs held.
+
+    Returns:
+        State row, controller memory, and the inputs as the actuators got them (limited, excitation included).
+    """
+    rates = row_rates(equations, padded=True)
+    measured = jnp.concatenate([x, around[-1:]])
+    memory, command = law(memory, 0.0, measured, wanted, gains)
+    inputs = jnp.clip(command + added, limits[0], limits[1])
+    w = jnp.concatenate([inputs, around])
+
+    def substep(_: Any, x: Any) -> Any:
+        return rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
+
+    return jax.lax.fori_loop(0, substeps, substep, x), memory, inputs
+
+
+@dataclass
+class Craft:
+    """One flying copy: state row, controller memory, the inputs it last got."""
+
+    x: Array
+    memory: Array
+    inputs: Array
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is flown at one instant; never changed, so that another thread may read it.
+
+    Attributes:
+        time: of the simulation [s].
+        crafts: state and input rows by name ("own", "ghost").
+        around: wind and voltage, the row of `SURROUNDINGS`.
+        target: the place, height and heading that are held (x, y, z, psi).
+        stick_number: number of the last stick message that is in it.
+        trouble: why it stands still, "" where it flies.
+    """
+
+    time: float
+    crafts: dict[str, tuple[Array, Array]]
+    around: Array
+    target: Array
+    stick_number: int
+    trouble: str
+
+
+@dataclass
+class Setting:
+    """What the page's switches and sliders say."""
+
+    mode: Mode = "held"
+    decoupled: bool = True
+    ghost: bool = False
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gusts: float = 0.0
+    voltage: float = 0.0
+    sticks: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STICKS, 0.0))
+    stick_number: int = 0
+
+
+class World:
+    """Everything that moves. Not for several threads at once.
+
+    Args:
+        vehicle: what flies.
+        controller: a designed controller of a coaxial helicopter, or None for the default ones.
+        seed: of the gusts.
+    """
+
+    def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None = None, seed: int = 0) -> None:
+        enable_double_precision()
+        self.vehicle = vehicle
+        card = vehicle.card.values()
+        battery = card.get("voltage_nominal")
+        self.nominal_voltage = battery
+        around = Environment() if battery is None else Environment(voltage=battery)
+        self.start_height = max(2.0, 8.0 * card["rotor_radius"])
+        self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
+        self.pilot: Pilot = pilot(vehicle, self.trim, controller=controller)
+        self.setting = Setting(voltage=float(around.voltage))
+        self.rows: list[Array] | None = None
+        self._environment, self._seed = around, seed
+        self._equations, self._p = equations_of(vehicle), parameter_row(vehicle, around)
+        self._limits = np.array(vehicle.input_limits).T
+        self._substeps = round(PHYSICS_RATE / self.pilot.rate)
+        self.period = self._substeps / PHYSICS_RATE
+        self._maneuver: tuple[Maneuver, int] | None = None
+        self.reset()
+
+    # ---- what the pilot does -----------------------------------------------------------------------------------
+    def reset(self) -> None:
+        """Back to the hover; switches stay, what was being recorded is kept up to here."""
+        self.ticks, self.trouble = 0, ""
+        self._maneuver = None
+        self._crafts = {"own": self._fresh()}
+        if self.setting.ghost:
+            self._crafts["ghost"] = self._fresh()
+        self._turbulence: Turbulence | None = None
+        self.set_gusts(self.setting.gusts)
+        self._target = np.array(self.trim.state[[0, 1, 2, 8]])
+
+    def _fresh(self) -> Craft:
+        return Craft(np.array(self.trim.state), np.array(self.pilot.memory), np.array(self.trim.inputs))
+
+    def set_mode(self, mode: Mode) -> None:
+        """Another mode in flight: it begins where the aircraft is."""
+        if mode != self.setting.mode:
+            self.setting.mode = mode
+            for craft in self._crafts.values():
+                craft.memory = np.array(self.pilot.memory)
+            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
+
+    def set_ghost(self, on: bool) -> None:
+        """A second copy with the decoupling the other way, from where the first one is now."""
+        self.setting.ghost = on
+        own = self._crafts["own"]
+        self._crafts.pop("ghost", None)
+        if on:
+            self._crafts["ghost"] = Craft(own.x.copy(), own.memory.copy(), own.inputs.copy())
+
+    def set_gusts(self, sigma: float) -> None:
+        """Turbulence of a standard deviation [m/s] across the wind; none at zero."""
+        self.setting.gusts = sigma
+        self._turbulence = None
+        if sigma > 0.0:
+            gusts = Gusts((sigma, sigma, 0.6 * sigma), (_GUST_LENGTH,) * 3, _GUST_SPEED)
+            self._turbulence = Turbulence(gusts, rate=1.0 / self.period, seed=self._seed)
+
+    def fly_maneuver(self, maneuver: Maneuver) -> None:
+        """Add a maneuver to the inputs from now on.
+
+        Raises:
+            ManeuverError: where the vehicle lacks what it moves.
+        """
+        maneuver.offsets(np.zeros(1), inputs=self.vehicle.input_names)
+        self._maneuver = (maneuver, self.ticks)
+
+    @property
+    def maneuver_left(self) -> float:
+        """Seconds until the maneuver is over; zero where none is flown."""
+        if self._maneuver is None:
+            return 0.0
+        maneuver, begun = self._maneuver
+        return max(0.0, maneuver.duration - (self.ticks - begun) * self.period)
+
+    # ---- time --------------------------------------------------------------------------------------------------
+    def step(self) -> None:
+        """One controller period further, for every copy; stands still where something went wrong."""
+        if self.trouble:
+            return
+        wanted, around, added = self._wanted(), self._around(), self._added()
+        before = self._crafts["own"].x
+        for name, craft in self._crafts.items():
+            decoupled = self.setting.decoupled if name == "own" else not self.setting.decoupled
+            found = advance(
+                self._equations,
+                self.pilot.step,
+                self._substeps,
+                craft.x,
+                craft.memory,
+                wanted,
+                around,
+                added,
+                self.pilot.gains[self.setting.mode, decoupled],
+                self._p,
+                self._limits,
+                1.0 / PHYSICS_RATE,
+            )
+            craft.x, craft.memory, craft.inputs = (np.asarray(part) for part in found)
+        own = self._crafts["own"]
+        self._check(own, before)
+        if self.trouble:
+            return
+        if self.rows is not None and len(self.rows) * self.period < LONGEST:
+            self.rows.append(np.concatenate([before, own.inputs, around]))
+        ghost = self._crafts.get("ghost")
+        if ghost is not None and not (np.all(np.isfinite(ghost.x)) and ghost.x[2] < 0.5 + self.start_height):
+            self.set_ghost(False)
+        self.ticks += 1
+
+    def _check(self, own: Craft, before: Array) -> None:
+        try:
+            check_divergence(self.vehicle, np.zeros(1), own.x[None], None)
+        except SwashError:
+            self.trouble = "The simulation left the range in which the equations hold. Reset to fly again."
+            own.x = before
+            return
+        grounded = bool(self.vehicle.card.options.get("ground"))
+        if own.x[2] > 0.0 and not grounded:
+            sink = (own.x[2] - before[2]) / self.period
+            self.trouble = f"Touched the ground at {sink:.1f} m/s. Reset to fly again."
+            own.x = before
+
+    def _wanted(self) -> Array:
+        """The reference row: sticks move what is held, or go through."""
+        setting, law, s = self.setting, self.pilot, self.setting.sticks
+        row = dict.fromkeys(WANTED, 0.0)
+        if setting.mode == "raw":
+            self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
+            row.update(yaw=s["yaw"], heave=s["heave"])
+        else:
+            self._target[2] = min(self._target[2] - self.period * law.climb * s["heave"], -0.2)
+            self._target[3] += self.period * law.turn * s["yaw"]
+        if setting.mode in ("raw", "held"):
+            row.update(roll=s["roll"], pitch=s["pitch"])
+        else:
+            ahead, right = law.speed * s["pitch"], law.speed * s["roll"]
+            row.update(ahead=ahead, right=right)
+            c, n = np.cos(self._target[3]), np.sin(self._target[3])
+            self._target[:2] += self.period * np.array([c * ahead - n * right, n * ahead + c * right])
+        row.update(x=self._target[0], y=self._target[1], z=self._target[2], psi=self._target[3])
+        return np.array([row[name] for name in WANTED])
+
+    def _around(self) -> Array:
+        wind = np.array(self.setting.wind)
+        if self._turbulence is not None:
+            wind = wind + self._turbulence.sample()
+        return np.array([*wind, self.setting.voltage])
+
+    def _added(self) -> Array:
+        none = np.zeros(len(self.vehicle.input_names))
+        if self._maneuver is None:
+            return none
+        maneuver, begun = self._maneuver
+        now = (self.ticks - begun) * self.period
+        if now >= maneuver.duration:
+            self._maneuver = None
+            return none
+        offsets = maneuver.offsets(np.array([now]), inputs=self.vehicle.input_names)
+        return np.array([offsets[name][0] for name in self.vehicle.input_names])
+
+    # ---- looking -----------------------------------------------------------------------------------------------
+    def moment(self) -> Moment:
+        """What is flown now."""
+        crafts = {name: (craft.x, craft.inputs) for name, craft in self._crafts.items()}
+        around = np.array([*self.setting.wind, self.setting.voltage])
+        target, number = self._target.copy(), self.setting.stick_number
+        return Moment(self.ticks * self.period, crafts, around, target, number, self.trouble)
+
+    def environment(self) -> Environment:
+        """The surroundings as the sliders have them, without gusts."""
+        row = [*self.setting.wind, self.setting.voltage]
+        return self._environment._replace(**dict(zip(SURROUNDINGS, row, strict=True)))
+
+    def keep_setting(self, other: World) -> None:
+        """Take over the switches of another world (a bar was put on or off)."""
+        self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
+        self.reset()

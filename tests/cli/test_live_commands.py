@@ -1,0 +1,91 @@
+"""`swash live` and `swash replay` where something is wrong, and a served page from start to interrupt."""
+
+from __future__ import annotations
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+from commands import one_message, swash
+
+import swashplate as sp
+from swashplate.links.live import server
+
+
+@pytest.fixture(autouse=True)
+def page_is_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The page's libraries are not what is tested here."""
+    (tmp_path / "page" / "vendor").mkdir(parents=True)
+    for name in ("three.module.min.js", "uPlot.esm.js"):
+        (tmp_path / "page" / "vendor" / name).touch()
+    monkeypatch.setattr(server, "PAGE", tmp_path / "page")
+
+
+def test_a_port_in_use_is_told() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        for command in (["live", "coax"], ["replay", "nothing.nc"]):
+            assert "--port 0 takes any free port" in one_message(swash(*command, "--port", port))
+
+
+@pytest.mark.parametrize("command", [["live", "coax"], ["replay", "nothing.nc"]])
+def test_other_machines_are_let_in_only_when_asked_to(command: list[str]) -> None:
+    assert "--allow-remote" in one_message(swash(*command, "--host", "0.0.0.0", "--port", "0"))
+    assert "no address of this machine" in one_message(swash(*command, "--host", "nowhere.invalid", "--port", "0"))
+
+
+def test_live_refuses_what_cannot_fly(tmp_path: Path) -> None:
+    assert "neither a vehicle's name nor a file" in one_message(swash("live", "nosuch", "--port", "0"))
+    file = tmp_path / "file"
+    file.write_text("x")
+    assert "expected a folder" in one_message(swash("live", "coax", "--port", "0", "--out", file))
+    assert "is not TOML" in one_message(swash("live", "coax", "--port", "0", "--controller", _broken(tmp_path)))
+    coax = sp.vehicle("coax")
+    from swashplate.control.controller_file import save_controller
+
+    save_controller(sp.autopilot(coax, sp.trim(coax)), tmp_path / "coax-controller.toml")
+    told = one_message(swash("live", "raptor50", "--port", "0", "--controller", tmp_path / "coax-controller.toml"))
+    assert "is for 'coax', not for 'conventional'" in told
+
+
+def _broken(folder: Path) -> Path:
+    path = folder / "broken.toml"
+    path.write_text("kind = ")
+    return path
+
+
+def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
+    assert "nothing.nc" in one_message(swash("replay", "nothing.nc", "--port", "0"))
+    film, frames = tmp_path / "a.mp4", tmp_path / "frames"
+    assert "Give one of them" in one_message(swash("replay", "x.nc", "--video", film, "--frames", frames))
+    assert "does not exist" in one_message(swash("replay", "x.nc", "--video", tmp_path / "no" / "a.mp4"))
+
+
+def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    import importlib.util
+
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == "uvicorn" else real(name, *a))
+    assert "pip install swashplate[live]" in one_message(swash("live", "coax", "--port", "0"))
+
+
+def test_serves_until_interrupted(tmp_path: Path) -> None:
+    if not (Path(server.__file__).parent / "page" / "vendor" / "three.module.min.js").is_file():
+        pytest.skip("the page's libraries are not here: python scripts/vendor_page.py")
+    command = [sys.executable, "-m", "swashplate", "live", "coax", "--port", "0"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        found = re.search(r"http://\S+", process.stdout.readline())
+        assert found is not None
+        with urllib.request.urlopen(found[0], timeout=10.0) as page:
+            assert b"swash live" in page.read()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=20.0)
+    assert process.returncode == 0
+    assert said == ""
+    assert not (tmp_path / "live").exists(), "nothing was recorded, nothing is left"
