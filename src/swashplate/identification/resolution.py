@@ -21,8 +21,8 @@ from swashplate.identification.spectra import Complex, Signals
 
 TWICED = 1.25
 """How much more the second estimate scatters than the random error of its coherence says: it carries the first one's
-noise nearly twice, less once more blurred. Measured: 1.06 times (40 records of noise through a first-order lag), and 1.22
-(median) to 1.47 (95th percentile) on an R-50 in hover, over 1,600 points of 3 flights."""
+noise nearly twice, less once more blurred. Measured: 1.06 times (40 records of noise through a first-order lag), and
+1.22 (median) to 1.47 (95th percentile) on an R-50 in hover, over 1,600 points of 3 flights."""
 
 BLURRED, LONGER = 0.3, 1.4
 """Change [dB] that the second estimate makes, above which longer windows are advised, and how much longer."""
