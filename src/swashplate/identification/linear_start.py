@@ -1,7 +1,7 @@
 """Start values that need none: the equations of motion as regressions on measured responses.
 
-Where outputs and kinematics give the responses of all states, M jw X = F X + G U e^(-jw tau) is linear in the entries of
-F and G, row by row (equation error in the frequency domain: Klein and Morelli 2006, sec. 7.3; as starting values:
+Where outputs and kinematics give the responses of all states, M jw X = F X + G U e^(-jw tau) is linear in the entries
+of F and G, row by row (equation error in the frequency domain: Klein and Morelli 2006, sec. 7.3; as starting values:
 Tischler and Remple 2012, ch. 13). Where some states are hidden (a rotor), only the controls' columns are matched in
 sign and size.
 """

@@ -39,6 +39,9 @@ SPREAD = 0.3
 
 SCREENED, STARTED = 48, 4
 
+_VERY_WRONG = 3e4
+"""J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
+
 _UNSEEN = 1e3
 """A parameter that starts at zero and would need more than this to answer alone is scaled by one."""
 
@@ -217,12 +220,12 @@ def fit_targets(
 def _better(
     model: StateSpaceModel, others: Mapping[str, StateSpaceModel], targets: Sequence[Target]
 ) -> tuple[StateSpaceModel, str]:
-    """The start that costs least, with its source ("" for the given one)."""
+    """The start that costs least, with its source ("" for the given one); zero responses count as very wrong."""
 
     def price(one: StateSpaceModel) -> float:
         row = cost_function(one, targets, np.ones(len(model.free)))
-        found = row.cost(np.array([one.parameters[n].value for n in model.free]))
-        return found if np.isfinite(found) else float("inf")
+        each = row.each(np.array([one.parameters[n].value for n in model.free]))
+        return float(sum(min(cost, _VERY_WRONG) if np.isfinite(cost) else _VERY_WRONG for cost in each))
 
     best, source, least = model, "", price(model)
     for name, other in others.items():
