@@ -16,6 +16,7 @@ from swashplate.cli import (
     derivatives,
     fit_ss,
     fit_tf,
+    fit_time,
     identify,
     inspect,
     maneuver,
@@ -66,6 +67,7 @@ app.command("validate", short_help="Predict flights with a model and judge the p
 app.command("respond", short_help="Frequency responses from logs of sweeps.")(respond.respond)
 app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
+app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
