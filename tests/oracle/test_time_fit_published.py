@@ -98,7 +98,7 @@ def test_delays_and_heave_come_back_with_their_bounds() -> None:
     u = np.cumsum(random.standard_normal(time.size)) * 0.01
     truth = structure("heave").with_values({"Zw": -2.25, "Zcol": -27.43, "tau_collective": 0.0527})
     phi, q0, q1 = hold_matrices(*truth.explicit()[:2], 0.01)
-    late, w = delayed(u[:, None], 5.27), np.zeros((time.size, 1))
+    late, w = delayed(u, 5.27)[:, None], np.zeros((time.size, 1))
     for k in range(1, time.size):
         w[k] = phi @ w[k - 1] + q0 @ late[k - 1] + q1 @ (late[k] - late[k - 1])
     c, d = truth.explicit()[2:]
