@@ -93,6 +93,24 @@ def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) ->
     assert "fixed" in fixed.out
 
 
+def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answered: Path) -> None:
+    places = []
+    for name, output in (("mixer_roll", "p"), ("mixer_pitch", "q")):
+        places.append(folder / f"tf_{output}")
+        done = swash(
+            "fit-tf", answered, "--input", name, "--outputs", output, "--form", "2/4", "--margins", "--out", places[-1]
+        )
+        assert done.code == 0, done.err
+        assert f"{output} / {name} (flight): crossover" in done.out
+        assert f"{output} / {name} (model): crossover" in done.out
+    done = swash("fit-ss", "rotor_body", answered, "--start-from", ",".join(map(str, places)), "--json")
+    assert done.code == 0, done.err
+    found = {p["name"]: p["value"] for p in json.loads(done.out)["fit"]["parameters"]}
+    assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
+    refused = swash("fit-ss", "rotor_body", answered, "--start-from", str(folder / "nothing.toml"))
+    assert "neither a vehicle's name nor a file" in one_message(refused)
+
+
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
     done = swash("fit-ss", "rotor_body", answered, "--hold-out", flown, "--starts", "1")
     assert "NOT A HOLD-OUT" in done.out
