@@ -124,3 +124,19 @@ def test_the_model_follows_a_log_that_no_fit_has_seen(shared_data: Path, respons
     found = verify(fit.model, flight(shared_data, "heli_sid_allbits_roll_rate.BIN", *INPUTS, *OUTPUTS))
     assert found.cost < 0.4, found
     assert all(found[name].theil < 0.03 for name in OUTPUTS), found
+
+
+def test_a_log_that_was_cut_off_is_named_and_what_is_left_is_used(shared_data: Path, tmp_path: Path) -> None:
+    whole = (shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN").read_bytes()
+    part = tmp_path / "cut.BIN"
+    part.write_bytes(whole[:2_600_000])
+    log = sp.read(part)
+    log = log.with_streams({"rates": log.streams["rates"]})
+    found = respond(
+        log.condition(rate=100, cutoff=0, outliers=False, trim_ground=False, derive=False),
+        inputs=["mixer_roll"],
+        outputs=["p"],
+        band=(0.2, 5.0),
+    )
+    assert any("cut.BIN" in text and "cut off" in text for text in found.problems), found.problems
+    assert found.band("p", "mixer_roll") is not None

@@ -142,7 +142,8 @@ def respond(
     made = _composed(matrices, omega, question, guess=guess, rest=rest)
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
-    warnings, problems = [*chosen.warnings, *notes], list(response_warnings.dead(flights, inputs, outputs))
+    warnings, problems = [*chosen.warnings, *notes], response_warnings.damaged(flights)
+    problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
         direct = _composed(matrices, omega, replace(question, references=0))
