@@ -364,8 +364,8 @@ def handling_section(m: ResponseMaterial) -> Section | None:
         "Attitude responses (rates over jω)",
         ("response", "from", "remark", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]"),
         tuple(rows),
-        note="After ADS-33E-PRF (definition from memory, not verified against its text), rate command: the lower of the "
-        "frequencies of 45° phase margin and 6 dB gain margin; phase delay by a coherence-weighted line "
+        note="After ADS-33E-PRF (definition from memory, not verified against its text), rate command: the lower of "
+        "the frequencies of 45° phase margin and 6 dB gain margin; phase delay by a coherence-weighted line "
         "from ω180 to twice of it. Its boundaries are for manned helicopters: for a small one scale "
         "frequencies with the square root of the size (Froude).",
     )
