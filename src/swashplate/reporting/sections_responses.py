@@ -281,7 +281,9 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
     )
     blocks.append(
         Table(
-            "Along unseen records",
+            "Along records of the fit"
+            if any("NOT A HOLD-OUT" in text for text in v.warnings)
+            else "Along unseen records",
             ("output", "unit", "rms error", "Theil", "fit %"),
             rows,
             note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
