@@ -93,6 +93,24 @@ def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) ->
     assert "fixed" in fixed.out
 
 
+def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answered: Path) -> None:
+    places = []
+    for name, output in (("mixer_roll", "p"), ("mixer_pitch", "q")):
+        places.append(folder / f"tf_{output}")
+        done = swash(
+            "fit-tf", answered, "--input", name, "--outputs", output, "--form", "2/4", "--margins", "--out", places[-1]
+        )
+        assert done.code == 0, done.err
+        assert f"{output} / {name} (flight): crossover" in done.out
+        assert f"{output} / {name} (model): crossover" in done.out
+    done = swash("fit-ss", "rotor_body", answered, "--start-from", ",".join(map(str, places)), "--json")
+    assert done.code == 0, done.err
+    found = {p["name"]: p["value"] for p in json.loads(done.out)["fit"]["parameters"]}
+    assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
+    refused = swash("fit-ss", "rotor_body", answered, "--start-from", str(folder / "nothing.toml"))
+    assert "neither a vehicle's name nor a file" in one_message(refused)
+
+
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
     done = swash("fit-ss", "rotor_body", answered, "--hold-out", flown, "--starts", "1")
     assert "NOT A HOLD-OUT" in done.out
@@ -181,3 +199,23 @@ def test_a_record_in_two_rates_is_brought_to_one(folder: Path, flown: Path) -> N
         "50",
     )
     assert done.code == 0, done.err
+
+
+def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flown: Path) -> None:
+    out, unseen = folder / "time", log(folder / "unseen_time.csv", seed=7, seconds=15.0)
+    short = log(folder / "short.csv", seed=8, seconds=12.0)
+    done = swash(
+        "fit-time", "rotor_body", short, "--no-shifts", "--hold-out", unseen, "--out", out,
+        "--start", "Lb=2000", "--start", "Blat=0.15", "--fix", "tau_pitch=0.05", "--iterations", "25",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    fit = json.loads((out / "fit.json").read_text(encoding="utf-8"))
+    found = {p["name"]: p["value"] for p in fit["parameters"]}
+    assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
+    assert found["tau_roll"] == pytest.approx(0.05, abs=0.002)
+    assert json.loads((out / "verification.json").read_text(encoding="utf-8"))["J_rms"] < 0.5
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "identified in time" in page
+    assert "NOT A HOLD-OUT" not in page
+    assert "is no method" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
+    assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))

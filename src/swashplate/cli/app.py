@@ -17,6 +17,7 @@ from swashplate.cli import (
     export,
     fit_ss,
     fit_tf,
+    fit_time,
     identify,
     inspect,
     link,
@@ -70,6 +71,7 @@ app.command("validate", short_help="Predict flights with a model and judge the p
 app.command("respond", short_help="Frequency responses from logs of sweeps.")(respond.respond)
 app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
+app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
 app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +12,8 @@ from swashplate.cli.reading import Reading
 
 if TYPE_CHECKING:
     from swashplate.control.ardupilot_gains import Suggestion
+    from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.state_space import StateSpaceModel
 
 FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
@@ -20,7 +23,8 @@ def fit_ss(
         str,
         typer.Argument(
             metavar="STRUCTURE",
-            help="A model file, or a ready structure: six_dof, hybrid, thirteen_state, coaxial, rotor_body, heave.",
+            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, thirteen_state, coaxial, "
+            "rotor_body, heave.",
         ),
     ],
     responses: flying.Responses,
@@ -30,7 +34,11 @@ def fit_ss(
     ] = None,
     start_from: Annotated[
         str | None,
-        typer.Option("--start-from", metavar="VEHICLE", help="Start from a vehicle's linearisation in hover."),
+        typer.Option(
+            "--start-from",
+            metavar="SOURCE",
+            help="Start from a vehicle's linearisation in hover, or from models of `swash fit-tf`, by commas.",
+        ),
     ] = None,
     fix: Annotated[
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")
@@ -71,11 +79,8 @@ def fit_ss(
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         if start_from is not None:
-            line.say("linearising the vehicle")
-            import swashplate as sp
-            from swashplate.identification.start_values import from_linear_model
-
-            model = from_linear_model(model, sp.linearize(sp.vehicle(start_from)))
+            line.say("finding start values")
+            model = _started(model, start_from, found, seed=seed)
         values = {
             n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
         }
@@ -118,6 +123,20 @@ def fit_ss(
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
     flying.end_with(fit.problems)
+
+
+def _started(model: StateSpaceModel, source: str, responses: FrequencyResponse, *, seed: int) -> StateSpaceModel:
+    """The model with start values from fitted transfer functions (files or their folders) or from a vehicle."""
+    from swashplate.identification.start_values import from_linear_model, from_models
+    from swashplate.identification.state_space_file import is_state_space
+    from swashplate.identification.state_space_file import structure as find
+
+    places = [Path(name) / "model.toml" if Path(name).is_dir() else Path(name) for name in flying.names(source)]
+    if places and all(is_state_space(str(place)) for place in places):
+        return from_models(model, [find(str(place)) for place in places], responses, seed=seed)
+    import swashplate as sp
+
+    return from_linear_model(model, sp.linearize(sp.vehicle(source)))
 
 
 def _gain_words(s: Suggestion) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
+
+if TYPE_CHECKING:
+    from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.transfer_function_fit import TransferFunctionFit
 
 FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
@@ -27,6 +31,9 @@ def fit_tf(
     ] = None,
     band: flying.BandOption = None,
     coherence: flying.Coherence = 0.6,
+    loop: Annotated[
+        bool, typer.Option("--margins", help="Crossover, gain and phase margin, the responses taken as broken loops.")
+    ] = False,
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     rate: options.Rate = 100.0,
@@ -91,15 +98,41 @@ def fit_tf(
                 write_text(folder / "model.toml", to_toml(model))
             if verification is not None:
                 write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
+    read = _margins(found, fit) if loop else []
     if json:
-        document = {"fit": fit.as_dict(), "verification": verification and verification.as_dict()}
+        document = {"fit": fit.as_dict(), "margins": read, "verification": verification and verification.as_dict()}
         typer.echo(as_json({**document, "tried": [{"form": t.form.text, "J": t.cost} for t in trials]}))
     elif not quiet:
         if trials:
             lines = [f"  {t.form.text:<10}{t.parameters:>3} parameters   J = {t.cost:8.1f}" for t in trials]
             typer.echo("Structures tried (zeros/poles):\n" + "\n".join(lines) + "\n")
         typer.echo(repr(fit))
+        for line_of_margins in read:
+            typer.echo(line_of_margins["text"])
         if verification is not None:
             typer.echo(f"\n{verification!r}")
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
+
+
+def _margins(responses: FrequencyResponse, fit: TransferFunctionFit) -> list[dict[str, Any]]:
+    """Margins of every response, by the flight (with random errors) and by its model."""
+    import numpy as np
+
+    from swashplate.identification.handling import margins
+
+    found: list[dict[str, Any]] = []
+    for model, wanted in zip(fit.models, fit.targets, strict=True):
+        h, _, error = responses.pair(wanted.output, wanted.input)
+        inside = (responses.omega >= wanted.omega[0]) & (responses.omega <= wanted.omega[-1]) & np.isfinite(h)
+        omega = responses.omega[inside]
+        wide = np.geomspace(omega[0] / 10.0, omega[-1] * 10.0, 800)
+        for source, m in (
+            ("flight", margins(omega, h[inside], error=error[inside])),
+            ("model", margins(wide, model.response(wide))),
+        ):
+            numbers = {k: [v.value, v.sigma] for k, v in vars(m).items()}
+            text = f"{wanted.name} ({source}): crossover {m.crossover!r} rad/s, phase margin {m.phase_margin!r} deg, "
+            text += f"gain margin {m.gain_margin!r} dB at {m.omega_180!r} rad/s"
+            found.append({"response": wanted.name, "from": source, **numbers, "text": text})
+    return found

@@ -41,7 +41,9 @@ class Conditioned:
     error: Array
 
 
-def condition_spectra(spectra: Complex, inputs: int, *, averages: float) -> Conditioned:
+def condition_spectra(
+    spectra: Complex, inputs: int, *, averages: float, removed: Complex | None = None, whole: Array | None = None
+) -> Conditioned:
     """H = Gxx^-1 Gxy with partial and multiple coherence (Tischler and Remple 2012, ch. 9; Bendat and Piersol 2010).
 
     With A = Gxx^-1 and the noise spectrum Gvv = Gyy - Gyx A Gxy, the inverse of the full matrix gives the partial
@@ -51,6 +53,8 @@ def condition_spectra(spectra: Complex, inputs: int, *, averages: float) -> Cond
         spectra: shape (n_f, n, n), inputs first, `[f, i, j]` = average of conj(Z_i) Z_j.
         inputs: how many of the channels are inputs.
         averages: number of independent windows.
+        removed: responses that were taken out of the outputs beforehand and are added here, shape
+            (n_f, n_outputs, n_inputs). whole: spectra of the whole outputs then, shape (n_f, n_outputs).
     """
     gxx, gxy = spectra[:, :inputs, :inputs], spectra[:, :inputs, inputs:]
     gyy = np.diagonal(spectra[:, inputs:, inputs:], axis1=1, axis2=2).real
@@ -62,12 +66,13 @@ def condition_spectra(spectra: Complex, inputs: int, *, averages: float) -> Cond
     h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
     explained = np.einsum("fio,fio->fo", gxy.conj(), h).real
     noise = np.maximum(gyy - explained, 0.0)
-    response = np.where(own[:, None, :] > SINGULAR, h.transpose(0, 2, 1), np.nan)
+    found = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
+    response = np.where(own[:, None, :] > SINGULAR, found, np.nan)
     a = np.diagonal(inverse, axis1=1, axis2=2).real
     power = np.abs(response) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         coherence = power / (a[:, None, :] * noise[:, :, None] + power)
-        multiple = explained / gyy
+        multiple = explained / gyy if whole is None else 1.0 - noise / whole
         input_power = np.where(a > 0.0, 1.0 / np.where(a > 0.0, a, 1.0), np.nan)
         cross = response * input_power[:, None, :]
     return Conditioned(

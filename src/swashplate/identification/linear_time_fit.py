@@ -1,15 +1,16 @@
-"""State-space models fitted in time by output error: maximum likelihood under measurement noise.
+"""State-space models fitted in time: maximum likelihood under measurement noise, or with gusts by prediction errors.
 
-    dx/dt = A x + B u + shift,    y = C x + D u + bias + v
+    dx/dt = A x + B u(t - tau) + shift (+ gusts),    y = C x + D u(t - tau) + bias + v
 
-The covariance of v alternates with Fisher scoring (Jategaonkar 2015, ch. 4; Klein and Morelli 2006, ch. 6); derivatives
-by complex steps are exact to rounding. An unstable aircraft is fitted where its record is short against its growth;
-gusts, which this method does not know, go into the noise and make its bounds too small.
+Output error takes all noise for measurement noise (Jategaonkar 2015, ch. 4; Klein and Morelli 2006, ch. 6). Prediction
+error corrects the state by K times the last innovation and fits K too: the innovations form, which knows any stationary
+gusts and measurement noise, also where both come in by an accelerometer (Ljung 1999, sec. 7.3; Jategaonkar, ch. 5).
+The covariance of the errors alternates with Fisher scoring; derivatives by complex steps are exact to rounding.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,13 +19,22 @@ from scipy.linalg import expm
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array, Flight
+from swashplate.identification.expressions import Expression
 from swashplate.identification.records import uniform_table
 from swashplate.identification.response_cost import ParameterAccuracy
 from swashplate.identification.rows import Entry, Row
-from swashplate.identification.scoring import minimise
+from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.state_space import StateSpaceModel
 
+METHODS = ("output-error", "prediction-error")
+
+VAGUE = 50.0
+"""Percent of a value that a standard deviation may have before it is said."""
+
 _STEP = 1e-30
+_FIRST_GAIN = 0.3
+_DIVERGED = 1e9
+_EXACT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -33,7 +43,7 @@ class LinearTimeFit:
 
     Attributes:
         model: identified. parameters: with standard deviations in `cramer_rao` (from the Fisher information).
-        covariance: of the output errors.
+        covariance: of the output errors (or innovations). method: "output-error" or "prediction-error".
         constants: start states, shifts and biases that were solved for, by name and record.
         history: cost after each iteration. converged: False where the iterations ran out.
     """
@@ -44,13 +54,32 @@ class LinearTimeFit:
     constants: Mapping[str, float]
     history: tuple[float, ...]
     converged: bool
+    method: str = "output-error"
+    warnings: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> ParameterAccuracy:
         return next(p for p in self.parameters if p.name == name)
 
     def __repr__(self) -> str:
         rows = [f"  {p.name:<12}{p.value:>12.5g} +- {p.cramer_rao:.2g}  {p.unit}" for p in self.parameters]
-        return "\n".join([f"{self.model.name} fitted in time", *rows])
+        told = [f"! {text}" for text in self.warnings]
+        return "\n".join([f"{self.model.name} fitted in time by {self.method}", *rows, *told])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers and words as JSON types."""
+        return {
+            "kind": "time-fit",
+            "model": self.model.name,
+            "method": self.method,
+            "parameters": [vars(p) for p in self.parameters],
+            "constants": dict(self.constants),
+            "covariance": self.covariance.tolist(),
+            "eigenvalues": [[float(v.real), float(v.imag)] for v in self.model.eigenvalues()],
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+            "sources": list(self.sources),
+        }
 
 
 def fit_in_time(
@@ -60,36 +89,45 @@ def fit_in_time(
     outputs: Sequence[str] | None = None,
     shifts: bool = True,
     biases: Sequence[str] = (),
+    method: str = "output-error",
     iterations: int = 80,
+    progress: Callable[[int, float], None] | None = None,
 ) -> LinearTimeFit:
     """Fit a model's free parameters to records in time.
 
     Args:
-        model: structure and start values; its delays must be zero (shift the inputs beforehand).
+        model: structure and start values. A delay belongs to an input; free ones are fitted.
         flights: conditioned; each unbroken piece is a record with its own start state and constants.
         outputs: channels to fit; all of the model's where None.
         shifts: constants in the states' rates, per record.
         biases: outputs with a constant of their own, per record.
+        method: "output-error", or "prediction-error" for records with gusts or an unstable aircraft.
         iterations: at most this many.
+        progress: called with the iteration and the cost.
 
     Raises:
-        IdentificationError: a model with delays, or one that diverges at its start values.
+        IdentificationError: delays that differ between outputs, a model that diverges at its start values, an unknown
+            method, or no free parameter.
     """
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     names = tuple(outputs or model.outputs)
-    if any(model.delay(o, i) for o in names for i in model.inputs):
-        raise IdentificationError(
-            "has delays, which the fit in time does not move.",
-            channel=model.name,
-            hint="Shift the inputs, fix them at 0.",
-        )
-    pieces = []
+    if method not in METHODS:
+        raise IdentificationError(f"'{method}' is no method; there are {', '.join(METHODS)}.", channel="method")
+    if not model.free:
+        raise IdentificationError("has no free parameter.", channel=model.name)
+    unknown = [o for o in (*names, *biases) if o not in model.outputs]
+    if unknown:
+        raise IdentificationError(f"is no output of '{model.name}'.", channel=", ".join(unknown))
+    delays = tuple(_delay_of(model, names, i) for i in model.inputs)
+    pieces, sources = [], []
     for flight in flights:
         for piece in flight.split():
             time, table = uniform_table(piece, (*model.inputs, *names), who=f"'{model.name}'")
             pieces.append((float((time[-1] - time[0]) / (time.size - 1)), table))
-    likelihood = _OutputErrors(model, names, pieces, shifts, tuple(biases))
-    optimum = minimise(likelihood, iterations=iterations, tolerance=1e-3)
+            sources.append(f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s")
+    gain = method == "prediction-error"
+    likelihood = _OutputErrors(model, names, pieces, shifts, tuple(biases), delays=delays, gain=gain)
+    optimum = minimise(likelihood, iterations=iterations, tolerance=0.02, progress=progress)
     numbers = optimum.row * likelihood.row.scale
     spread = np.sqrt(np.diag(np.linalg.pinv(optimum.information, hermitian=True))) * likelihood.row.scale
     named = dict(zip(likelihood.row.names, numbers, strict=True))
@@ -108,11 +146,42 @@ def fit_in_time(
         for i, n in enumerate(model.free)
     )
     kept = {n: float(v) for n, v in list(named.items())[k:]}
-    return LinearTimeFit(found, parameters, likelihood.covariance, kept, optimum.history, optimum.converged)
+    return LinearTimeFit(
+        found,
+        parameters,
+        likelihood.covariance,
+        kept,
+        optimum.history,
+        optimum.converged,
+        method,
+        _words(parameters, optimum),
+        tuple(sources),
+    )
+
+
+def _words(parameters: Sequence[ParameterAccuracy], optimum: Optimum) -> tuple[str, ...]:
+    words = [] if optimum.converged else ["the iterations ran out."]
+    vague = [p.name for p in parameters if not p.cramer_rao_percent <= VAGUE]
+    if vague:
+        words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
+    if optimum.at_bound:
+        words.append(f"ended on a bound: {', '.join(optimum.at_bound)}.")
+    return tuple(words)
+
+
+def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:
+    found = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
+    if len(found) > 1:
+        raise IdentificationError(
+            f"has different delays to different outputs ({', '.join(found)}).",
+            channel=input,
+            hint="Give the input one delay; the fit in time delays inputs.",
+        )
+    return next(iter(found.values()), None)
 
 
 class _OutputErrors:
-    """Half the sum of squared output errors in the metric of their covariance, which `refresh` takes anew."""
+    """The likelihood of output errors or innovations; `refresh` takes their covariance anew for gradient and metric."""
 
     def __init__(
         self,
@@ -121,11 +190,16 @@ class _OutputErrors:
         pieces: Sequence[tuple[float, Array]],
         shifts: bool,
         biases: tuple[str, ...],
+        *,
+        delays: tuple[Expression | None, ...],
+        gain: bool,
     ) -> None:
+        self.delays = delays
         self.model, self.outputs, self.pieces = model, outputs, pieces
         self.rows_of = [model.outputs.index(o) for o in outputs]
         m = len(model.inputs)
         spread = np.std(np.concatenate([table[:, m:] for _, table in pieces]), axis=0) + 1e-12
+        self.floor = (_EXACT * spread) ** 2
         self.covariance = np.diag((0.1 * spread) ** 2)
         entries = [
             Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper)
@@ -141,6 +215,11 @@ class _OutputErrors:
                     entries.append(Entry(f"shift {s}[{number}]", "nuisance", 0.0, 0.1 * size[s]))
             for o in biases:
                 entries.append(Entry(f"bias {o}[{number}]", "nuisance", 0.0, 0.1 * float(spread[outputs.index(o)])))
+        for s in model.states if gain else ():
+            for o in outputs:
+                entries.append(
+                    Entry(f"gain {s}/{o}", "noise", _FIRST_GAIN * (s == o), 0.1 * size[s] / spread[outputs.index(o)])
+                )
         self._row = Row(tuple(entries))
         self._place = {name: i for i, name in enumerate(self._row.names)}
 
@@ -150,14 +229,19 @@ class _OutputErrors:
 
     def refresh(self, row: Array) -> None:
         errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-        if np.all(np.isfinite(errors)) and np.max(np.abs(errors)) < 1e9:
-            self.covariance = errors.T @ errors / len(errors) + 1e-12 * np.diag(np.diag(self.covariance))
+        if np.all(np.isfinite(errors)) and np.max(np.abs(errors)) < _DIVERGED:
+            self.covariance = self._covariance(errors)
+
+    def _covariance(self, errors: Array) -> Array:
+        return np.asarray(errors.T @ errors / len(errors) + np.diag(self.floor))
 
     def cost(self, row: Array) -> float:
+        """Negative log-likelihood at its own covariance, without constants: n/2 log det S."""
         with np.errstate(over="ignore", invalid="ignore"):
             errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-            value = 0.5 * float(np.einsum("ti,ij,tj->", errors, np.linalg.inv(self.covariance), errors))
-        return value if np.isfinite(value) else float("inf")
+        if not np.all(np.isfinite(errors)) or np.max(np.abs(errors)) > _DIVERGED:
+            return float("inf")
+        return 0.5 * len(errors) * float(np.linalg.slogdet(self._covariance(errors))[1])
 
     def scores(self, row: Array) -> tuple[float, Array, Array]:
         numbers = np.asarray(row * self.row.scale)
@@ -168,7 +252,7 @@ class _OutputErrors:
         weighted = slopes @ metric
         gradient = np.einsum("pti,ti->p", weighted, plain)
         information = np.einsum("pti,qti->pq", weighted, slopes, optimize=True)
-        return 0.5 * float(np.einsum("ti,ij,tj->", plain, metric, plain)), gradient, information
+        return 0.5 * len(plain) * float(np.linalg.slogdet(self._covariance(plain))[1]), gradient, information
 
     def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
         """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""
@@ -188,6 +272,7 @@ class _OutputErrors:
         n, m = len(self.model.states), len(self.model.inputs)
         systems = [self._matrices(numbers) for numbers in batch]
         a, b, c, d, h1 = (np.stack(part) for part in zip(*systems, strict=True))
+        gain = self._gain(batch)
         parts = []
         for number, (dt, table) in enumerate(self.pieces):
             shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
@@ -200,19 +285,46 @@ class _OutputErrors:
             block[:, n : n + width, n + width :] = np.eye(width) / dt
             step = expm(block * dt)
             phi, g0, g1 = step[:, :n, :n], step[:, :n, n : n + width], step[:, :n, n + width :]
-            u = table[:, :m]
-            drive = np.einsum("pij,tj->tpi", g0[:, :, :m], u[:-1]) + np.einsum(
-                "pij,tj->tpi", g1[:, :, :m], np.diff(u, axis=0)
+            u = self._late(batch, table[:, :m], dt)
+            drive = np.einsum("pij,tpj->tpi", g0[:, :, :m], u[:-1]) + np.einsum(
+                "pij,tpj->tpi", g1[:, :, :m], np.diff(u, axis=0)
             )
             drive = drive + np.einsum("pij,pj->pi", g0[:, :, m:], shift)
-            through = np.einsum("pij,tj->tpi", d, u) + bias
+            through = np.einsum("pij,tpj->tpi", d, u) + bias
             errors = np.empty((len(table), len(batch), len(self.outputs)), dtype=np.complex128)
             for k in range(len(table)):
                 errors[k] = table[k, m:] - through[k] - np.einsum("pij,pj->pi", c, x)
                 if k + 1 < len(table):
                     x = np.einsum("pij,pj->pi", phi, x) + drive[k]
+                    if gain is not None:
+                        x = x + np.einsum("pij,pj->pi", gain, errors[k])
             parts.append(errors.transpose(1, 0, 2))
         return np.concatenate(parts, axis=1)
+
+    def _late(self, batch: Any, u: Array, dt: float) -> Any:
+        """Inputs later by their delays, straight between samples, (n_t, n_batch, n_inputs)."""
+        late = np.broadcast_to(u[:, None, :], (len(u), len(batch), u.shape[1]))
+        if not any(self.delays):
+            return late
+        late = late.astype(np.complex128)
+        count = np.arange(len(u))
+        for p, numbers in enumerate(batch):
+            values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
+            for i, delay in enumerate(self.delays):
+                if delay is not None:
+                    lag = delay(values) / dt
+                    whole = int(np.floor(np.real(lag)))
+                    near, far = (u[np.clip(count - k, 0, len(u) - 1), i] for k in (whole, whole + 1))
+                    late[:, p, i] = near + (lag - whole) * (far - near)
+        return late
+
+    def _gain(self, batch: Any) -> Any:
+        """Gains from innovations to states, (n_batch, n_states, n_outputs); None for output error."""
+        places = [self._place.get(f"gain {s}/{o}") for s in self.model.states for o in self.outputs]
+        if not places or places[0] is None:
+            return None
+        shape = (len(batch), len(self.model.states), len(self.outputs))
+        return batch[:, [p for p in places if p is not None]].reshape(shape)
 
     def _column(self, batch: Any, pattern: str, names: Sequence[str]) -> Any:
         found = np.zeros((len(batch), len(names)), dtype=np.complex128)

@@ -70,7 +70,9 @@ def _without(fit: StateSpaceFit, name: str, value: float) -> StateSpaceFit | Non
     if not model.free:
         return None
     try:
-        return fit_targets(model, fit.targets, left_out=fit.left_out, starts=1, settings=fit.settings)
+        return fit_targets(
+            model, fit.targets, ceilings=fit.ceilings, left_out=fit.left_out, starts=1, settings=fit.settings
+        )
     except (IdentificationError, np.linalg.LinAlgError):
         return None
 

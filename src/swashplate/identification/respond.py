@@ -19,6 +19,7 @@ from swashplate.identification.conditioning import (
     random_error,
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.resolution import TWICED, blur_words, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
 
 LINES_PER_DECADE = 50
@@ -135,14 +136,20 @@ def respond(
     omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
     question = _Question(inputs, outputs, own[0].values.shape[1] - n)
     matrices, notes = _matrices(own, omega, chosen.lengths, overlap)
-    made = _composed(matrices, omega, question)
+    blurred = _composed(matrices, omega, question)
+    guess = first_guess(blurred)
+    rest, _ = _matrices(without(own, omega, guess), omega, chosen.lengths, overlap)
+    made = _composed(matrices, omega, question, guess=guess, rest=rest)
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
-    warnings, problems = [*chosen.warnings, *notes], list(response_warnings.dead(flights, inputs, outputs))
+    warnings, problems = [*chosen.warnings, *notes], response_warnings.damaged(flights)
+    problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
+        # Both as the windows blur them, so that only the loop tells them apart.
         direct = _composed(matrices, omega, replace(question, references=0))
-        warnings += response_warnings.bias_words(made, direct)
+        warnings += response_warnings.bias_words(blurred, direct)
     warnings += response_warnings.few_averages(matrices)
+    warnings += blur_words(blurred, made, longest=min(piece.duration for piece in pieces))
     warnings += response_warnings.mixing_words(made)
     warnings += response_warnings.lead_words(made)
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
@@ -155,7 +162,6 @@ def respond(
         made,
         input_units=tuple(_unit(flights[0], name) for name in inputs),
         output_units=tuple(_unit(flights[0], name) for name in outputs),
-        windows=tuple(m.window for m in matrices),
         sources=tuple(piece.name for piece in pieces),
         warnings=tuple(warnings),
         problems=tuple(problems),
@@ -238,15 +244,23 @@ def _matrices(
     return found, notes
 
 
-def _composed(matrices: Sequence[SpectralMatrix], omega: Array, question: _Question) -> FrequencyResponse:
-    """The composite of the conditioned spectra of every window."""
+def _composed(
+    matrices: Sequence[SpectralMatrix],
+    omega: Array,
+    question: _Question,
+    *,
+    guess: Complex | None = None,
+    rest: Sequence[SpectralMatrix] | None = None,
+) -> FrequencyResponse:
+    """The composite of the conditioned spectra of every window, of what a guess leaves of the outputs where given."""
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     parts = []
-    for matrix in matrices:
-        values = matrix.values
+    for matrix, left in zip(matrices, matrices if rest is None else rest, strict=True):
+        values = left.values
         if question.references:
             values = project_on_references(values, n_in, question.references)
-        parts.append(condition_spectra(values[:, :n, :n], n_in, averages=matrix.averages))
+        whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
+        parts.append(condition_spectra(values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole))
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
     weight = np.stack([_window_weight(part, matrix) for part, matrix in zip(parts, matrices, strict=True)])
     plain = [m.values for m in matrices]
@@ -261,11 +275,12 @@ def _composed(matrices: Sequence[SpectralMatrix], omega: Array, question: _Quest
         response=response,
         coherence=coherence,
         multiple=_mean(weight, np.stack([part.multiple for part in parts])),
-        error=error,
+        error=error if rest is None else TWICED * error,
         input_power=auto[:, :n_in],
         output_power=auto[:, n_in:n],
         input_coherence=between.real,
         method="joint" if question.references else "direct",
+        windows=tuple(m.window for m in matrices),
     )
 
 

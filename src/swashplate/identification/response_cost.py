@@ -26,6 +26,9 @@ PHASE_WEIGHT = 0.01745
 ACCEPTABLE, INDISTINGUISHABLE = 100.0, 50.0
 """J of a response up to which a model is acceptable, and hardly to be told from the flight."""
 
+SIGMAS = 3.0
+"""Errors by which a response that was not seen may exceed its estimate."""
+
 _DB = 20.0 / np.log(10.0)
 _DEG = 180.0 / np.pi
 
@@ -39,6 +42,7 @@ class Target:
         omega: frequencies [rad/s], shape (n,).
         measured: the response there, shape (n,).
         coherence: partial coherence there, shape (n,).
+        ceiling: True where nothing coherent was seen, and `measured` is what the response cannot exceed.
     """
 
     output: str
@@ -46,6 +50,7 @@ class Target:
     omega: Array
     measured: Complex
     coherence: Array
+    ceiling: bool = False
 
     @property
     def name(self) -> str:
@@ -92,6 +97,38 @@ def target(
     return Target(output, input, at, np.exp(log_at), np.interp(np.log(at), np.log(omega), coherence[known]))
 
 
+def ceiling(
+    responses: FrequencyResponse,
+    output: str,
+    input: str,
+    *,
+    band: tuple[float, float] | None = None,
+    points: int = POINTS,
+) -> Target | None:
+    """What a pair without coherence still tells: a response above its estimate and three errors would have been seen.
+
+    Without it a fit is free to invent a large response to an input where there was none to see. None where the input
+    told nothing either.
+
+    Args:
+        responses: from `respond`.
+        output, input: the pair.
+        band: narrower limits [Hz].
+        points: frequencies, evenly in log frequency.
+    """
+    h, _, error = responses.pair(output, input)
+    low, high = (0.0, np.inf) if band is None else (TWO_PI * band[0], TWO_PI * band[1])
+    known = (
+        np.isfinite(h) & np.isfinite(error) & (np.abs(h) > 0.0) & (responses.omega >= low) & (responses.omega <= high)
+    )
+    if known.sum() < 4:
+        return None
+    omega = responses.omega[known]
+    at = np.geomspace(omega[0], omega[-1], points)
+    bound = np.interp(np.log(at), np.log(omega), np.log(np.abs(h[known]) * (1.0 + SIGMAS * error[known])))
+    return Target(output, input, at, np.exp(bound).astype(np.complex128), np.ones(points), ceiling=True)
+
+
 def log_error(model: Complex, measured: Complex) -> Complex:
     """log(model / measured) with the phase difference wrapped to half a turn either way."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -100,10 +137,18 @@ def log_error(model: Complex, measured: Complex) -> Complex:
 
 
 def cost_of(model: Complex, wanted: Target) -> float:
-    """J of one response."""
+    """J of one response; of a ceiling, what stands above it."""
     gain, phase = wanted.weights
+    if wanted.ceiling:
+        return float(np.sum((gain * _DB * _excess(model, wanted)) ** 2))
     error = log_error(model, wanted.measured)
     return float(np.sum((gain * _DB * error.real) ** 2) + np.sum((phase * _DEG * error.imag) ** 2))
+
+
+def _excess(model: Complex, wanted: Target) -> Array:
+    """Logarithm of how far a model stands above a ceiling, zero below it."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.maximum(np.log(np.abs(model)) - np.log(np.abs(wanted.measured)), 0.0))
 
 
 Evaluate = Callable[[Array], tuple[list[Complex], list[Complex]]]
@@ -111,7 +156,7 @@ Evaluate = Callable[[Array], tuple[list[Complex], list[Complex]]]
 
 
 class ResponseCost:
-    """Half the sum of J over all targets, in the form that `scoring.minimise` wants (Gauss-Newton).
+    """Half the sum of J over all targets and ceilings, in the form that `scoring.minimise` wants (Gauss-Newton).
 
     Args:
         row: the parameters that move.
@@ -155,6 +200,12 @@ class ResponseCost:
         rows, derivatives = [], []
         for model, slope, wanted in zip(models, slopes, self.targets, strict=True):
             gain, phase = wanted.weights
+            if wanted.ceiling:
+                excess = _excess(model, wanted)
+                above = np.where(excess > 0.0, gain * _DB, 0.0)
+                rows.append(gain * _DB * excess)
+                derivatives.append(above[:, None] * np.where(excess[:, None] > 0.0, slope.real, 0.0))
+                continue
             error = log_error(model, wanted.measured)
             rows += [gain * _DB * error.real, phase * _DEG * error.imag]
             derivatives += [(gain * _DB)[:, None] * slope.real, (phase * _DEG)[:, None] * slope.imag]

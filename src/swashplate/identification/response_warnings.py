@@ -39,6 +39,15 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
     ]
 
 
+def damaged(flights: Sequence[Flight]) -> list[str]:
+    """What is broken in the logs themselves (cut off, bytes lost, clock set back): responses are of what is left."""
+    return [
+        f"{flight.provenance.source or 'flight'}: {'; '.join(flight.provenance.damage)}; what was read is used."
+        for flight in flights
+        if flight.provenance.damage
+    ]
+
+
 def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
     """Inputs that no frequency, or hardly one, tells apart."""
     words = []

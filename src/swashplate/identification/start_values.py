@@ -8,7 +8,8 @@ import numpy as np
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
-from swashplate.identification.response_cost import POINTS, Target
+from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.response_cost import POINTS, Target, target
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_fit import fit_targets
 from swashplate.identification.transfer_function_fit import TransferFunctionFit
@@ -73,6 +74,40 @@ def _residualised(linear: LinearModel, states: Sequence[str]) -> tuple[Array, Ar
     return np.asarray(a), np.asarray(b)
 
 
+def from_models(
+    model: StateSpaceModel, fitted: Sequence[StateSpaceModel], responses: FrequencyResponse, *, seed: int = 0
+) -> StateSpaceModel:
+    """The model with start values that answer as simpler fitted models do, over the responses' coherent bands.
+
+    Args:
+        model: what needs start values.
+        fitted: models with inputs and outputs of it (those that `swash fit-tf` wrote).
+        responses: measured, for the bands.
+
+    Raises:
+        IdentificationError: where none of them joins an output and an input of model and responses.
+    """
+    targets = []
+    for one in fitted:
+        for o, output in enumerate(one.outputs):
+            for i, name in enumerate(one.inputs):
+                if {output} <= {*model.outputs} & {*responses.outputs} and {name} <= {*model.inputs} & {
+                    *responses.inputs
+                }:
+                    seen = target(responses, output, name)
+                    if seen is not None:
+                        h = one.response(seen.omega)[:, o, i]
+                        targets.append(Target(output, name, seen.omega, h, np.ones(seen.omega.size)))
+    return _matched(model, targets, seed=seed)
+
+
+def _matched(model: StateSpaceModel, targets: Sequence[Target], *, seed: int) -> StateSpaceModel:
+    if not targets:
+        raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
+    found = fit_targets(model, targets, seed=seed, iterations=40)
+    return model.with_values({name: found.model.parameters[name].value for name in found.free})
+
+
 def from_transfer_functions(
     model: StateSpaceModel, fits: Sequence[TransferFunctionFit], *, seed: int = 0
 ) -> StateSpaceModel:
@@ -91,7 +126,4 @@ def from_transfer_functions(
                 omega = np.geomspace(wanted.omega[0], wanted.omega[-1], POINTS)
                 h = function.response(omega)
                 targets.append(Target(function.output, function.input, omega, h, np.ones(POINTS)))
-    if not targets:
-        raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
-    found = fit_targets(model, targets, seed=seed, iterations=40)
-    return model.with_values({name: found.model.parameters[name].value for name in found.free})
+    return _matched(model, targets, seed=seed)

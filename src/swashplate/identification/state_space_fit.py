@@ -12,12 +12,14 @@ import numpy as np
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array
 from swashplate.identification.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+from swashplate.identification.linear_start import other_starts
 from swashplate.identification.response_cost import (
     ACCEPTABLE,
     ParameterAccuracy,
     ResponseCost,
     Target,
     accuracy_of,
+    ceiling,
     target,
 )
 from swashplate.identification.rows import Entry, Row
@@ -36,6 +38,9 @@ SPREAD = 0.3
 """Relative scatter of the starting points."""
 
 SCREENED, STARTED = 48, 4
+
+_VERY_WRONG = 3e4
+"""J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
 
 _UNSEEN = 1e3
 """A parameter that starts at zero and would need more than this to answer alone is scaled by one."""
@@ -69,10 +74,13 @@ def fit_state_space(
         IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
     """
     began = time.perf_counter()
-    targets, left_out = _targets(model, responses, band, bands or {}, least_coherence)
+    targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
+    others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
     return fit_targets(
         model,
         targets,
+        others=others,
+        ceilings=ceilings,
         left_out=left_out,
         starts=starts,
         iterations=iterations,
@@ -96,7 +104,7 @@ def _targets(
     band: tuple[float, float] | None,
     bands: Mapping[str, tuple[float, float]],
     least: float,
-) -> tuple[list[Target], tuple[str, ...]]:
+) -> tuple[list[Target], list[Target], tuple[str, ...]]:
     shared_in = [name for name in model.inputs if name in responses.inputs]
     shared_out = [name for name in model.outputs if name in responses.outputs]
     if not shared_in or not shared_out:
@@ -105,13 +113,15 @@ def _targets(
             f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
             hint="Name the model's channels as the flight's.",
         )
-    found, missing = [], []
+    found, ceilings, missing = [], [], []
     for output in shared_out:
         for name in shared_in:
             own = bands.get(f"{output}/{name}", bands.get(name, band))
             one = target(responses, output, name, band=own, least=least)
             if one is None:
                 missing.append(f"{output} / {name}")
+                limit = ceiling(responses, output, name, band=own)
+                ceilings += [] if limit is None else [limit]
             else:
                 found.append(one)
     if not found:
@@ -119,13 +129,15 @@ def _targets(
             f"no response keeps a coherence of {least:g} over a band: {', '.join(missing)}.",
             hint="Nothing can be fitted; look at the responses and fly a better sweep.",
         )
-    return found, tuple(missing)
+    return found, ceilings, tuple(missing)
 
 
 def fit_targets(
     model: StateSpaceModel,
     targets: Sequence[Target],
     *,
+    others: Mapping[str, StateSpaceModel] | None = None,
+    ceilings: Sequence[Target] = (),
     left_out: tuple[str, ...] = (),
     starts: int = STARTED,
     iterations: int = 100,
@@ -134,7 +146,7 @@ def fit_targets(
     began: float | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> StateSpaceFit:
-    """Fit a model to given targets (see `fit_state_space`)."""
+    """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
     began = time.perf_counter() if began is None else began
     warnings, problems = [], _start_problems(model)
     traceless = _traceless(model, targets)
@@ -146,7 +158,9 @@ def fit_targets(
             f"no fitted response sees a free parameter of '{model.name}'.",
             hint="Fit other responses or free parameters.",
         )
-    optimum, cost = _best(model, targets, starts=starts, iterations=iterations, seed=seed, progress=progress)
+    every_target = (*targets, *ceilings)
+    start, source = _better(model, others or {}, every_target)
+    optimum, cost = _best(start, every_target, starts=starts, iterations=iterations, seed=seed, progress=progress)
     numbers = optimum.row * cost.row.scale
     _, slopes = cost.residuals(optimum.row)
     cramer_rao, insensitivity, correlation = accuracy_of(slopes / cost.row.scale)
@@ -164,7 +178,8 @@ def fit_targets(
             for name, p in found.parameters.items()
         },
     )
-    costs = tuple(cost.each(optimum.row))
+    every = cost.each(optimum.row)
+    costs = tuple(every[: len(targets)])
     parameters = tuple(
         ParameterAccuracy(
             name=name,
@@ -180,10 +195,14 @@ def fit_targets(
         for name, p in found.parameters.items()
     )
     warnings += _words(targets, costs, parameters, optimum)
+    over = [c.name for c, above in zip(ceilings, every[len(targets) :], strict=True) if above > ACCEPTABLE]
+    if over:
+        warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
     return StateSpaceFit(
         model=found,
         start=model,
         targets=tuple(targets),
+        ceilings=tuple(ceilings),
         costs=costs,
         parameters=parameters,
         free=model.free,
@@ -194,8 +213,26 @@ def fit_targets(
         problems=tuple(problems),
         left_out=left_out,
         seconds=time.perf_counter() - began,
-        settings=dict(settings or {}),
+        settings={**dict(settings or {}), "started_from": source or "given values"},
     )
+
+
+def _better(
+    model: StateSpaceModel, others: Mapping[str, StateSpaceModel], targets: Sequence[Target]
+) -> tuple[StateSpaceModel, str]:
+    """The start that costs least, with its source ("" for the given one); zero responses count as very wrong."""
+
+    def price(one: StateSpaceModel) -> float:
+        row = cost_function(one, targets, np.ones(len(model.free)))
+        each = row.each(np.array([one.parameters[n].value for n in model.free]))
+        return float(sum(min(cost, _VERY_WRONG) if np.isfinite(cost) else _VERY_WRONG for cost in each))
+
+    best, source, least = model, "", price(model)
+    for name, other in others.items():
+        one = model.with_values({n: other.parameters[n].value for n in model.free})
+        if price(one) < least:
+            best, source, least = one, name, price(one)
+    return best, source
 
 
 def _pairs(model: StateSpaceModel, targets: Sequence[Target]) -> list[tuple[int, int, Array]]:

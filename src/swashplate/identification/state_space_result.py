@@ -43,7 +43,7 @@ class StateSpaceFit:
         reduction: what was dropped on the way.
         converged: False where the iterations ran out.
         warnings, problems: what a reader must know; what is wrong.
-        left_out: pairs without a coherent band.
+        left_out: pairs without a coherent band. ceilings: what their responses cannot exceed.
         seconds: wall time.
         settings: what was asked.
     """
@@ -61,6 +61,7 @@ class StateSpaceFit:
     warnings: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    ceilings: tuple[Target, ...] = ()
     seconds: float = 0.0
     settings: Mapping[str, Any] = field(default_factory=dict)
 

@@ -35,11 +35,12 @@ def response_report(material: ResponseMaterial, *, path: str | os.PathLike[str],
 def compose_responses(material: ResponseMaterial, *, title: str | None = None) -> Report:
     """The report's structure."""
     m = material
-    if not (m.responses or m.transfer_functions or m.fit or m.verification):
+    if not (m.responses or m.transfer_functions or m.fit or m.verification or m.time_fit):
         raise SwashError("there is nothing to report.")
     parts = [
         sections_responses.verification_section(m.verification, m.rival) if m.verification else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
+        sections_responses.time_fit_section(m.time_fit) if m.time_fit else None,
         sections_responses.fit_costs_section(m.fit) if m.fit else None,
         sections_responses.transfer_functions_section(m) if m.transfer_functions else None,
         sections_responses.bodes_section(m) if m.responses else None,
@@ -63,6 +64,8 @@ def _title(m: ResponseMaterial) -> str:
         return f"{m.fit.model.name} identified from frequency responses"
     if m.transfer_functions:
         return "Transfer functions from frequency responses"
+    if m.time_fit:
+        return f"{m.time_fit.model.name} identified in time"
     if m.responses:
         return "Frequency responses"
     assert m.verification is not None
@@ -71,6 +74,8 @@ def _title(m: ResponseMaterial) -> str:
 
 def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
     found = []
+    if m.verification and any("NOT A HOLD-OUT" in text for text in m.verification.warnings):
+        found.append(("caution", "NOT A HOLD-OUT: the fit has seen the records that are shown."))
     if m.verification and any(f.provenance.simulated for f in m.verification.flights):
         found.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))
     if m.fit and m.fit.problems:
@@ -121,7 +126,11 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         )
     elif m.fit or m.transfer_functions:
         rows.append(("In time", "not verified: give a flight that the fit has not seen.", "caution"))
-    told = [*(m.responses.warnings if m.responses else ()), *(m.fit.warnings if m.fit else ())]
+    told = [
+        *(m.time_fit.warnings if m.time_fit else ()),
+        *(m.responses.warnings if m.responses else ()),
+        *(m.fit.warnings if m.fit else ()),
+    ]
     rows.append(
         ("Beware", " ".join(told[:3]) or "nothing that these flights could show.", "caution" if told else "plain")
     )

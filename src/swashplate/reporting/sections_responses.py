@@ -11,6 +11,7 @@ from swashplate.control.ardupilot_gains import Suggestion
 from swashplate.errors import IdentificationError
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.handling import Handling, attitude_of, handling_qualities
+from swashplate.identification.linear_time_fit import LinearTimeFit
 from swashplate.identification.mismatch import mismatch
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
@@ -37,6 +38,7 @@ class ResponseMaterial:
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
         fit: a state-space fit. verification: in time. rival: another model on the same records.
+        time_fit: a state-space model fitted to records in time.
         gains: suggested for the autopilot.
     """
 
@@ -46,6 +48,7 @@ class ResponseMaterial:
     fit: StateSpaceFit | None = None
     verification: Verification | None = None
     rival: Verification | None = None
+    time_fit: LinearTimeFit | None = None
     gains: tuple[Suggestion, ...] = field(default=())
 
 
@@ -118,6 +121,33 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if len(fit.history) > 1:
         words = "Half the sum of J over all responses, after each iteration."
         blocks.append(replace(cost_history(fit.history), caption=words))
+    return Section("parameters", "Parameters", tuple(blocks))
+
+
+def time_fit_section(fit: LinearTimeFit) -> Section:
+    """Parameters with their standard deviations, and the modes."""
+    rows = tuple(
+        (
+            Cell(p.name),
+            Cell(unit_words(p.unit)),
+            Cell(value_words(p.start), number=True),
+            Cell(value_words(p.value, p.cramer_rao), number=True, strong=True),
+            _percent(p.cramer_rao_percent, CR_TARGET),
+            Cell("at its bound" if p.at_bound else "", tone="bad" if p.at_bound else "plain"),
+        )
+        for p in fit.parameters
+    )
+    blocks: list[Block] = [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
+    blocks.append(
+        Table(
+            "Parameters",
+            ("parameter", "unit", "start", "identified", "standard deviation", "remarks"),
+            rows,
+            note=f"By {fit.method}; standard deviations from the Fisher information, for white errors: with coloured "
+            "ones the true scatter is larger.",
+        )
+    )
+    blocks.append(eigenvalues({"identified": _modes(fit.model.eigenvalues())}))
     return Section("parameters", "Parameters", tuple(blocks))
 
 
@@ -251,7 +281,9 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
     )
     blocks.append(
         Table(
-            "Along unseen records",
+            "Along records of the fit"
+            if any("NOT A HOLD-OUT" in text for text in v.warnings)
+            else "Along unseen records",
             ("output", "unit", "rms error", "Theil", "fit %"),
             rows,
             note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
@@ -334,9 +366,10 @@ def handling_section(m: ResponseMaterial) -> Section | None:
         "Attitude responses (rates over jω)",
         ("response", "from", "remark", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]"),
         tuple(rows),
-        note="ADS-33E-PRF, rate command: the lower of the frequencies of 45° phase margin and 6 dB gain margin; phase "
-        "delay by a coherence-weighted line from ω180 to twice of it. Its boundaries are for manned helicopters: for a "
-        "small one scale frequencies with the square root of the size (Froude).",
+        note="After ADS-33E-PRF (definition from memory, not verified against its text), rate command: the lower of "
+        "the frequencies of 45° phase margin and 6 dB gain margin; phase delay by a coherence-weighted line "
+        "from ω180 to twice of it. Its boundaries are for manned helicopters: for a small one scale "
+        "frequencies with the square root of the size (Froude).",
     )
     return Section("handling", "Handling qualities", (table,), folded=True)
 
