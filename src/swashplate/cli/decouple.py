@@ -111,7 +111,7 @@ def decouple(
     law, slowest = made.numbers.law, loop_modes(vehicle, made, hover)[0]
     if made.mode != "manual":  # a pilot damps what "manual" leaves alone
         require_stable(slowest, rate=made.rate, where=model)
-    margins = None if slowest.real > 0.0 or made.mode == "manual" else loop_margins(vehicle, made, hover)
+    margins = None if made.mode == "manual" else loop_margins(vehicle, made, hover)
     volts = float(hover.environment.voltage)
     motor = hover.commands()["motor_lower"]
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}

@@ -1,0 +1,350 @@
+"""A controller on a vehicle, judged: margins, disturbance rejection, handling qualities, steps and cross-coupling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.control.margins import Margins
+from swashplate.control.requirements import (
+    ATTITUDE_COUPLING,
+    BANDWIDTH,
+    REJECTION,
+    REJECTION_PEAK,
+    TASKS,
+    Boundary,
+    froude_scale,
+)
+from swashplate.control.sampled_loop import SampledLoop, sampled_loop
+from swashplate.control.stability import frequencies_of, margins_of, modes_of
+from swashplate.control.step_response import StepMetrics, cross_ratio, step_metrics
+from swashplate.errors import ControllerError, DivergenceError, IdentificationError, SwashError
+from swashplate.flights.flight import Flight
+from swashplate.identification.handling import Handling, handling_qualities
+from swashplate.simulation.closed_loop import Controller, simulate_closed_loop
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Command = Literal["auto", "rate", "attitude"]
+
+ATTITUDES: Mapping[str, tuple[str, float]] = {"phi": ("roll", 1.0), "theta": ("pitch", -1.0), "psi": ("psi", 1.0)}
+"""Attitude by name: the reference that a pilot moves it by, and its sign (a pitch command is nose down positive)."""
+STEPS: Mapping[str, tuple[str, str, float]] = {
+    "roll": ("phi", "p", 0.1),
+    "pitch": ("theta", "q", 0.1),
+    "psi": ("psi", "r", math.radians(30.0)),
+    "z": ("z", "", -0.5),
+    "x": ("x", "", 1.0),
+    "y": ("y", "", 1.0),
+    "ahead": ("u", "", 0.5),
+    "right": ("v", "", 0.5),
+}
+"""Steps by reference: the state that answers, its measured rate, and the size [rad, m, m/s, share of the stick]."""
+_LEAD = 0.5
+"""Seconds of rest before a step."""
+_PHYSICS = 500.0
+"""Least rate of the simulation [Hz]."""
+_COUPLING_WITHIN = 4.0
+"""Seconds after the step in which couplings are read (as in ADS-33E-PRF, 3.3.9)."""
+_HALF_POWER = 10.0 ** (-3.0 / 20.0)
+_ATTITUDE_LAG = -60.0
+_LAST_LEAD = 60.0
+"""Degrees of lead above which an outer loop still takes the pilot's command back; the response is read above it."""
+
+
+@dataclass(frozen=True)
+class AttitudeResponse:
+    """An attitude's response to the pilot's command.
+
+    Attributes:
+        state, reference: names.
+        omega, response: the frequency response, the sign a pilot's [rad/s].
+        handling: bandwidth and phase delay; None with the reason in `problem`.
+        kind: "attitude" or "rate", what a steady command gives; it says which bandwidth counts.
+        level: of the bandwidth.
+    """
+
+    state: str
+    reference: str
+    omega: Array
+    response: NDArray[np.complex128]
+    handling: Handling | None
+    kind: str
+    level: int | None
+    problem: str = ""
+
+    @property
+    def oscillates(self) -> bool:
+        """Bandwidth by gain below that by phase (or none): prone to pilot-induced oscillation (ADS-33E-PRF, fig. 4)."""
+        h = self.handling
+        return h is not None and not h.bandwidth_gain.value >= h.bandwidth_phase.value
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """What a loop leaves of a disturbance on a measured state.
+
+    Attributes:
+        state: name.
+        bandwidth: lowest frequency at which it leaves 3 dB less than all [rad/s]; NaN where it never does.
+        peak: the most that it leaves [dB], at `peak_frequency` [rad/s].
+        omega, size: |S| against frequency.
+        level, peak_level: of both; None where no standard speaks of the state.
+    """
+
+    state: str
+    bandwidth: float
+    peak: float
+    peak_frequency: float
+    omega: Array
+    size: Array
+    level: int | None
+    peak_level: int | None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of one reference, flown on the nonlinear vehicle."""
+
+    reference: str
+    state: str
+    size: float
+    flight: Flight
+    metrics: StepMetrics
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """What one axis does while another is commanded: `value` in `unit`, and its level where a standard has one."""
+
+    name: str
+    value: float
+    unit: str
+    level: int | None
+
+
+@dataclass(frozen=True)
+class ControlCheck:
+    """Everything that was found; a part that could not be is in `problems`.
+
+    Attributes:
+        vehicle, trim: what flies, where.
+        scale: of the Froude scaling, N.
+        task: of the bandwidth's boundaries.
+        modes: of the closed loop [1/s], least stable first.
+        margins: None for a loop that does not stand.
+        omega, opened: the loop opened at the inputs, for the plots.
+    """
+
+    vehicle: Vehicle
+    trim: Trim
+    rate: float
+    scale: float
+    task: str
+    modes: NDArray[np.complex128]
+    margins: Margins | None
+    omega: Array
+    opened: NDArray[np.complex128]
+    attitudes: tuple[AttitudeResponse, ...]
+    rejections: tuple[Rejection, ...]
+    steps: tuple[Step, ...]
+    couplings: tuple[Coupling, ...]
+    problems: tuple[str, ...]
+
+    def boundary(self, state: str) -> Boundary:
+        """Of an attitude's bandwidth."""
+        return BANDWIDTH[self.task][state]
+
+
+def check_controller(
+    vehicle: Vehicle,
+    controller: Controller,
+    trim: Trim,
+    *,
+    task: str = "other",
+    command: Command = "auto",
+    scale: float | None = None,
+    duration: float = 20.0,
+    points: int = 600,
+) -> ControlCheck:
+    """Judge a controller about a trim.
+
+    Args:
+        vehicle: what flies, which need not be what the controller was designed on.
+        controller: see `swashplate.simulation.closed_loop.Controller`.
+        trim: the hover or steady flight.
+        task: of the bandwidth's boundaries, one of `TASKS`.
+        command: type of the attitude response. "rate" counts the lower of the two bandwidths, "attitude" that by
+            phase; "auto" takes it for attitude where the phase at a third of the bandwidth is above -60 degrees.
+        scale: of the Froude scaling; by default the UH-60's rotor radius over the vehicle's.
+        duration: of the steps [s].
+        points: of the frequency grid.
+
+    Raises:
+        SwashError: for a task that is not known, or a vehicle without a rotor radius where no scale is given.
+    """
+    if task not in TASKS:
+        raise SwashError(f"is '{task}', expected {', '.join(TASKS)}.", channel="task")
+    if duration <= _COUPLING_WITHIN:
+        raise SwashError(f"is {duration:g} s, expected more than {_COUPLING_WITHIN:g} s.", channel="duration")
+    n = scale if scale is not None else _scale_of(vehicle)
+    loop = sampled_loop(vehicle, controller, trim)
+    w = frequencies_of(loop, points=points)
+    problems: list[str] = []
+    try:
+        margins = margins_of(loop, points=points, where=vehicle.name)
+    except ControllerError as error:
+        margins = None
+        problems.append(f"No margins: {error.problem}")
+    steps = _steps(vehicle, controller, trim, loop, duration, problems)
+    return ControlCheck(
+        vehicle=vehicle,
+        trim=trim,
+        rate=controller.rate,
+        scale=n,
+        task=task,
+        modes=modes_of(loop),
+        margins=margins,
+        omega=w,
+        opened=loop.opened(w),
+        attitudes=tuple(_attitude(loop, w, state, BANDWIDTH[task], command, n) for state in _commanded(loop)),
+        rejections=tuple(_rejections(loop, w, n)) if margins else (),
+        steps=tuple(steps),
+        couplings=tuple(_couplings({step.reference: step for step in steps})),
+        problems=tuple(problems),
+    )
+
+
+def _scale_of(vehicle: Vehicle) -> float:
+    radius = vehicle.card.values().get("rotor_radius")
+    if radius is None:
+        raise SwashError(
+            "has no rotor_radius to scale the boundaries by.",
+            where=vehicle.card.path or vehicle.name,
+            hint="Give the scale (--scale; 1 for full size).",
+        )
+    return froude_scale(radius)
+
+
+def _commanded(loop: SampledLoop) -> list[str]:
+    return [s for s, (reference, _) in ATTITUDES.items() if s in loop.states and loop.answers(reference, s)]
+
+
+def _attitude(
+    loop: SampledLoop,
+    w: Array,
+    state: str,
+    boundaries: Mapping[str, Boundary],
+    command: Command,
+    scale: float,
+) -> AttitudeResponse:
+    reference, sign = ATTITUDES[state]
+    response = sign * loop.response(w, reference, state)
+    # The phase is counted from where the rate's response is largest; there an attitude lags by about 90 degrees.
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    middle = int(np.argmax(np.abs(response) * w))
+    phase -= 360.0 * np.ceil((phase[middle] - 90.0) / 360.0)
+    leading = np.flatnonzero(phase[: middle + 1] > _LAST_LEAD)
+    first = int(leading[-1]) + 1 if leading.size else 0
+    band = slice(first, None)
+    kind = command
+    try:
+        found = handling_qualities(w[band], response[band], command="attitude")
+        if command == "auto":
+            third = float(np.interp(found.bandwidth_phase.value / 3.0, w, phase))
+            kind = "attitude" if third > _ATTITUDE_LAG else "rate"
+        if kind == "rate":
+            found = handling_qualities(w[band], response[band])
+    except IdentificationError as error:
+        return AttitudeResponse(state, reference, w, response, None, kind, None, error.problem)
+    level = boundaries[state].level(found.bandwidth.value, scale=scale)
+    return AttitudeResponse(state, reference, w, response, found, kind, level)
+
+
+def _rejections(loop: SampledLoop, w: Array, scale: float) -> list[Rejection]:
+    found = []
+    for state in ("phi", "theta", "psi", "x", "y", "z", "u", "v"):
+        if state not in loop.states:
+            continue
+        size = np.abs(loop.sensitivity(w, state))
+        if np.min(size) > _HALF_POWER:  # nobody holds it
+            continue
+        below = size < _HALF_POWER
+        up = np.flatnonzero(below[:-1] & ~below[1:])
+        bandwidth = float("nan")
+        if up.size:
+            k = int(up[0])
+            part = np.log(_HALF_POWER / size[k]) / np.log(size[k + 1] / size[k])
+            bandwidth = float(w[k] * (w[k + 1] / w[k]) ** part)
+        worst = int(np.argmax(size))
+        peak = float(20.0 * np.log10(size[worst]))
+        standard = REJECTION.get(state)
+        level = None if standard is None else standard.level(bandwidth, scale=scale)
+        peak_level = None if standard is None else REJECTION_PEAK.level(peak)
+        found.append(Rejection(state, bandwidth, peak, float(w[worst]), w, size, level, peak_level))
+    return found
+
+
+def _steps(
+    vehicle: Vehicle, controller: Controller, trim: Trim, loop: SampledLoop, duration: float, problems: list[str]
+) -> list[Step]:
+    rate = controller.rate * max(1, round(_PHYSICS / controller.rate))
+    samples = round((_LEAD + duration) * rate) + 1
+    on = np.arange(samples) / rate >= _LEAD
+    at_rest = trim.states()
+    found = []
+    for reference, (state, measured_rate, size) in STEPS.items():
+        if state not in loop.states or not loop.answers(reference, state):
+            continue
+        if reference in ("ahead", "right") and loop.answers("x", "x"):
+            continue  # a place that is held takes a speed back
+        try:
+            flight = simulate_closed_loop(
+                vehicle,
+                controller,
+                duration=_LEAD + duration,
+                reference={reference: at_rest.get(reference, 0.0) + size * on},
+                start=trim,
+                rate=rate,
+                environment=trim.environment,
+            )
+        except DivergenceError as error:
+            problems.append(f"The step of {reference} was lost after {error.time:.2f} s ({error.state}).")
+            continue
+        after = slice(int(np.argmax(on)), None)
+        metrics = step_metrics(
+            flight.time(state)[after],
+            flight.values(state)[after],
+            wanted=None if reference in ("roll", "pitch") else size,
+            rates=flight.values(measured_rate)[after] if measured_rate else None,
+        )
+        found.append(Step(reference, state, size, flight, metrics))
+    return found
+
+
+def _couplings(steps: Mapping[str, Step]) -> list[Coupling]:
+    lateral, forward = (
+        next((steps[r] for r in names if r in steps), None)
+        for names in (("roll", "right", "y"), ("pitch", "ahead", "x"))
+    )
+    found = []
+    for name, step, on, off, unit, factor in (
+        ("pitch from roll", lateral, "phi", "theta", "deg/deg", 1.0),
+        ("roll from pitch", forward, "theta", "phi", "deg/deg", 1.0),
+        ("height from pitch", forward, "theta", "z", "m/rad", 1.0),
+        ("yaw from collective", steps.get("z"), "z", "psi", "deg/m", math.degrees(1.0)),
+    ):
+        if step is None:
+            continue
+        t = step.flight.time(on)
+        part = (t >= _LEAD) & (t <= _LEAD + _COUPLING_WITHIN)
+        value = factor * cross_ratio(step.flight.values(on)[part], step.flight.values(off)[part])
+        level = ATTITUDE_COUPLING.level(value) if unit == "deg/deg" else None
+        found.append(Coupling(f"{name} (step of {step.reference})", value, unit, level))
+    return found
