@@ -147,4 +147,4 @@ def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> No
     assert "moves yaw; with --monte-carlo a maneuver is a pilot's roll or pitch" in yaw.err
     windy = swash(*command[:7], "--maneuver", "doublet:pitch,1s", "--gusts", "indoor")
     assert windy.code == 2
-    assert "are for --monte-carlo" in windy.err
+    assert "--gusts: is for --monte-carlo" in windy.err

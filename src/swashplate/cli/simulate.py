@@ -65,6 +65,25 @@ def simulate(
     gusts: Annotated[
         str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
     ] = "none",
+    battery: Annotated[
+        str | None,
+        typer.Option("--battery", metavar="FROM-TO", help="With --monte-carlo: voltage at start and end, 12.5-10.5."),
+    ] = None,
+    tolerances: Annotated[
+        bool, typer.Option("--tolerances", help="With --monte-carlo: the card's numbers drawn from their sigmas.")
+    ] = False,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary", metavar="NAME=SIGMA", help="With --monte-carlo: a number of the card, also NAME=5%; repeatable."
+        ),
+    ] = None,
+    payload: Annotated[
+        float, typer.Option("--payload", help="With --monte-carlo: up to so much mass more [kg].", min=0.0)
+    ] = 0.0,
+    delay: Annotated[
+        float, typer.Option("--delay", help="With --monte-carlo: commands late by up to [s].", min=0.0, max=1.0)
+    ] = 0.0,
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
@@ -81,8 +100,20 @@ def simulate(
     excitation, aircraft = parse(maneuver), given.vehicle_of(vehicle, None, switched)
     if pilot and controller is None:
         raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
-    if many is None and (fit is not None or gusts != "none"):
-        raise SwashError("are for --monte-carlo.", channel="--fit and --gusts", hint="Add --monte-carlo 100.")
+    scatter = {
+        "--fit": fit,
+        "--gusts": gusts != "none",
+        "--battery": battery,
+        "--tolerances": tolerances,
+        "--vary": vary,
+        "--payload": payload,
+        "--delay": delay,
+    }
+    alone = [name for name, wanted in scatter.items() if wanted] if many is None else []
+    if alone:
+        raise SwashError("is for --monte-carlo.", channel=", ".join(alone), hint="Add --monte-carlo 100.")
+    if battery is not None and (voltage is not None or sag):
+        raise SwashError("says what --voltage and --sag say.", channel="--battery", hint="Give one of them.")
     if many is not None:
         if controller is None:
             raise SwashError("needs a --controller.", channel="--monte-carlo", hint="`swash decouple` writes one.")
@@ -100,6 +131,11 @@ def simulate(
                 seed=seed,
                 voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
                 sag=sag,
+                battery=battery,
+                tolerances=tolerances,
+                vary=vary,
+                payload=payload,
+                delay=delay,
             )
             paths = _save(worst, out)
         if not quiet:

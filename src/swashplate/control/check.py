@@ -181,7 +181,7 @@ def check_controller(
         trim: the hover or steady flight.
         task: of the bandwidth's boundaries, one of `TASKS`.
         command: type of the attitude response. "rate" counts the lower of the two bandwidths, "attitude" that by
-            phase; "auto" takes it for attitude where the phase at a third of the bandwidth is above -60 degrees.
+            phase; "auto" takes it for attitude where the phase at a tenth of the bandwidth is above -60 degrees.
         scale: of the Froude scaling; by default the UH-60's rotor radius over the vehicle's.
         duration: of the steps [s].
         points: of the frequency grid.
@@ -257,8 +257,8 @@ def _attitude(
     try:
         found = handling_qualities(w[band], response[band], command="attitude")
         if command == "auto":
-            third = float(np.interp(found.bandwidth_phase.value / 3.0, w, phase))
-            kind = "attitude" if third > _ATTITUDE_LAG else "rate"
+            low = float(np.interp(found.bandwidth_phase.value / 10.0, w, phase))
+            kind = "attitude" if low > _ATTITUDE_LAG else "rate"
         if kind == "rate":
             found = handling_qualities(w[band], response[band])
     except IdentificationError as error:

@@ -6,33 +6,27 @@ slope at hover and no part in it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    rk4_step,
-    row_rates,
-)
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_SUBSTEPS = 10
 _NOTHING = 1e-12
 
 
@@ -120,57 +114,43 @@ def sampled_loop(vehicle: Vehicle, controller: Controller, trim: Trim) -> Sample
         SwashError: where the loop is not finite there.
     """
     enable_double_precision()
-    surroundings = np.array([getattr(trim.environment, name) for name in SURROUNDINGS], dtype=np.float64)
     states = trim.states()
     reference = np.array([states.get(name, 0.0) for name in REFERENCES])
-    found = _jacobians(
-        equations_of(vehicle),
-        controller.step,
-        trim.state,
-        controller.memory,
-        controller.gains,
-        reference,
-        surroundings,
-        parameter_row(vehicle, trim.environment),
-        np.array(vehicle.input_limits).T,
-        1.0 / controller.rate,
+    measured = np.array([*trim.state, trim.environment.voltage], dtype=np.float64)
+    inputs, *parts = (
+        np.asarray(part, dtype=np.float64)
+        for part in _decisions(
+            controller.step,
+            measured,
+            np.asarray(controller.memory, dtype=np.float64),
+            controller.gains,
+            reference,
+            np.array(vehicle.input_limits).T,
+        )
     )
-    parts = [np.asarray(part, dtype=np.float64) for part in found]
-    if not all(np.all(np.isfinite(part)) for part in parts):
+    around = linearize(vehicle, replace(trim, inputs=inputs))
+    if not all(np.all(np.isfinite(part)) for part in (around.A, around.B, *parts)):
         raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
-    return SampledLoop(vehicle.state_names, vehicle.input_names, controller.rate, *parts)
+    by_state, by_input = _held(around.A, around.B, 1.0 / controller.rate)
+    return SampledLoop(vehicle.state_names, vehicle.input_names, controller.rate, by_state, by_input, *parts)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
-def _jacobians(
-    equations: Equations,
-    control: Step,
-    x: Any,
-    memory: Any,
-    gains: Any,
-    reference: Any,
-    surroundings: Any,
-    p: Any,
-    limits: Any,
-    dt: Any,
-) -> Any:
-    rates = row_rates(equations, padded=False)
-    n = x.shape[0]
+def _held(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
+    """A continuous model from sample to sample with its inputs held, by one exponential (Van Loan 1978)."""
+    n, m = B.shape
+    both = scipy.linalg.expm(dt * np.block([[A, B], [np.zeros((m, n + m))]]))
+    return both[:n, :n], both[:n, n:]
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _decisions(control: Step, measured: Any, memory: Any, gains: Any, reference: Any, limits: Any) -> Any:
+    """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
+    n = measured.shape[0] - 1
 
     def deciding(both: Any, reference: Any) -> tuple[Any, Any]:
-        measured = jnp.concatenate([both[:n], surroundings[-1:]])
-        after, command = control(both[n:], 0.0, measured, reference, gains)
+        after, command = control(both[n:], 0.0, jnp.append(both[:n], measured[n]), reference, gains)
         return jnp.clip(command, limits[0], limits[1]), after
 
-    def flying(x: Any, command: Any) -> Any:
-        w = jnp.concatenate([command, surroundings])
-
-        def substep(x: Any, _: Any) -> tuple[Any, None]:
-            return rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt / _SUBSTEPS), None
-
-        return jax.lax.scan(substep, x, None, length=_SUBSTEPS)[0]  # a loop: unrolled it takes a minute to compile
-
-    both = jnp.concatenate([x, memory])
-    by_state, by_input = jax.jacfwd(flying, argnums=(0, 1))(x, deciding(both, reference)[0])
+    both = jnp.concatenate([measured[:n], memory])
     (command, command_reference), (after, memory_reference) = jax.jacfwd(deciding, argnums=(0, 1))(both, reference)
-    return by_state, by_input, command, after, command_reference, memory_reference
+    return deciding(both, reference)[0], command, after, command_reference, memory_reference

@@ -193,9 +193,7 @@ def _handling(check: ControlCheck) -> Section | None:
     rows = []
     for a in check.attitudes:
         h = a.handling
-        remark = a.problem or (
-            "bandwidth by gain is the lower: prone to pilot-induced oscillation" if a.oscillates else ""
-        )
+        remark = a.problem or ("6 dB bandwidth lower or none: a pilot may oscillate" if a.oscillates else "")
         numbers = (h.bandwidth_phase, h.bandwidth_gain, h.bandwidth, h.phase_delay) if h else (None,) * 4
         rows.append(
             (Cell(f"{a.state} of {a.reference}"), Cell(a.kind if h else "–"),
@@ -208,7 +206,7 @@ def _handling(check: ControlCheck) -> Section | None:
     )  # fmt: skip
     note = (
         "ADS-33E-PRF: an attitude response counts its bandwidth by phase, a rate response the lower of both. The type "
-        "is taken from the phase at a third of the bandwidth where it was not given."
+        "is taken from the phase at a tenth of the bandwidth where it was not given."
     )
     blocks: list[Block] = [Table("Bandwidth and phase delay", columns, tuple(rows), note=note)]
     if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):

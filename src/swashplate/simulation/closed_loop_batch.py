@@ -48,6 +48,7 @@ def simulate_closed_loops(
     wind: Mapping[str, ArrayLike] | None = None,
     voltage: ArrayLike | None = None,
     noise: Mapping[str, float] | None = None,
+    delay: ArrayLike = 0.0,
     seed: int = 0,
     start: Trim | None = None,
     rate: float = 500.0,
@@ -65,6 +66,8 @@ def simulate_closed_loops(
         reference: as in `simulate_closed_loop`, numbers or series (n,) at the controller's rate, the same for all.
         wind, voltage: numbers, series (n,) or (n, size) at the controller's rate, held between samples.
         noise: standard deviation of the white noise on a measured state, by its name [its unit].
+        delay: of each vehicle's commands on their way to the actuators [s], a number or shape (size,); to the nearest
+            step of the physics. Before the first command arrives the actuators get those of the start.
         seed: of that noise.
         start: where all start; the hover of `vehicle` where it is not given.
         rate: of the physics [Hz], a whole multiple of the controller's.
@@ -98,6 +101,10 @@ def simulate_closed_loops(
         if name not in vehicle.parameter_names:
             raise CardError("is not a parameter of the vehicle.", where=vehicle.name, channel=name)
         p[vehicle.parameter_names.index(name)] = values
+    late = np.round(np.broadcast_to(np.asarray(delay, dtype=np.float64), (size,)) * rate)
+    if not np.all(late >= 0.0):
+        raise SwashError("is negative or no number.", channel="delay")
+    waiting = int(np.ceil(late.max() / round(substeps)))
     sigma = np.zeros(len(vehicle.state_names))
     for name, value in (noise or {}).items():
         sigma[vehicle.index(name)] = value
@@ -112,6 +119,7 @@ def simulate_closed_loops(
             round(substeps),
             keep,
             bool(np.any(sigma)),
+            waiting,
             np.repeat(begin.state[:, None], count, axis=1),
             np.repeat(np.asarray(controller.memory)[:, None], count, axis=1),
             np.asarray(controller.gains),
@@ -120,6 +128,8 @@ def simulate_closed_loops(
             p[:, part],
             np.array(vehicle.input_limits).T[:, :, None],
             sigma[:, None],
+            late[part].astype(int),
+            begin.inputs,
             key,
             1.0 / rate,
         )
@@ -144,13 +154,14 @@ def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
     return np.broadcast_to(table[:samples], (samples, size))
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
+@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4, 5))
 def _fly_many(
     equations: Equations,
     control: Step,
     substeps: int,
     keep: int,
     noisy: bool,
+    waiting: int,
     x0: Any,
     memory: Any,
     gains: Any,
@@ -159,6 +170,8 @@ def _fly_many(
     p: Any,
     limits: Any,
     sigma: Any,
+    late: Any,
+    first: Any,
     key: Any,
     dt: Any,
 ) -> tuple[Any, Any]:
@@ -169,8 +182,8 @@ def _fly_many(
     deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
     voltage = SURROUNDINGS.index("voltage")
 
-    def sample(carry: tuple[Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
-        x, memory, k = carry
+    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
+        x, memory, sent, k = carry
         surroundings, reference = now
         measured = x
         if noisy:
@@ -178,14 +191,28 @@ def _fly_many(
         measured = jnp.concatenate([measured, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
         inputs = jnp.clip(command, limits[0], limits[1])
-        w = jnp.concatenate([inputs, surroundings])
-        after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
-        return (after, memory, k + 1), (x, inputs)
+        if not waiting:
+            w = jnp.concatenate([inputs, surroundings])
+            after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
+            return (after, memory, sent, k + 1), (x, inputs)
+        sent = jnp.concatenate([inputs[None], sent[:-1]])
+
+        def arrived(j: Any) -> Any:
+            """What the actuators get in step j of the sample: the command of so many samples ago."""
+            ago = jnp.maximum(-((j - late) // substeps), 0)
+            return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
+
+        def step(x: Any, j: Any) -> tuple[Any, None]:
+            return flying(x, jnp.concatenate([arrived(j), surroundings]), p), None
+
+        after, _ = jax.lax.scan(step, x, jnp.arange(substeps))
+        return (after, memory, sent, k + 1), (x, arrived(0))
 
     def kept(carry: Any, now: Any) -> Any:
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
         return carry, (x[0], inputs[0])
 
     tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted))
-    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), 0), tables)
+    sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
+    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), sent, 0), tables)
     return record  # type: ignore[no-any-return]
