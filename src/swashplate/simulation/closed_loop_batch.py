@@ -24,6 +24,7 @@ from swashplate.simulation.dynamics import (
     equations_of,
     parameter_row,
     rk4_step,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.trigonometry import vector_backend
@@ -113,7 +114,7 @@ def simulate_closed_loops(
             keep,
             bool(np.any(sigma)),
             np.repeat(begin.state[:, None], count, axis=1),
-            np.repeat(np.asarray(controller.memory)[:, None], count, axis=1),
+            _memories(controller, seed + first + np.arange(count)),
             np.asarray(controller.gains),
             around if around.shape[2] == 1 else around[:, :, part],
             wanted,
@@ -131,6 +132,13 @@ def simulate_closed_loops(
     kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
     rows = np.concatenate([inputs, kept], axis=1)
     return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
+
+
+def _memories(controller: Controller, seeds: NDArray[np.int64]) -> Array:
+    """A column per vehicle; a controller that draws its sensors' biases and noise draws others for each."""
+    if hasattr(controller, "memories"):
+        return np.asarray(controller.memories(seeds))
+    return np.repeat(np.asarray(controller.memory)[:, None], len(seeds), axis=1)
 
 
 def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
@@ -169,23 +177,28 @@ def _fly_many(
     deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
     voltage = SURROUNDINGS.index("voltage")
 
-    def sample(carry: tuple[Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
-        x, memory, k = carry
+    feels = getattr(control, "feels", False)
+    feeling: Any = jax.vmap(row_force(equations, xp=vector_backend()), in_axes=(1, 1, 1), out_axes=1)
+
+    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
+        x, memory, before, k = carry
         surroundings, reference = now
         measured = x
         if noisy:
             measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
-        measured = jnp.concatenate([measured, surroundings[voltage][None]])
+        felt = [feeling(x, jnp.concatenate([before, surroundings]), p)] if feels else []
+        measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
         inputs = jnp.clip(command, limits[0], limits[1])
         w = jnp.concatenate([inputs, surroundings])
         after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
-        return (after, memory, k + 1), (x, inputs)
+        return (after, memory, inputs, k + 1), (x, inputs)
 
     def kept(carry: Any, now: Any) -> Any:
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
         return carry, (x[0], inputs[0])
 
     tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted))
-    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), 0), tables)
+    nothing = jnp.zeros((len(equations.vehicle.input_names), x0.shape[1]))
+    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), nothing, 0), tables)
     return record  # type: ignore[no-any-return]
