@@ -10,6 +10,7 @@ import typer
 
 from swashplate.cli import (
     bench,
+    control,
     data,
     decouple,
     demo,
@@ -73,6 +74,7 @@ app.command("maneuver", short_help="Design an excitation to fly and check its ru
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
+app.add_typer(control.app, name="control")
 app.add_typer(bench.app, name="bench")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")

@@ -58,7 +58,7 @@ def fly(
             channel="--maneuver",
         )
     hover = sp.trim(vehicle, voltage=voltage)
-    pilot = from_file(controller)(vehicle, hover)
+    pilot = from_file(controller, seed=seed)(vehicle, hover)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)
@@ -73,7 +73,7 @@ def fly(
         reference=maneuver.signals(time - _LEAD),
         wind=None if setting is None else dryden(setting, samples=samples, rate=pilot.rate, seed=seed, count=count),
         voltage=float(hover.environment.voltage) - sag * time,
-        noise=SENSOR_NOISE,
+        noise=None if getattr(pilot.step, "feels", False) else SENSOR_NOISE,  # it brings its own sensors
         seed=seed,
         start=hover,
         rate=pilot.rate * max(1, round(_PHYSICS / pilot.rate)),

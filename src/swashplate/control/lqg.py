@@ -21,12 +21,16 @@ from swashplate.control import observer
 from swashplate.control.lqg_law import LAW_MEMORY, Feedback, lqr_law
 from swashplate.control.matrices import JaxMatrices, Matrices
 from swashplate.control.observer import Estimate, Numbers, Plan
-from swashplate.control.sensor_suite import BIASED
+from swashplate.control.sensor_suite import BIASED, readings
+from swashplate.errors import ControllerError
+from swashplate.physics.frames import Vector
+from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Step
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+_BODY = len(RigidBody._fields)
 
 
 class Carried(NamedTuple):
@@ -183,11 +187,11 @@ class SensedStep:
         inner = carried_size(plan)
         numbers, feedback = numbers_from(plan, self.speeds, gains)
         carried, own = carried_from(plan, memory[:inner]), memory[inner:]
-        x, voltage = measured[: plan.n], measured[-1]
+        voltage = measured[-1]
         if plan.sensors:
-            y, own = self._read(own, x, measured[plan.n : plan.n + 3], numbers)
+            y, own = self._read(own, measured[:_BODY], measured[-4:-1], numbers)
         else:
-            y = x[:, None]
+            y = measured[: plan.n, None]
         wanted = [reference[i] for i in range(reference.shape[0])]
         after, _ = lqg_step(plan, numbers, feedback, carried, y, voltage, wanted, M)
         acting = jnp.stack([jnp.asarray(after.given[delay][j]) for j, delay in enumerate(plan.delays)])
@@ -213,12 +217,8 @@ class SensedStep:
 
 def true_readings(plan: Plan, x: Any, force: Any, bias: Any) -> Any:
     """All channels of a true state row, without noise."""
-    from swashplate.control.sensor_suite import readings
-    from swashplate.physics.frames import Vector
-    from swashplate.physics.rigid_body import RigidBody
-
     M = JaxMatrices()
-    body, felt = RigidBody(*(x[i] for i in range(12))), Vector(force[0], force[1], force[2])
+    body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
     named = {name: bias[i] for i, name in enumerate(plan.biases)}
     shown = [value for sensor in plan.sensors for value in readings(sensor, body, felt, named, M.xp).values()]
     return jnp.stack([jnp.asarray(value) for value in shown])
@@ -310,8 +310,23 @@ class Lqg:
         return np.stack([np.concatenate([inner, self._sensor_memory(int(seed))]) for seed in seeds], axis=1)
 
     def starting_at(self, trim: Trim, *, seed: int | None = None) -> Lqg:
-        """The same at another start, with other noise."""
-        return replace(self, start=trim, seed=self.seed if seed is None else seed)
+        """The same at another start, with other noise.
+
+        Raises:
+            ControllerError: where the trim is of a vehicle with other inputs, or, without an observer, other states.
+        """
+        own = self.vehicle
+        strange = trim.input_names != own.input_names or (
+            not self.plan.sensors and trim.state_names != own.state_names
+        )
+        if strange:
+            raise ControllerError(
+                f"was designed on another aircraft than this {len(trim.state_names)}-state one.", where=own.name
+            )
+        known = trim.states()
+        state = [known.get(n, float(v)) for n, v in zip(own.state_names, np.asarray(self.feedback.states)[0], strict=True)]
+        start = replace(trim, state=np.array(state), state_names=own.state_names)
+        return replace(self, start=start, seed=self.seed if seed is None else seed)
 
 
 def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:

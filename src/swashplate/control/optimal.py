@@ -59,22 +59,25 @@ def unseen(F: Array, H: Array, names: Sequence[str], *, scale: Array, all_modes:
         all_modes: also decaying modes.
     """
     balanced = F * scale[None, :] / scale[:, None], H * scale[None, :]
+    outputs = balanced[1] / max(float(np.linalg.norm(balanced[1], 2)), 1e-300)
     found: list[Direction] = []
-    seen_already = np.zeros((0, F.shape[0]))
     for z in _modes(balanced[0], all_modes):
-        outputs = balanced[1] / max(float(np.linalg.norm(balanced[1], 2)), 1e-300)
         test = np.vstack([balanced[0] - z * np.eye(F.shape[0]), outputs])
         _, values, right = np.linalg.svd(test)
-        for value, vector in zip(values[::-1], right[::-1].conj(), strict=False):
-            if value > _BLIND * values[0]:
-                break
-            vector = _turned_real(vector)
-            rest = vector - seen_already.T @ (seen_already @ vector)
-            if np.linalg.norm(rest) < 1e-3:
-                continue
-            seen_already = np.vstack([seen_already, rest / np.linalg.norm(rest)])
-            found.append(Direction(complex(z), _shares(vector, names), float(value / values[0])))
+        blind = [i for i, value in enumerate(values) if value <= _BLIND * values[0]]
+        if blind:
+            vectors = np.column_stack([_turned_real(right[i].conj()) for i in blind])
+            margin = float(values[blind[-1]] / values[0])
+            found += [Direction(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
     return tuple(found)
+
+
+def plain(basis: Array) -> Array:
+    """Another basis of the same columns' span, each column with a state of its own: easier to put into words."""
+    _, _, pivots = scipy.linalg.qr(basis.T, pivoting=True)
+    own = np.sort(pivots[: basis.shape[1]])
+    turned = basis @ np.linalg.inv(basis[own])
+    return np.asarray(turned / np.linalg.norm(turned, axis=0), dtype=np.float64)
 
 
 def unreached(F: Array, G: Array, names: Sequence[str], *, scale: Array) -> tuple[Direction, ...]:
@@ -97,11 +100,10 @@ def _turned_real(vector: Any) -> Array:
     return np.asarray(turned / np.linalg.norm(turned), dtype=np.float64)
 
 
-def _shares(vector: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
+def shares(vector: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """The states that take part in a direction most, largest first."""
     order = np.argsort(-np.abs(vector), kind="stable")
-    return tuple(
-        (names[i], float(vector[i])) for i in order if abs(vector[i]) >= _NAMED * abs(vector[order[0]])
-    )
+    return tuple((names[i], float(vector[i])) for i in order if abs(vector[i]) >= _NAMED * abs(vector[order[0]]))
 
 
 def regulator(F: Array, G: Array, Q: Array, R: Array, names: Sequence[str], *, scale: Array, where: str) -> Array:
@@ -163,7 +165,14 @@ def steady_filter(
             hint="Add a sensor that does, or hold less: `swash control observability` says who sees what.",
         )
     try:
-        P = scipy.linalg.solve_discrete_are(F.T, H.T, Q, R)
+        # In units of the scaling and of each reading's noise: metres beside radians per second cost digits.
+        sigma = np.sqrt(np.diag(R))
+        P = scipy.linalg.solve_discrete_are(
+            (F * scale[None, :] / scale[:, None]).T,
+            (H * scale[None, :] / sigma[:, None]).T,
+            Q / np.outer(scale, scale),
+            R / np.outer(sigma, sigma),
+        ) * np.outer(scale, scale)
     except (np.linalg.LinAlgError, ValueError):
         raise ControllerError("no steady Kalman filter exists for these sensors.", where=where) from None
     L = np.linalg.solve(H @ P @ H.T + R, H @ P).T
