@@ -325,8 +325,8 @@ def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: S
         D = A @ (identity + ahead * D)
         return k, D, total + weight * k, slope + weight * D
 
-    zero = 0.0 * begin
-    _, _, moved, slope = M.repeated(4, stage, (zero, zero @ zero.T, zero, zero @ zero.T))
+    zero, flat = 0.0 * begin, 0.0 * P
+    _, _, moved, slope = M.repeated(4, stage, (zero, flat, zero, flat))
     F = identity + slope
     P = F @ P @ F.T
     P = 0.5 * (P + P.T) + np.eye(len(plan.names)) * numbers.process
