@@ -134,7 +134,7 @@ def as_document(check: ControlCheck, *, controller: str) -> dict[str, Any]:
         "rate": check.rate,
         "froude_scale": check.scale,
         "task": check.task,
-        "least_stable_mode": {"real": check.modes[0].real, "imaginary": abs(check.modes[0].imag)},
+        "least_stable_mode": {"real": check.slowest.real, "imaginary": abs(check.slowest.imag)},
         "margins": margins,
         "rejection": {r.state: {name: getattr(r, name) for name in rejection} for r in check.rejections},
         "handling": handling,
@@ -154,6 +154,7 @@ def as_document(check: ControlCheck, *, controller: str) -> dict[str, Any]:
             for b in boundaries
         ],
         "problems": list(check.problems),
+        "notes": list(check.notes),
     }
 
 
@@ -169,7 +170,7 @@ def _tables(check: ControlCheck) -> None:
     def level(number: int | None) -> str:
         return "-" if number is None else str(number)
 
-    slowest = check.modes[0]
+    slowest = check.slowest
     typer.echo(
         f"least stable mode {slowest.real:+.3f} +- {abs(slowest.imag):.2f}j 1/s, Froude scale {check.scale:.3g}\n"
     )
@@ -206,4 +207,6 @@ def _tables(check: ControlCheck) -> None:
                 [(c.name, shown(c.value), c.unit, level(c.level)) for c in check.couplings],
             )
         )
+    for note in check.notes:
+        typer.echo(f"\n{note}")
     typer.echo("\nLevels by boundaries that were not checked against the standards' text: provisional.")

@@ -78,7 +78,7 @@ def fly(
     drawn = draw_numbers(vehicle, sigmas | _varied(vehicle, vary), count=count, seed=seed + 1_000_003, about=drawn)
     if payload:
         drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
-    pilot = from_file(controller)(vehicle, hover)
+    pilot = from_file(controller, seed=seed)(vehicle, hover)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)
@@ -95,7 +95,7 @@ def fly(
         reference=maneuver.signals(time - _LEAD),
         wind=None if setting is None else dryden(setting, samples=samples, rate=pilot.rate, seed=seed, count=count),
         voltage=float(hover.environment.voltage) - fall * time,
-        noise=SENSOR_NOISE,
+        noise=None if getattr(pilot.step, "feels", False) else SENSOR_NOISE,  # it brings its own sensors
         delay=late,
         seed=seed,
         start=hover,

@@ -149,7 +149,7 @@ def simulate(
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=hold if controller is None else from_file(controller),
+            controller=hold if controller is None else from_file(controller, seed=seed),
             pilot=pilot,
             speed=speed,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
@@ -168,17 +168,24 @@ def simulate(
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
 
 
-def from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
-    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle."""
+def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle.
+
+    Args:
+        path: the file.
+        seed: of the noise that a controller with sensors of its own sees.
+    """
     from swashplate.control.controller_file import read_controller
+    from swashplate.control.lqg import Lqg
     from swashplate.errors import ControllerError
 
     saved = read_controller(path)
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
-        if saved.vehicle != vehicle.name:
-            raise ControllerError(f"is for '{saved.vehicle}', not for '{vehicle.name}'.", where=path)
-        return saved
+        of = saved.vehicle if isinstance(saved.vehicle, str) else saved.vehicle.name
+        if of != vehicle.name:
+            raise ControllerError(f"is for '{of}', not for '{vehicle.name}'.", where=path)
+        return saved.starting_at(trim, seed=seed) if isinstance(saved, Lqg) else saved
 
     return make
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.control.lqg import Lqg
+from swashplate.control.lqg_analysis import analyse
 from swashplate.control.margins import Margins
 from swashplate.control.requirements import (
     ATTITUDE_COUPLING,
@@ -46,6 +48,12 @@ STEPS: Mapping[str, tuple[str, str, float]] = {
     "right": ("v", "", 0.5),
 }
 """Steps by reference: the state that answers, its measured rate, and the size [rad, m, m/s, share of the stick]."""
+_OBSERVED = (
+    "With an observer, modes and margins are those of its steady filter on the model of its design. Disturbance "
+    "rejection and bandwidth are not computed; the steps are flown with its noisy sensors."
+)
+_NEUTRAL = 1e-6
+"""1/s."""
 _LEAD = 0.5
 """Seconds of rest before a step."""
 _PHYSICS = 500.0
@@ -139,7 +147,8 @@ class ControlCheck:
         task: of the bandwidth's boundaries.
         modes: of the closed loop [1/s], least stable first.
         margins: None for a loop that does not stand.
-        omega, opened: the loop opened at the inputs, for the plots.
+        omega, opened: the loop opened at the inputs, for the plots; empty with an observer.
+        notes: what is not told here, and why.
     """
 
     vehicle: Vehicle
@@ -156,6 +165,13 @@ class ControlCheck:
     steps: tuple[Step, ...]
     couplings: tuple[Coupling, ...]
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def slowest(self) -> complex:
+        """The least stable mode that is one: not a place that nobody holds, nor memory that nothing writes [1/s]."""
+        moving = self.modes[np.abs(self.modes) > _NEUTRAL]
+        return complex(moving[0]) if moving.size else 0j
 
     def boundary(self, state: str) -> Boundary:
         """Of an attitude's bandwidth."""
@@ -194,6 +210,8 @@ def check_controller(
     if duration <= _COUPLING_WITHIN:
         raise SwashError(f"is {duration:g} s, expected more than {_COUPLING_WITHIN:g} s.", channel="duration")
     n = scale if scale is not None else _scale_of(vehicle)
+    if isinstance(controller, Lqg) and controller.plan.sensors:
+        return _observed(vehicle, controller, trim, n, task, duration)
     loop = sampled_loop(vehicle, controller, trim)
     w = frequencies_of(loop, points=points)
     problems: list[str] = []
@@ -202,7 +220,8 @@ def check_controller(
     except ControllerError as error:
         margins = None
         problems.append(f"No margins: {error.problem}")
-    steps = _steps(vehicle, controller, trim, loop, duration, problems)
+    answered = [r for r, (s, _, _) in STEPS.items() if s in loop.states and loop.answers(r, s)]
+    steps = _steps(vehicle, controller, trim, answered, duration, problems)
     return ControlCheck(
         vehicle=vehicle,
         trim=trim,
@@ -218,6 +237,33 @@ def check_controller(
         steps=tuple(steps),
         couplings=tuple(_couplings({step.reference: step for step in steps})),
         problems=tuple(problems),
+    )
+
+
+def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task: str, duration: float) -> ControlCheck:
+    """A controller with an observer: its margins by its own analysis, its steps with noisy sensors."""
+    speeds = np.asarray(controller.feedback.speeds)
+    analysis = analyse(controller, at=int(np.argmin(np.abs(speeds - trim.speed))), where=vehicle.name)
+    held = ("x", "y") if float(controller.feedback.place) > 0.5 else ("ahead", "right")
+    problems: list[str] = []
+    steps = _steps(vehicle, controller, trim, ["psi", "z", *held], duration, problems)
+    nothing = np.zeros(0)
+    return ControlCheck(
+        vehicle=vehicle,
+        trim=trim,
+        rate=controller.rate,
+        scale=scale,
+        task=task,
+        modes=analysis.modes,
+        margins=analysis.margins,
+        omega=nothing,
+        opened=nothing.astype(complex),
+        attitudes=(),
+        rejections=(),
+        steps=tuple(steps),
+        couplings=tuple(_couplings({step.reference: step for step in steps})),
+        problems=tuple(problems),
+        notes=(_OBSERVED,),
     )
 
 
@@ -292,7 +338,12 @@ def _rejections(loop: SampledLoop, w: Array, scale: float) -> list[Rejection]:
 
 
 def _steps(
-    vehicle: Vehicle, controller: Controller, trim: Trim, loop: SampledLoop, duration: float, problems: list[str]
+    vehicle: Vehicle,
+    controller: Controller,
+    trim: Trim,
+    answered: Sequence[str],
+    duration: float,
+    problems: list[str],
 ) -> list[Step]:
     rate = controller.rate * max(1, round(_PHYSICS / controller.rate))
     samples = round((_LEAD + duration) * rate) + 1
@@ -300,9 +351,7 @@ def _steps(
     at_rest = trim.states()
     found = []
     for reference, (state, measured_rate, size) in STEPS.items():
-        if state not in loop.states or not loop.answers(reference, state):
-            continue
-        if reference in ("ahead", "right") and loop.answers("x", "x"):
+        if reference not in answered or (reference in ("ahead", "right") and "x" in answered):
             continue  # a place that is held takes a speed back
         try:
             flight = simulate_closed_loop(

@@ -13,6 +13,9 @@ from swashplate.atomic import write_text
 from swashplate.control.autopilot import MODES, Autopilot, CyclicGains, Gains
 from swashplate.control.decoupling import Decoupler
 from swashplate.control.height_yaw import CoaxialRotors, HeightYawGains
+from swashplate.control.lqg import Lqg
+from swashplate.control.lqg_file import TYPE as LQG
+from swashplate.control.lqg_file import lqg_from, save_lqg
 from swashplate.errors import ControllerError
 
 SCHEMA = 1
@@ -25,8 +28,11 @@ _GROUPS: dict[str, Any] = {
 }
 
 
-def save_controller(controller: Autopilot, path: str | Path) -> None:
+def save_controller(controller: Autopilot | Lqg, path: str | Path) -> None:
     """Write a controller as a TOML file."""
+    if isinstance(controller, Lqg):
+        save_lqg(controller, path)
+        return
     document = {
         "kind": "controller",
         "schema": SCHEMA,
@@ -40,7 +46,7 @@ def save_controller(controller: Autopilot, path: str | Path) -> None:
     write_text(path, tomli_w.dumps(document))
 
 
-def read_controller(path: str | Path) -> Autopilot:
+def read_controller(path: str | Path) -> Autopilot | Lqg:
     """A controller from its file.
 
     Raises:
@@ -58,6 +64,8 @@ def read_controller(path: str | Path) -> Autopilot:
             where=path,
             hint="`swash decouple MODEL --out FILE` writes one.",
         )
+    if document.get("type") == LQG:
+        return lqg_from(document, path)
     if document.get("type") != TYPE or document.get("schema") != SCHEMA:
         found = f"type {document.get('type')!r}, schema {document.get('schema')!r}"
         raise ControllerError(f"{found}: expected type '{TYPE}', schema {SCHEMA}.", where=path)

@@ -116,7 +116,8 @@ def sampled_loop(vehicle: Vehicle, controller: Controller, trim: Trim) -> Sample
     enable_double_precision()
     states = trim.states()
     reference = np.array([states.get(name, 0.0) for name in REFERENCES])
-    measured = np.array([*trim.state, trim.environment.voltage], dtype=np.float64)
+    felt = [0.0] * 3 if getattr(controller.step, "feels", False) else []  # an observer's; here the states are known
+    measured = np.array([*trim.state, *felt, trim.environment.voltage], dtype=np.float64)
     inputs, *parts = (
         np.asarray(part, dtype=np.float64)
         for part in _decisions(
@@ -126,6 +127,7 @@ def sampled_loop(vehicle: Vehicle, controller: Controller, trim: Trim) -> Sample
             controller.gains,
             reference,
             np.array(vehicle.input_limits).T,
+            len(vehicle.state_names),
         )
     )
     around = linearize(vehicle, replace(trim, inputs=inputs))
@@ -142,13 +144,12 @@ def _held(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
     return both[:n, :n], both[:n, n:]
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _decisions(control: Step, measured: Any, memory: Any, gains: Any, reference: Any, limits: Any) -> Any:
+@partial(jax.jit, static_argnums=(0, 6), compiler_options=QUICK_TO_COMPILE)
+def _decisions(control: Step, measured: Any, memory: Any, gains: Any, reference: Any, limits: Any, n: int) -> Any:
     """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
-    n = measured.shape[0] - 1
 
     def deciding(both: Any, reference: Any) -> tuple[Any, Any]:
-        after, command = control(both[n:], 0.0, jnp.append(both[:n], measured[n]), reference, gains)
+        after, command = control(both[n:], 0.0, jnp.concatenate([both[:n], measured[n:]]), reference, gains)
         return jnp.clip(command, limits[0], limits[1]), after
 
     both = jnp.concatenate([measured[:n], memory])

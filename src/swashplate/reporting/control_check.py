@@ -55,7 +55,7 @@ def control_report(check: ControlCheck, *, path: str | os.PathLike[str], title: 
 def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
     """The report's structure."""
     sections = [_loops(check), _rejection(check), _handling(check), _steps(check), _boundaries(check), _made(check)]
-    slowest = check.modes[0]
+    slowest = check.slowest
     words = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
     return Report(
         title=title or f"A controller on {check.vehicle.name}",
@@ -106,7 +106,7 @@ def _margins_line(check: ControlCheck) -> tuple[str, str]:
 
 def _rejection_line(check: ControlCheck) -> tuple[str, str]:
     if not check.rejections:
-        return "no state is held.", "plain"
+        return ("not computed with an observer." if check.notes else "no state is held."), "plain"
     worst = max(check.rejections, key=lambda r: r.peak)
     levels = [x for r in check.rejections for x in (r.level, r.peak_level) if x is not None]
     names = listed([r.state for r in check.rejections], most=8)
@@ -116,7 +116,7 @@ def _rejection_line(check: ControlCheck) -> tuple[str, str]:
 def _handling_line(check: ControlCheck) -> tuple[str, str]:
     rows = [(a, a.handling) for a in check.attitudes if a.handling]
     if not rows:
-        return "no bandwidth could be read off.", "caution"
+        return ("not computed with an observer." if check.notes else "no bandwidth could be read off."), "caution"
     words = [
         f"{figures.ATTITUDE_WORDS[a.state]} {h.bandwidth.value:.3g} rad/s, Level {a.level or '–'}" for a, h in rows
     ]
@@ -166,7 +166,9 @@ def _loops(check: ControlCheck) -> Section:
             "singular value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
         )
         blocks.append(Table("Margins at the inputs, one loop opened at a time", columns, tuple(rows), note=note))
-    blocks += [figures.loops_figure(check), figures.modes_figure(check)]
+    blocks += [Text(note, tone="caution") for note in check.notes]
+    blocks += [figures.loops_figure(check)] if check.omega.size else []
+    blocks.append(figures.modes_figure(check))
     return Section("margins", "Margins", tuple(blocks))
 
 

@@ -23,6 +23,7 @@ from swashplate.simulation.dynamics import (
     equations_of,
     parameter_row,
     rk4_step_looped,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence, simulated_flight
@@ -45,7 +46,8 @@ class Controller(Protocol):
         memory: its state at the start, a row of numbers.
         gains: its numbers, a row, so that other gains compile nothing anew.
         step: a module's function `(memory, time, measured, reference, gains) -> (memory, inputs)`; `measured` is the
-            vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it.
+            vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it. A step with
+            an attribute `feels` that is true is given the specific force at the centre of gravity between the two.
     """
 
     @property
@@ -142,10 +144,17 @@ def _fly(
     def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
         x, memory, command, k = carry
         surroundings, reference, excitation = now
-        measured = jnp.concatenate([x, surroundings[-1:]])
-        fresh_memory, fresh = control(memory, k * dt, measured, reference, gains)
+        measured = told(control, equations, x, jnp.clip(command, limits[0], limits[1]), surroundings, p)
         due = k % every == 0
-        memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
+
+        def decided() -> tuple[Any, Any]:
+            return control(memory, k * dt, measured, reference, gains)
+
+        if getattr(control, "feels", False):  # too much work to be thrown away between its samples
+            memory, command = jax.lax.cond(due, decided, lambda: (memory, command))
+        else:
+            fresh_memory, fresh = decided()
+            memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
         inputs = jnp.clip(command + excitation, limits[0], limits[1])
         w = jnp.concatenate([inputs, surroundings])
         after = rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
@@ -154,6 +163,13 @@ def _fly(
     nothing = jnp.zeros(added.shape[1])
     _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, 0), (around, wanted, added))
     return record  # type: ignore[no-any-return]
+
+
+def told(control: Step, equations: Equations, x: Any, inputs: Any, surroundings: Any, p: Any) -> Any:
+    """What a controller is given as `measured`: the state, the specific force if it feels it, the voltage."""
+    if not getattr(control, "feels", False):
+        return jnp.concatenate([x, surroundings[-1:]])
+    return jnp.concatenate([x, row_force(equations)(x, jnp.concatenate([inputs, surroundings]), p), surroundings[-1:]])
 
 
 def _table(names: tuple[str, ...], given: Mapping[str, ArrayLike], n: int, default: list[Any]) -> Array:

@@ -24,6 +24,7 @@ from swashplate.simulation.dynamics import (
     equations_of,
     parameter_row,
     rk4_step,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.trigonometry import vector_backend
@@ -121,7 +122,7 @@ def simulate_closed_loops(
             bool(np.any(sigma)),
             waiting,
             np.repeat(begin.state[:, None], count, axis=1),
-            np.repeat(np.asarray(controller.memory)[:, None], count, axis=1),
+            _memories(controller, seed + first + np.arange(count)),
             np.asarray(controller.gains),
             around if around.shape[2] == 1 else around[:, :, part],
             wanted,
@@ -141,6 +142,13 @@ def simulate_closed_loops(
     kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
     rows = np.concatenate([inputs, kept], axis=1)
     return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
+
+
+def _memories(controller: Controller, seeds: NDArray[np.int64]) -> Array:
+    """A column per vehicle; a controller that draws its sensors' biases and noise draws others for each."""
+    if hasattr(controller, "memories"):
+        return np.asarray(controller.memories(seeds))
+    return np.repeat(np.asarray(controller.memory)[:, None], len(seeds), axis=1)
 
 
 def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
@@ -182,31 +190,36 @@ def _fly_many(
     deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
     voltage = SURROUNDINGS.index("voltage")
 
+    feels = getattr(control, "feels", False)
+    feeling: Any = jax.vmap(row_force(equations, xp=vector_backend()), in_axes=(1, 1, 1), out_axes=1)
+
+    def arrived(sent: Any, j: Any) -> Any:
+        """What the actuators get in step j of a sample: the command of so many samples ago."""
+        ago = jnp.clip(-((j - late) // substeps), 0, waiting)
+        return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
+
     def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
         x, memory, sent, k = carry
         surroundings, reference = now
         measured = x
         if noisy:
             measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
-        measured = jnp.concatenate([measured, surroundings[voltage][None]])
+        acting = arrived(sent, substeps - 1) if waiting else sent[0]  # until now
+        felt = [feeling(x, jnp.concatenate([acting, surroundings]), p)] if feels else []
+        measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
         inputs = jnp.clip(command, limits[0], limits[1])
         if not waiting:
             w = jnp.concatenate([inputs, surroundings])
             after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
-            return (after, memory, sent, k + 1), (x, inputs)
+            return (after, memory, inputs[None], k + 1), (x, inputs)
         sent = jnp.concatenate([inputs[None], sent[:-1]])
 
-        def arrived(j: Any) -> Any:
-            """What the actuators get in step j of the sample: the command of so many samples ago."""
-            ago = jnp.maximum(-((j - late) // substeps), 0)
-            return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
-
         def step(x: Any, j: Any) -> tuple[Any, None]:
-            return flying(x, jnp.concatenate([arrived(j), surroundings]), p), None
+            return flying(x, jnp.concatenate([arrived(sent, j), surroundings]), p), None
 
         after, _ = jax.lax.scan(step, x, jnp.arange(substeps))
-        return (after, memory, sent, k + 1), (x, arrived(0))
+        return (after, memory, sent, k + 1), (x, arrived(sent, 0))
 
     def kept(carry: Any, now: Any) -> Any:
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
