@@ -44,7 +44,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 
 def cost(source: Path) -> dict[str, float]:
-    """Instructions of a step (median and most), bytes of code with constants, stack, and RAM (carried, static, stack)."""
+    """Instructions of a step (median and most), bytes of code with constants, stack, and RAM in all."""
     text = source.read_text(encoding="utf-8")
     arguments = re.search(
         r"void swash_step\((\w+) memory\[(\d+)\], const \w+ measured\[(\d+)\].*?command\[(\d+)\]", text, re.DOTALL

@@ -72,6 +72,11 @@ def test_json_says_what_the_table_says() -> None:
         (("decouple", "coax", "--to-speed", "-1"), "--to-speed: is -1 m/s, expected a positive speed"),
         (("decouple", "coax", "--to-speed", "40"), "reaches"),
         (("decouple", "coax", "--report", "path.pdf"), "ends in '.pdf', expected .html"),
+        (("decouple", "raptor50"), "`swash control decouple` takes any linear model"),
+        (("control", "decouple", "raptor50", "--pair", "cyclic=p"), "has no input cyclic; it has theta0, B1, A1"),
+        (("control", "decouple", "hybrid", "--pair", "lateral=p", "--pair", "longitudinal=p"), "gives p to two inputs"),
+        (("control", "decouple", "hybrid", "--at", "1,0"), "--at: '1,0' is not all positive"),
+        (("control", "decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
         (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: cannot be read"),
         (("control", "check", "coax", "--controller", "x.toml", "--scale", "0"), "--scale: is 0, expected a positive"),
         (
@@ -227,3 +232,20 @@ def test_aircraft_that_differ_by_more_than_a_fit_says(tmp_path: Path) -> None:
     alone = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--delay", "0.01", "--payload", "0.1")
     assert alone.code == 2
     assert "--payload, --delay: is for --monte-carlo" in alone.err
+
+
+def test_any_linear_model_is_decoupled_with_its_ratios_against_frequency(tmp_path: Path) -> None:
+    out = tmp_path / "raptor.json"
+    outcome = swash("control", "decouple", "raptor50", "--at", "1,3", "--out", out)
+    assert outcome.code == 0, outcome.err
+    found = json.loads(out.read_text())
+    assert found["axes"] == {"inputs": ["A1", "B1"], "outputs": ["p", "q"]}
+    ratios = found["off_over_on_axis"]
+    assert set(ratios) >= {"bare", "matrix"}
+    for axis, bare in ratios["bare"].items():
+        assert ratios["matrix"][axis][1] < bare[1]  # at 3 rad/s, where the matrix was made
+    rigid = ("x", "y", "z", "psi", "u", "v", "w", "phi", "theta", "p", "q", "r")
+    refused = swash("control", "decouple", "raptor50", "--keep", ",".join(rigid), "--json")
+    assert refused.code == 2
+    assert "No filter" in refused.err
+    assert "matrix" in json.loads(refused.out)["off_over_on_axis"]

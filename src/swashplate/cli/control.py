@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swashplate.cli import conditions as given
-from swashplate.cli import control_check, options
+from swashplate.cli import control_check, decouple_linear, options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 app.command("check", short_help="Margins, handling qualities and steps of a controller.")(control_check.check)
+app.command("decouple", short_help="Decouple the axes of any linear model.")(decouple_linear.decouple)
 
 _USUAL = "imu@100,mocap@100+10ms"
 Sensors = Annotated[
