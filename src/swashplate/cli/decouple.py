@@ -115,6 +115,8 @@ def decouple(
     vehicle = sp.vehicle(model)
     hover = sp.trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage)
     named = lag in LAGS or lag.isalpha()
+    if not named and not abs(options.numbers(lag, option="--lag", count=1)[0]) <= 180.0:
+        raise SwashError(f"is {lag} degrees, expected at most 180 either way.", channel="--lag")
     wanted: Any = lag if named else math.radians(options.numbers(lag, option="--lag", count=1)[0])
     made = autopilot(
         vehicle,

@@ -46,7 +46,7 @@ class Boundary:
         return self.level1 * factor, self.level2 * factor
 
     def level(self, value: float, *, scale: float = 1.0) -> int | None:
-        """1, 2 or 3; None where the value or the boundary is no number."""
+        """1, 2 or 3; 2 too for what misses a Level 1 that has no boundary below; None for no number."""
         first, second = self.scaled(scale)
         if not math.isfinite(value) or not math.isfinite(first):
             return None
