@@ -26,6 +26,7 @@ from swashplate.errors import ControllerError
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -333,7 +334,7 @@ def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
     return _stored_compiled(plan, Numbers(*(jnp.asarray(part) for part in numbers)), jnp.asarray(mean), jnp.asarray(w))
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _stored_compiled(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
     M = JaxMatrices()
     flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])

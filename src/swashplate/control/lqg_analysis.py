@@ -25,6 +25,7 @@ from swashplate.control.matrices import JaxMatrices
 from swashplate.control.observer import DISTURBED, Numbers, Plan
 from swashplate.control.optimal import delayed, sampled, steady_filter
 from swashplate.errors import ControllerError
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
@@ -122,7 +123,7 @@ def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
     return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _outputs(plan: Plan, numbers: Numbers, e: Any, w: Any) -> Any:
     M = JaxMatrices()
     return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]

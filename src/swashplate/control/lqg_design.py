@@ -80,7 +80,7 @@ def design(
         allowed: deviations by state or integral that weigh as much as the effort (`ALLOWED`).
         effort: share of an input's range, one for all or by input.
         Q, R: weights instead of these, per second, over `design_states` and the inputs.
-        unrest: what disturbs the vehicle, for the observer.
+        unrest: what disturbs the vehicle, for the observer; by default what the card's identification learnt.
         voltage, environment: of the trims.
 
     Raises:
@@ -121,7 +121,7 @@ def design(
         pace=np.array(_PACE),
         place=np.array(1.0 if holding == "place" else 0.0),
     )
-    chosen = unrest or Unrest()
+    chosen = unrest or observer.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan))
     return Lqg(vehicle, plan, numbers, feedback, trims[0], chosen)

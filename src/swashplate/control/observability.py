@@ -157,7 +157,7 @@ def observability(
     """
     prompt = tuple(replace(sensor, delay=0.0) for sensor in sensors)
     plan = Plan(equations_of(vehicle), prompt, rate, (0,) * len(vehicle.input_names)).checked()
-    chosen = unrest or Unrest()
+    chosen = unrest or observer.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, trim.environment), fade, process, observer.measurement_noise(plan))
     model = seen(Lqg(vehicle, plan, numbers, _NO_FEEDBACK, trim, chosen), trim)
