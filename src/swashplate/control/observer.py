@@ -174,9 +174,10 @@ class Plan:
             ratio = self.rate / sensor.rate
             if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6:
                 raise ControllerError(
-                    f"gives {sensor.rate:g} readings per second; the controller's {self.rate:g} Hz is no whole multiple.",
+                    f"gives {sensor.rate:g} readings per second; "
+                    f"the controller's {self.rate:g} Hz is no whole multiple.",
                     channel=sensor.kind,
-                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz, or choose another sensor rate.",
+                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz, or the sensor at another rate.",
                 )
         return self
 
@@ -249,7 +250,9 @@ def moving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp:
     parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
     rates = vehicle.rates(e[:n], w[: plan.inputs], parameters, around, xp)
     pushed = dict(zip(DISTURBED, e[n : n + 6], strict=True))
-    rates = [rate + pushed[name] if name in pushed else rate for name, rate in zip(vehicle.state_names, rates, strict=True)]
+    rates = [
+        rate + pushed[name] if name in pushed else rate for name, rate in zip(vehicle.state_names, rates, strict=True)
+    ]
     fading = [-numbers.fade[i] * e[n + i] for i in range(6)]
     return [*rates, *fading, *[0.0] * (len(e) - n - 6)]
 

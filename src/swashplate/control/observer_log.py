@@ -142,9 +142,7 @@ def along(controller: Lqg, flight: Flight, pose: Array, *, ahead: float = 0.1) -
     later[: n - steps] = rates[steps:]
     taken = np.arange(n) % every == 0
     taken[: round(_SETTLING * plan.rate)] = False
-    return Along(
-        time, estimates, innovations[taken], covariances[taken].mean(axis=0), ahead, later, predicted, raw
-    )
+    return Along(time, estimates, innovations[taken], covariances[taken].mean(axis=0), ahead, later, predicted, raw)
 
 
 def _smoothed_rates(pose: Array, dt: float) -> Array:
