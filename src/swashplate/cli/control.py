@@ -76,7 +76,8 @@ def design(
     ] = Method.LQG,
     sensors: Sensors = _USUAL,
     holding: Annotated[
-        Holding, typer.Option("--holding", help="A place, or a speed ahead and to the right; always height and heading.")
+        Holding,
+        typer.Option("--holding", help="A place, or a speed ahead and to the right; always height and heading."),
     ] = Holding.PLACE,
     speed: given.Speed = "0",
     rate: Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)] = 100.0,
@@ -133,7 +134,7 @@ def design(
         holding=holding.value,
         speeds=speeds,
         allowed=_named(allow, "--allow"),
-        effort=_named(effort, "--effort"),
+        effort=_named(effort, "--effort") or None,
         Q=_weights(state_weights, "--state-weights"),
         R=_weights(input_weights, "--input-weights"),
         voltage=voltage,
@@ -179,11 +180,11 @@ def _tell(made: Lqg, found: list[Analysis], speeds: tuple[float, ...]) -> None:
     units = dict(zip(made.vehicle.state_names, made.vehicle.state_units, strict=True))
     rows = []
     for name, value in found[0].spread.items():
-        factor, unit = (math.degrees(1.0), units[name].replace("rad", "deg")) if "rad" in units[name] else (1.0, units[name])
-        known = found[0].uncertainty.get(name)
-        rows.append(
-            (f"{name} [{unit}]", f"{factor * value:.3g}", "-" if known is None else f"{factor * known:.3g}")
+        factor, unit = (
+            (math.degrees(1.0), units[name].replace("rad", "deg")) if "rad" in units[name] else (1.0, units[name])
         )
+        known = found[0].uncertainty.get(name)
+        rows.append((f"{name} [{unit}]", f"{factor * value:.3g}", "-" if known is None else f"{factor * known:.3g}"))
     typer.echo()
     console().print(table((f"in gusts as assumed, at {speeds[0]:g} m/s", "strays (1 sigma)", "known to"), rows))
 
@@ -198,7 +199,11 @@ def _document(made: Lqg, found: list[Analysis], speeds: tuple[float, ...]) -> di
                 "least_stable_mode": {"real": analysis.modes[0].real, "imaginary": abs(analysis.modes[0].imag)},
                 "margins": {
                     **{a.name: {"gain": a.gain, "phase_deg": math.degrees(a.phase)} for a in analysis.margins.axes},
-                    "together": {"disc": together.alpha, "gain": together.gain, "phase_deg": math.degrees(together.phase)},
+                    "together": {
+                        "disc": together.alpha,
+                        "gain": together.gain,
+                        "phase_deg": math.degrees(together.phase),
+                    },
                 },
                 "spread": analysis.spread,
                 "uncertainty": analysis.uncertainty,

@@ -26,6 +26,7 @@ from swashplate.errors import ControllerError
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -287,7 +288,7 @@ class Lqg:
         variance[:own] = observer.start_variance(plan, self.unrest)
         w = np.array([*self.start.inputs, float(self.start.environment.voltage)])[:, None]
         P = np.diag(variance)
-        if N > own:
+        if own < N:
             deepest = max(at.kept for at in plan.sampling)
             for _ in range(deepest):  # every stored reading is one of the start
                 found = _stored(plan, self.numbers, mean, w)
@@ -316,15 +317,15 @@ class Lqg:
             ControllerError: where the trim is of a vehicle with other inputs, or, without an observer, other states.
         """
         own = self.vehicle
-        strange = trim.input_names != own.input_names or (
-            not self.plan.sensors and trim.state_names != own.state_names
-        )
+        strange = trim.input_names != own.input_names or (not self.plan.sensors and trim.state_names != own.state_names)
         if strange:
             raise ControllerError(
                 f"was designed on another aircraft than this {len(trim.state_names)}-state one.", where=own.name
             )
         known = trim.states()
-        state = [known.get(n, float(v)) for n, v in zip(own.state_names, np.asarray(self.feedback.states)[0], strict=True)]
+        state = [
+            known.get(n, float(v)) for n, v in zip(own.state_names, np.asarray(self.feedback.states)[0], strict=True)
+        ]
         start = replace(trim, state=np.array(state), state_names=own.state_names)
         return replace(self, start=start, seed=self.seed if seed is None else seed)
 
@@ -333,9 +334,8 @@ def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
     return _stored_compiled(plan, Numbers(*(jnp.asarray(part) for part in numbers)), jnp.asarray(mean), jnp.asarray(w))
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _stored_compiled(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
     M = JaxMatrices()
     flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])
     return M.linearised(lambda e, w: observer.keeping(plan, numbers, e, w, M.xp), mean, flags)
-

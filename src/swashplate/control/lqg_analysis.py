@@ -7,7 +7,7 @@ per second stays; late sensors and late commands are chains of samples. Everythi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,15 +18,16 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from swashplate.control import observer
-from swashplate.control.lqg import Lqg, late_inputs
+from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_design import typical
 from swashplate.control.margins import Margins, margins
 from swashplate.control.matrices import JaxMatrices
 from swashplate.control.observer import DISTURBED, Numbers, Plan
 from swashplate.control.optimal import delayed, sampled, steady_filter
 from swashplate.errors import ControllerError
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.simulation.linearize import linearize
+from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 
 Array = NDArray[np.float64]
@@ -57,11 +58,15 @@ class Seen:
     moved: tuple[int, ...]
 
 
-def seen(controller: Lqg, trim: Trim, *, without: Sequence[str] = ()) -> Seen:
-    """The observer's linear model about a trim, some states left out (a place that nothing sees)."""
-    plan, numbers = controller.plan, controller.numbers
-    model = linearize(controller.vehicle, trim)
-    n, nb = plan.n, len(plan.biases)
+def seen(plan: Plan, numbers: Numbers, model: LinearModel, *, without: Sequence[str] = ()) -> Seen:
+    """The observer's linear model about a model's trim.
+
+    Args:
+        plan, numbers: the observer.
+        model: of the vehicle; states behind those of the vehicle (actuators) are allowed.
+        without: states left out (a place that nothing sees).
+    """
+    n, nb = len(model.states), len(plan.biases)
     own = n + 6 + nb
     A = np.zeros((own, own))
     A[:n, :n] = model.A
@@ -71,9 +76,11 @@ def seen(controller: Lqg, trim: Trim, *, without: Sequence[str] = ()) -> Seen:
     B = np.zeros((own, plan.inputs))
     B[:n] = model.B
     F, G = sampled(A, B, plan.dt)
-    H = outputs(plan, numbers, trim)[:, :own]
+    slopes, more = outputs(plan, numbers, model.trim), n - plan.n
+    H = np.hstack([slopes[:, : plan.n], np.zeros((len(slopes), more)), slopes[:, plan.n : own - more]])
     names = [*model.states, *(f"disturbance {d}" for d in DISTURBED), *(f"bias {b}" for b in plan.biases)]
-    process = np.asarray(numbers.process)[:own]
+    noise_of = np.asarray(numbers.process)
+    process = np.concatenate([noise_of[: plan.n], np.full(more, 1e-8), noise_of[plan.n : own - more]])
     F, H, added = _late_readings(F, H, plan)
     G = np.vstack([G, np.zeros((len(added), plan.inputs))])
     names += added
@@ -122,7 +129,7 @@ def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
     return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _outputs(plan: Plan, numbers: Numbers, e: Any, w: Any) -> Any:
     M = JaxMatrices()
     return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]
@@ -137,12 +144,14 @@ class Analysis:
         margins: at the inputs.
         spread: standard deviation of the vehicle's states under the assumed unrest and sensors, by name.
         uncertainty: of the estimates, by name (empty without sensors).
+        delay: the same further delay in every opened loop that makes it unstable [s].
     """
 
     modes: NDArray[np.complex128]
     margins: Margins
     spread: dict[str, float]
     uncertainty: dict[str, float]
+    delay: float
 
 
 def analyse(controller: Lqg, *, at: int = 0, points: int = 240, where: str = "") -> Analysis:
@@ -151,48 +160,104 @@ def analyse(controller: Lqg, *, at: int = 0, points: int = 240, where: str = "")
     Raises:
         ControllerError: where the loop is not stable, or no steady observer exists (with the direction).
     """
-    plan, f = controller.plan, controller.feedback
-    trim = controller.start if len(f.speeds) == 1 else _trim_of(controller, at)
-    place = float(f.place) > 0.5
-    without = () if place else ("x", "y")
-    name = where or controller.vehicle.card.path or controller.vehicle.name
-    model = seen(controller, trim, without=without)
-    K, C = _gains(controller, at, model, place)
-    plant = _plant(model)
+    f = controller.feedback
+    trim = _trim_of(controller, at)
+    return analyse_loop(
+        controller.plan,
+        controller.numbers,
+        linearize(controller.vehicle, trim),
+        np.asarray(f.gains)[at],
+        place=float(f.place) > 0.5,
+        points=points,
+        where=where or controller.vehicle.card.path or controller.vehicle.name,
+    )
+
+
+def analyse_loop(
+    plan: Plan,
+    numbers: Numbers,
+    model: LinearModel,
+    gains: Array,
+    *,
+    place: bool,
+    later: Sequence[int] | None = None,
+    opened: Sequence[str] | None = None,
+    points: int = 240,
+    where: str = "",
+) -> Analysis:
+    """The same for a gain over `lqg_design.design_states` and a linear model.
+
+    Args:
+        plan, numbers: the observer.
+        model: its columns may end in actuators' states.
+        gains: (inputs, states with late commands and integrals).
+        place: whether a place is held.
+        later: delays of the real inputs in samples, where they are not those that the controller believes in.
+        opened: inputs at which the loop is opened, all where not given; the others stay closed.
+        points: of the frequency grid.
+        where: the model's name.
+    """
+    known = seen(plan, numbers, model, without=() if place else ("x", "y"))
+    truth = known
+    if later is not None:
+        truth = seen(replace(plan, delays=tuple(later)), numbers, model, without=() if place else ("x", "y"))
+    K, C = _gains(plan, model, gains, known, place)
+    plant = _plant(truth)
+    L, P = None, np.zeros_like(known.F)
     if plan.sensors:
-        scale = np.array([typical(n.split(" ")[-1] if n.startswith(("dist", "bias")) else n) for n in model.names])
-        L, P = steady_filter(model.F, model.H, model.process, model.noise, model.names, scale=scale, where=name)
-        P = P - L @ model.H @ P
-    else:
-        L, P = None, np.zeros_like(model.F)
-    compensator = _compensator(model, K, C, L, plan.dt)
-    closed, entering = _closed(model, plant, compensator, L is not None)
+        scale = np.array([typical(n.split(" ")[-1] if n.startswith(("dist", "bias")) else n) for n in known.names])
+        L, P = steady_filter(known.F, known.H, known.process, known.noise, known.names, scale=scale, where=where)
+        P = P - L @ known.H @ P
+    compensator = _compensator(known, K, C, L, plan.dt)
+    closed, entering = _closed(plant, compensator, L is not None)
     values = np.linalg.eigvals(closed).astype(np.complex128)
     values = values[np.abs(values) > 1e-8]
-    modes = np.log(values) * plan.rate
+    modes: NDArray[np.complex128] = np.log(values) * plan.rate
     modes = modes[np.argsort(-modes.real, kind="stable")]
     if modes[0].real >= 0.0:
         raise ControllerError(
-            f"the loop at {plan.rate:g} Hz has a growing mode at {modes[0].real:+.3g} +- {abs(modes[0].imag):.3g}j 1/s.",
-            where=name,
+            f"the loop at {plan.rate:g} Hz has a growing mode at {modes[0].real:+.3g} "
+            f"+- {abs(modes[0].imag):.3g}j 1/s.",
+            where=where,
             hint="Ask for less (larger allowed deviations), run it faster, or cut the delays.",
         )
     w = np.geomspace(_LOWEST, np.pi * plan.rate * 0.999, points)
     z = np.exp(1j * w / plan.rate)
     A, B, H = plant
-    response = _response(z, A, B, H, None)
-    loop = -_response(z, *compensator) @ response
-    spread = _spread(model, closed, entering, plan)
-    uncertainty = {n: float(np.sqrt(max(P[i, i], 0.0))) for i, n in enumerate(model.names)} if L is not None else {}
-    moved = [j for j in range(plan.inputs) if np.any(np.abs(loop[:, j, j]) > 1e-12)]
-    picked = loop[:, moved][:, :, moved]
-    names = tuple(controller.vehicle.input_names[j] for j in moved)
-    return Analysis(modes, margins(w, picked, names), spread, uncertainty)
+    loop = -_response(z, *compensator) @ _response(z, A, B, H, None)
+    if opened is not None:
+        kept = [model.inputs.index(name) for name in opened]
+        inner = np.linalg.inv(np.eye(plan.inputs) + loop)[:, kept][:, :, kept]
+        loop = np.linalg.inv(inner) - np.eye(len(kept))
+    labels = tuple(opened or model.inputs)
+    moved = [j for j in range(len(labels)) if np.any(np.abs(loop[:, j, j]) > 1e-12)]
+    loop, names = loop[:, moved][:, :, moved], tuple(labels[j] for j in moved)
+    return Analysis(
+        modes,
+        margins(w, loop, names),
+        _spread(truth, closed, entering),
+        {} if L is None else {n: float(np.sqrt(max(P[i, i], 0.0))) for i, n in enumerate(known.names)},
+        _delay_margin(w, loop),
+    )
+
+
+def _delay_margin(w: Array, loop: Any) -> float:
+    """Delay in all loops at which an eigenvalue of L e^(-jwT) becomes -1 (MacFarlane and Postlethwaite 1977)."""
+    found = float("inf")
+    values = np.linalg.eigvals(loop)
+    sizes = np.log(np.sort(np.abs(values), axis=1))
+    order = np.argsort(np.abs(values), axis=1)
+    turned = np.mod(np.pi + np.angle(np.take_along_axis(values, order, axis=1)), 2.0 * np.pi)
+    for size, phase in zip(sizes.T, turned.T, strict=True):
+        for i in np.flatnonzero(np.diff(np.sign(size))):
+            share = size[i] / (size[i] - size[i + 1])
+            at = w[i] * (w[i + 1] / w[i]) ** share
+            ends = np.unwrap(phase[i : i + 2])
+            found = min(found, float(np.mod(ends[0] + share * (ends[1] - ends[0]), 2.0 * np.pi) / at))
+    return found
 
 
 def _trim_of(controller: Lqg, at: int) -> Trim:
-    from dataclasses import replace
-
     f = controller.feedback
     return replace(
         controller.start,
@@ -202,15 +267,12 @@ def _trim_of(controller: Lqg, at: int) -> Trim:
     )
 
 
-def _gains(controller: Lqg, at: int, model: Seen, place: bool) -> tuple[Array, Array]:
+def _gains(plan: Plan, linear: LinearModel, gains: Array, model: Seen, place: bool) -> tuple[Array, Array]:
     """Gains over the model's states and the four integrals, and what the integrals are fed with."""
-    plan = controller.plan
-    gains = np.asarray(controller.feedback.gains)[at]
-    of = [*controller.vehicle.state_names]
-    counts: dict[int, int] = {}
-    for j in late_inputs(plan):
-        counts[j] = counts.get(j, 0) + 1
-        of.append(f"{controller.vehicle.input_names[j]} {counts[j]} ago")
+    of = [
+        *linear.states,
+        *(f"{linear.inputs[j]} {ago} ago" for j, d in enumerate(plan.delays) for ago in range(1, d + 1)),
+    ]
     K = np.zeros((plan.inputs, len(model.names) + 4))
     for column, name in enumerate(of):
         if name in model.names:
@@ -230,7 +292,7 @@ def _plant(model: Seen) -> tuple[Array, Array, Array]:
 
 def _compensator(model: Seen, K: Array, C: Array, L: Array | None, dt: float) -> tuple[Array, Array, Array, Array]:
     """(A, B, C, D) from readings (states without sensors) to commands; its states: prediction and integrals."""
-    N, m = model.F.shape[0], model.G.shape[1]
+    N = model.F.shape[0]
     Ks, Kq = K[:, :N], K[:, N:]
     if L is None:
         # What it carries: waiting commands (the tail of the model's chain) and the integrals.
@@ -239,9 +301,7 @@ def _compensator(model: Seen, K: Array, C: Array, L: Array | None, dt: float) ->
         chain = [i for i, name in enumerate(model.names) if name.endswith(" ago")]
         Fw, Gw = model.F[np.ix_(chain, chain)], model.G[chain]
         Kw = Ks[:, chain]
-        A = np.block(
-            [[Fw - Gw @ Kw, -Gw @ Kq], [np.zeros((4, len(chain))), np.eye(4)]]
-        )
+        A = np.block([[Fw - Gw @ Kw, -Gw @ Kq], [np.zeros((4, len(chain))), np.eye(4)]])
         B = np.vstack([-Gw @ Ks @ pick, dt * C @ pick])
         return A, B, np.hstack([-Kw, -Kq]), -Ks @ pick
     keep = np.eye(N) - L @ model.H
@@ -251,7 +311,7 @@ def _compensator(model: Seen, K: Array, C: Array, L: Array | None, dt: float) ->
     return A, B, np.hstack([Cu, -Kq]), Du
 
 
-def _closed(model: Seen, plant: Any, compensator: Any, noisy: bool) -> tuple[Array, tuple[Array, Array]]:
+def _closed(plant: Any, compensator: Any, noisy: bool) -> tuple[Array, tuple[Array, Array]]:
     """The closed loop's matrix, and how process noise (on the plant) and measurement noise enter it."""
     A, B, H = plant
     Ac, Bc, Cc, Dc = compensator
@@ -261,7 +321,7 @@ def _closed(model: Seen, plant: Any, compensator: Any, noisy: bool) -> tuple[Arr
     return whole, (by_process, by_noise)
 
 
-def _spread(model: Seen, closed: Array, entering: tuple[Array, Array], plan: Plan) -> dict[str, float]:
+def _spread(model: Seen, closed: Array, entering: tuple[Array, Array]) -> dict[str, float]:
     """Standard deviations of the vehicle's states: white noise, and disturbing accelerations as they are coloured."""
     by_process, by_noise = entering
     m = list(model.moved)
@@ -273,9 +333,7 @@ def _spread(model: Seen, closed: Array, entering: tuple[Array, Array], plan: Pla
     noise[:size, :size] = by_process @ model.process[np.ix_(m, m)] @ by_process.T + by_noise @ model.noise @ by_noise.T
     noise[size:, size:] = model.process[np.ix_(d, d)]
     P = scipy.linalg.solve_discrete_lyapunov(whole, noise, method="bilinear")
-    return {
-        model.names[m[i]]: float(np.sqrt(max(P[i, i], 0.0))) for i in range(len(m)) if m[i] in model.vehicle
-    }
+    return {model.names[m[i]]: float(np.sqrt(max(P[i, i], 0.0))) for i in range(len(m)) if m[i] in model.vehicle}
 
 
 def _response(z: Any, A: Array, B: Array, C: Array, D: Array | None) -> Any:

@@ -44,6 +44,8 @@ ALLOWED: Mapping[str, float] = {
 }
 """Deviations [m, m/s, rad, rad/s, and their integrals] that weigh as much as `EFFORT` of an input's range (Bryson)."""
 EFFORT = 0.1
+EFFORTS: Mapping[str, float] = dict.fromkeys(("motor_lower", "motor_upper"), 0.04)
+"""Inputs with another share: motors are slow, and pushing them hard only heats them."""
 SUMS = ("sum_ahead", "sum_right", "sum_down", "sum_heading")
 _SAMPLES = 20.0
 """Samples per period that a mode needs which does not decay by itself."""
@@ -61,7 +63,7 @@ def design(
     holding: Holding = "place",
     speeds: Sequence[float] = (0.0,),
     allowed: Mapping[str, float] | None = None,
-    effort: Mapping[str, float] | float = EFFORT,
+    effort: Mapping[str, float] | float | None = None,
     Q: Any = None,
     R: Any = None,
     unrest: Unrest | None = None,
@@ -78,9 +80,9 @@ def design(
         holding: "place" and heading and height, or "speed" ahead and to the right with these.
         speeds: of the trims that the gains are scheduled over [m/s]; more than one needs holding "speed".
         allowed: deviations by state or integral that weigh as much as the effort (`ALLOWED`).
-        effort: share of an input's range, one for all or by input.
+        effort: share of an input's range, one for all or by input (`EFFORT`, `EFFORTS`).
         Q, R: weights instead of these, per second, over `design_states` and the inputs.
-        unrest: what disturbs the vehicle, for the observer.
+        unrest: what disturbs the vehicle, for the observer; by default what the card's identification learnt.
         voltage, environment: of the trims.
 
     Raises:
@@ -121,7 +123,7 @@ def design(
         pace=np.array(_PACE),
         place=np.array(1.0 if holding == "place" else 0.0),
     )
-    chosen = unrest or Unrest()
+    chosen = unrest or observer.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan))
     return Lqg(vehicle, plan, numbers, feedback, trims[0], chosen)
@@ -153,7 +155,7 @@ def _weights(
     vehicle: Vehicle,
     names: tuple[str, ...],
     allowed: Mapping[str, float],
-    effort: Mapping[str, float] | float,
+    effort: Mapping[str, float] | float | None,
     Q: Any,
     R: Any,
     *,
@@ -164,7 +166,9 @@ def _weights(
         raise ControllerError(
             f"is not a state: {', '.join(unknown)}; expected {', '.join(names)}.", where=where, channel="allowed"
         )
-    if not isinstance(effort, Mapping):
+    if effort is None:
+        effort = {}
+    elif not isinstance(effort, Mapping):
         effort = dict.fromkeys(vehicle.input_names, effort)
     strange = sorted(set(effort) - set(vehicle.input_names))
     if strange:
@@ -175,14 +179,22 @@ def _weights(
         )
     if any(not value > 0.0 for value in (*allowed.values(), *effort.values())):
         raise ControllerError("must be above zero.", where=where, channel="allowed and effort")
-    deviations = {**ALLOWED, **allowed}
-    if Q is None:
-        Q = np.diag([1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names])
-    if R is None:
-        spans = [high - low for low, high in vehicle.input_limits]
-        shares = [effort.get(name, EFFORT) for name in vehicle.input_names]
-        R = np.diag([1.0 / (share * span) ** 2 for share, span in zip(shares, spans, strict=True)])
-    return _square(Q), _square(R)
+    usual = bryson(vehicle, names, allowed=allowed, effort=effort)
+    return usual[0] if Q is None else _square(Q), usual[1] if R is None else _square(R)
+
+
+def bryson(
+    vehicle: Vehicle,
+    names: Sequence[str],
+    *,
+    allowed: Mapping[str, float] | None = None,
+    effort: Mapping[str, float] | None = None,
+) -> tuple[Array, Array]:
+    """Weights of states by name and of inputs: one over the square of what is allowed (Bryson's rule)."""
+    deviations, shares = {**ALLOWED, **(allowed or {})}, {**EFFORTS, **(effort or {})}
+    Q = np.diag([1.0 / deviations[name] ** 2 if name in deviations else 0.0 for name in names])
+    spans = zip(vehicle.input_names, vehicle.input_limits, strict=True)
+    return Q, np.diag([1.0 / (shares.get(name, EFFORT) * (high - low)) ** 2 for name, (low, high) in spans])
 
 
 def _square(weights: Any) -> Array:

@@ -1,4 +1,4 @@
-"""Linear-quadratic controllers as files: the model's card, the sensors, the gains; enough to fly without anything else."""
+"""Linear-quadratic controllers as files: the model's card, the sensors, the gains; enough to fly."""
 
 from __future__ import annotations
 
@@ -41,9 +41,7 @@ def save_lqg(controller: Lqg, path: str | Path) -> None:
         "rate": plan.rate,
         "delays": dict(zip(controller.vehicle.input_names, (d / plan.rate for d in plan.delays), strict=True)),
         "air": {"air_density": float(about.air_density), "gravity": float(about.gravity)},
-        "sensors": [
-            {"kind": s.kind, "rate": s.rate, "delay": s.delay, "sigma": list(s.sigma)} for s in plan.sensors
-        ],
+        "sensors": [{"kind": s.kind, "rate": s.rate, "delay": s.delay, "sigma": list(s.sigma)} for s in plan.sensors],
         "unrest": controller.unrest._asdict(),
         "feedback": {name: np.asarray(part).tolist() for name, part in f._asdict().items()},
         "card": tomllib.loads(controller.vehicle.card.to_toml()),
@@ -102,7 +100,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
 
 def _check_sizes(vehicle: Vehicle, plan: Plan, f: Feedback, path: str | Path) -> None:
     S, n, m = f.speeds.size, plan.n, plan.inputs
-    expected = dict.fromkeys(_SINGLE, ()) | dict.fromkeys(("battery", "low", "high"), (m,))
+    expected: dict[str, tuple[int, ...]] = dict.fromkeys(_SINGLE, ()) | dict.fromkeys(("battery", "low", "high"), (m,))
     expected |= {"speeds": (S,), "states": (S, n), "inputs": (S, m)}
     expected |= {"gains": (S, m, n + sum(plan.delays) + INTEGRALS)}
     for name, shape in expected.items():

@@ -11,20 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control import observer
-from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_analysis import Seen, seen
 from swashplate.control.lqg_design import typical
-from swashplate.control.lqg_law import Feedback
 from swashplate.control.observer import DISTURBED, Numbers, Plan, Unrest
 from swashplate.control.optimal import Direction, plain, shares, unseen
 from swashplate.control.sensor_suite import BIASED, Suite
 from swashplate.simulation.dynamics import equations_of, parameter_row
+from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -133,7 +131,9 @@ def in_words(direction: Direction) -> str:
     if len(named) == 1:
         return named[0][0]
     (first, size), *rest = named
-    others = ", ".join(f"{abs(value / size):.2g} of {what} {'with' if value * size > 0 else 'against'} it" for what, value in rest)
+    others = ", ".join(
+        f"{abs(value / size):.2g} of {what} {'with' if value * size > 0 else 'against'} it" for what, value in rest
+    )
     return f"{first}, together with {others}"
 
 
@@ -157,10 +157,10 @@ def observability(
     """
     prompt = tuple(replace(sensor, delay=0.0) for sensor in sensors)
     plan = Plan(equations_of(vehicle), prompt, rate, (0,) * len(vehicle.input_names)).checked()
-    chosen = unrest or Unrest()
+    chosen = unrest or observer.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, trim.environment), fade, process, observer.measurement_noise(plan))
-    model = seen(Lqg(vehicle, plan, numbers, _NO_FEEDBACK, trim, chosen), trim)
+    model = seen(plan, numbers, linearize(vehicle, trim))
     scale = np.array([_scale(name) for name in model.names])
     readings = model.H / np.sqrt(np.diag(model.noise))[:, None]
     hidden = unseen(model.F, readings, model.names, scale=scale)
@@ -194,7 +194,7 @@ def _gramian(F: Array, H: Array, samples: int) -> Array:
 def _faint(
     model: Seen, readings: Array, scale: Array, hidden: tuple[Direction, ...], *, samples: int
 ) -> tuple[Direction, ...]:
-    """Directions of vehicle states and biases that change the readings by less than their noise, but for hidden ones."""
+    """Directions of states and biases that change the readings by less than their noise, but for hidden ones."""
     kept = [i for i, name in enumerate(model.names) if not name.startswith("disturbance ")]
     F = (model.F * scale[None, :] / scale[:, None])[np.ix_(kept, kept)]
     W = _gramian(F, readings[:, kept] * scale[None, kept], samples)
@@ -231,7 +231,3 @@ def _known(model: Seen, scale: Array, *, samples: int, count: int) -> tuple[Know
         P = 0.5 * (P + P.T)
     sigma, before = (np.sqrt(np.maximum(np.diag(part), 0.0)) * scale for part in (P, blind))
     return tuple(Known(n, float(s), float(b)) for n, s, b in zip(model.names, sigma, before, strict=True))
-
-
-_NONE: Any = np.zeros(0)
-_NO_FEEDBACK = Feedback(*(_NONE,) * len(Feedback._fields))

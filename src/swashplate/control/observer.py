@@ -24,6 +24,7 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import Equations
+from swashplate.vehicles.card import Card
 from swashplate.vehicles.structure import rebuild
 
 Array = NDArray[np.float64]
@@ -37,24 +38,55 @@ class Unrest(NamedTuple):
     """How far a vehicle strays from its equations.
 
     Attributes:
-        force, moment: standard deviation of the disturbing accelerations [m/s^2, rad/s^2].
+        force, force_down, moment, moment_yaw: standard deviation of the disturbing accelerations: level and down
+            [m/s^2], of roll and pitch and of yaw [rad/s^2].
         force_time, moment_time: their time constants [s].
-        jolt, twist: white noise on velocity and body rates [m/s^2, rad/s^2 per root of Hz].
+        jolt, twist, twist_yaw: white noise on velocity and body rates [m/s^2, rad/s^2 per root of Hz].
         flapping, bar: white noise on the tilt of rotors and of the bar [rad/s per root of Hz].
         speed: white noise on rotor speeds [rad/s^2 per root of Hz].
         other: white noise on every other inner state, per second and root of Hz.
     """
 
     force: float = 0.1
+    force_down: float = 0.1
     moment: float = 0.5
+    moment_yaw: float = 0.5
     force_time: float = 1.0
     moment_time: float = 0.5
     jolt: float = 0.02
     twist: float = 0.1
+    twist_yaw: float = 0.1
     flapping: float = 0.02
     bar: float = 0.01
     speed: float = 3.0
     other: float = 0.01
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations of the disturbances in the order of `DISTURBED`."""
+        return np.array([self.force, self.force, self.force_down, self.moment, self.moment, self.moment_yaw])
+
+
+def unrest_of(card: Card) -> Unrest:
+    """What an identification learnt of the disturbances beside the parameters; the usual numbers where it did not.
+
+    A gust that fades with T and is driven by white noise of intensity g has a standard deviation of g sqrt(T / 2).
+    """
+    noise = card.observer.get("noise", {})
+    if not noise:
+        return Unrest()
+    force, moment = np.sqrt(0.5 * noise["tau_gust_force"]), np.sqrt(0.5 * noise["tau_gust_moment"])
+    return Unrest(
+        force=float(force * noise["gust_horizontal"]),
+        force_down=float(force * noise["gust_vertical"]),
+        moment=float(moment * noise["gust_tilt"]),
+        moment_yaw=float(moment * noise["gust_yaw"]),
+        force_time=noise["tau_gust_force"],
+        moment_time=noise["tau_gust_moment"],
+        jolt=max(noise["white_horizontal"], noise["white_vertical"]),
+        twist=noise["white_tilt"],
+        twist_yaw=noise["white_yaw"],
+    )
 
 
 @dataclass(frozen=True)
@@ -142,9 +174,10 @@ class Plan:
             ratio = self.rate / sensor.rate
             if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6:
                 raise ControllerError(
-                    f"gives {sensor.rate:g} readings per second; the controller's {self.rate:g} Hz is no whole multiple.",
+                    f"gives {sensor.rate:g} readings per second; "
+                    f"the controller's {self.rate:g} Hz is no whole multiple.",
                     channel=sensor.kind,
-                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz, or choose another sensor rate.",
+                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz, or the sensor at another rate.",
                 )
         return self
 
@@ -177,13 +210,13 @@ def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
     u, dt = unrest, plan.dt
     fade = np.repeat([1.0 / u.force_time, 1.0 / u.moment_time], 3)
     vehicle = plan.equations.vehicle
-    white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pqr", u.twist)}
+    white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pq", u.twist), "r": u.twist_yaw}
     white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1"), u.flapping)
     white |= dict.fromkeys(("eta_bar", "zeta_bar", "c", "d"), u.bar)
     white |= dict.fromkeys(("omega_lower", "omega_upper", "omega"), u.speed)
     inner = vehicle.state_names[_BODY:]
     states = [white.get(name, u.other if name in inner else 0.0) ** 2 * dt for name in vehicle.state_names]
-    spread = np.repeat([u.force, u.moment], 3) ** 2 * (1.0 - np.exp(-2.0 * fade * dt))
+    spread = u.spread**2 * (1.0 - np.exp(-2.0 * fade * dt))
     wander = [BIASED[name][1] ** 2 * dt for name in plan.biases]
     late = len(plan.names) - plan.n - len(DISTURBED) - len(wander)
     # A stored reading is not disturbed; the last digit keeps the covariance positive in rounding.
@@ -199,7 +232,7 @@ def start_variance(plan: Plan, unrest: Unrest) -> Array:
     units = dict(zip(plan.equations.vehicle.state_names, plan.equations.vehicle.state_units, strict=True))
     usual = {"m": 0.05, "m/s": 0.05, "rad": 0.01, "rad/s": 0.02}
     first = [4.0 if name.startswith("omega") else usual.get(unit, 0.01) ** 2 for name, unit in units.items()]
-    spread = np.repeat([unrest.force, unrest.moment], 3) ** 2
+    spread = unrest.spread**2
     return np.array([*first, *spread, *(BIASED[name][0] ** 2 for name in plan.biases)])
 
 
@@ -217,7 +250,9 @@ def moving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp:
     parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
     rates = vehicle.rates(e[:n], w[: plan.inputs], parameters, around, xp)
     pushed = dict(zip(DISTURBED, e[n : n + 6], strict=True))
-    rates = [rate + pushed[name] if name in pushed else rate for name, rate in zip(vehicle.state_names, rates, strict=True)]
+    rates = [
+        rate + pushed[name] if name in pushed else rate for name, rate in zip(vehicle.state_names, rates, strict=True)
+    ]
     fading = [-numbers.fade[i] * e[n + i] for i in range(6)]
     return [*rates, *fading, *[0.0] * (len(e) - n - 6)]
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from swashplate.control.lqg import Lqg, SensedStep
 from swashplate.simulation.closed_loop import REFERENCES, told
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -154,7 +155,7 @@ def trial(
     return Trial(made, place, height, truth, estimates, sigmas)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
+@partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
 def _fly(
     equations: Equations,
     control: SensedStep,

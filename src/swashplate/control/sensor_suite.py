@@ -1,4 +1,4 @@
-"""What an aircraft is told: sensors with their channels, rates, delays, noise and biases, written "imu@200,flow@25+40ms".
+"""What an aircraft is told: sensors with their rates, delays, noise and biases, written "imu@200,flow@25+40ms".
 
 A suite is data; the readings are one function of scalars, so that the observer, its C and the simulated sensors are the
 same sensors.
@@ -63,8 +63,8 @@ BIASED: Mapping[str, tuple[float, float]] = {
     **dict.fromkeys(("ax", "ay", "az"), (0.05, 1e-3)),
     "height": (0.3, 0.02),
 }
-"""Channels of gyros, accelerometers and pressure that have a bias: its sigma at the start and how it wanders (per root of
-a second)."""
+"""Channels of gyros, accelerometers and pressure that have a bias: its sigma at the start and how it wanders (per
+root of a second)."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,9 @@ def suite(text: str) -> Suite:
             raise ControllerError(f"'{part}': expected up to 10000 Hz and 1000 ms.", channel="sensors")
         found.append(Sensor(match["kind"], rate, delay, kind.sigma))
     kinds = [sensor.kind for sensor in found]
-    doubled = sorted({k for k in kinds if kinds.count(k) > 1} | ({"gyro", "imu"} if {"gyro", "imu"} <= {*kinds} else set()))
+    doubled = sorted(
+        {k for k in kinds if kinds.count(k) > 1} | ({"gyro", "imu"} if {"gyro", "imu"} <= {*kinds} else set())
+    )
     if doubled:
         raise ControllerError(f"{' and '.join(doubled)} is there twice.", channel="sensors", hint="Give each once.")
     return tuple(found)
@@ -153,6 +155,4 @@ def readings(
     }
     if sensor.kind == "sonar":
         shown["range"] = -body.z / (xp.cos(body.phi) * xp.cos(body.theta))
-    return {
-        name: shown[name] + bias[name] if _has_bias(sensor.kind, name) else shown[name] for name in sensor.channels
-    }
+    return {name: shown[name] + bias[name] if _has_bias(sensor.kind, name) else shown[name] for name in sensor.channels}

@@ -155,8 +155,8 @@ def _heading(controller: Autopilot | Lqg, traced: _Traced, precision: Precision)
     lines = textwrap.wrap(", ".join(traced.measured), 100)
     return f"""/* One step of a swashplate controller, to be called at {controller.rate:g} Hz.
  *
- *   void swash_step({precision} memory[{counts[0]}], const {precision} measured[{counts[1]}], const {precision} reference[8],
- *                   {precision} command[{counts[2]}]);
+ *   void swash_step({precision} memory[{counts[0]}], const {precision} measured[{counts[1]}],
+ *                   const {precision} reference[8], {precision} command[{counts[2]}]);
  *
  * vehicle    {traced.about.replace("*/", "* /")}
  * measured   {f"{chr(10)} *            ".join(lines)}
@@ -179,8 +179,8 @@ const {precision} swash_memory[{n}] = {{
   {start}
 }};
 
-void swash_step({precision} memory[{n}], const {precision} measured[{len(traced.measured)}], const {precision} reference[8],
-                {precision} command[{m}]) {{
+void swash_step({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
+                const {precision} reference[8], {precision} command[{m}]) {{
   static {precision} after[{n + m}], w[{max(work, 1)}];
   static int iw[{max(whole, 1)}];
   const {precision} *arg[{max(int(f.sz_arg()), 3)}];

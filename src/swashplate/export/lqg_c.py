@@ -41,13 +41,13 @@ class CasadiMatrices:
         """Traced once per place in the program: the four stages of a Runge-Kutta step call one function."""
         import casadi
 
-        key = (f.__code__, x.shape[0], w.shape[0])  # type: ignore[attr-defined]
+        key = (f.__code__, x.shape[0], w.shape[0])
         if key not in self._made:
             xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
             found = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
             slopes = casadi.jacobian(found, xs)
             self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [found, slopes])
-        return tuple(self._made[key](x, w))  # type: ignore[return-value]
+        return tuple(self._made[key](x, w))
 
     def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any:
         for i in range(count):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any, Protocol
 
 import jax
@@ -16,6 +15,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.flights.maneuvers import parse as parse_maneuver
 from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -105,7 +105,8 @@ def simulate_closed_loop(
     at_start = dict(zip(vehicle.state_names, x0, strict=True))
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
-    states, inputs = _fly(
+    fly = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly
+    states, inputs = fly(
         equations_of(vehicle),
         controller.step,
         round(every),
@@ -125,8 +126,7 @@ def simulate_closed_loop(
     return flight
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _fly(
+def _flying(
     equations: Equations,
     control: Step,
     every: int,
@@ -163,6 +163,11 @@ def _fly(
     nothing = jnp.zeros(added.shape[1])
     _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, 0), (around, wanted, added))
     return record  # type: ignore[no-any-return]
+
+
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2))
+# An observer's derivatives take minutes to compile as XLA usually does it.
+_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
 
 
 def told(control: Step, equations: Equations, x: Any, inputs: Any, surroundings: Any, p: Any) -> Any:
