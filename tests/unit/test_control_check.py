@@ -10,8 +10,11 @@ import pytest
 import swashplate as sp
 from swashplate.control.autopilot import autopilot
 from swashplate.control.check import ControlCheck, check_controller
+from swashplate.control.lqg_analysis import analyse
+from swashplate.control.lqg_design import design
 from swashplate.control.requirements import BANDWIDTH, PHASE_MARGIN, REJECTION_PEAK, froude_scale
 from swashplate.control.sampled_loop import SampledLoop, sampled_loop
+from swashplate.control.sensor_suite import suite
 from swashplate.control.stability import loop_margins, loop_modes
 from swashplate.control.step_response import cross_ratio, step_metrics
 from swashplate.errors import SwashError
@@ -179,3 +182,20 @@ def test_a_conventional_helicopter_under_its_state_hold(place: ControlCheck) -> 
         "height from pitch",
         "yaw from collective",
     }
+
+
+def test_linear_quadratic_controllers_with_and_without_an_observer(coax: Vehicle, hover: Trim) -> None:
+    fed = check_controller(coax, design(coax, sensors=()), hover, duration=5.0)
+    assert fed.problems == ()
+    assert fed.notes == ()
+    assert fed.slowest.real < -0.01  # memory that nothing writes is no mode
+    assert {r.state for r in fed.rejections} >= {"x", "y", "z", "psi"}
+    told = design(coax, sensors=suite("imu@100,mocap@100+10ms"))
+    seen = check_controller(coax, told, hover, duration=5.0)
+    assert seen.problems == ()
+    assert "observer" in seen.notes[0]
+    assert seen.margins is not None
+    assert fed.margins is not None
+    assert seen.margins.together.alpha == analyse(told).margins.together.alpha
+    assert seen.margins.together.alpha < fed.margins.together.alpha
+    assert {step.reference for step in seen.steps} == {"x", "y", "z", "psi"}

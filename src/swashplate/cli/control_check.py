@@ -108,7 +108,13 @@ def as_document(check: ControlCheck, *, controller: str) -> dict[str, Any]:
                 }
                 for a in check.margins.axes
             },
-            "together": {"disc": t.alpha, "frequency": t.frequency, "gain": t.gain, "phase_deg": math.degrees(t.phase)},
+            "together": {
+                "disc": t.alpha,
+                "frequency": t.frequency,
+                "gain": t.gain,
+                "phase_deg": math.degrees(t.phase),
+                "delay": t.phase / t.frequency,
+            },
         }
     handling = {}
     for a in check.attitudes:

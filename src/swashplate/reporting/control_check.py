@@ -99,7 +99,8 @@ def _margins_line(check: ControlCheck) -> tuple[str, str]:
     level = margins_level(worst.gain, worst.gain_down, worst.phase)
     return (
         f"all loops at once ±{_decibel(t.gain):.1f} dB or ±{math.degrees(t.phase):.0f}° (disc {t.alpha:.2f} at "
-        f"{t.frequency:.3g} rad/s); the weakest single loop is {worst.name}, {math.degrees(worst.phase):.0f}°.",
+        f"{t.frequency:.3g} rad/s, where that phase is {1e3 * t.phase / t.frequency:.2g} ms of delay); the weakest "
+        f"single loop is {worst.name}, {math.degrees(worst.phase):.0f}°.",
         "good" if level == 1 else "caution",
     )
 
