@@ -1,4 +1,4 @@
-"""The table and the picture of docs/explanation/lqg.md: what delay a CoaX stands with and without its bar (minutes).
+"""The table and the picture of docs/howto/control-with-an-observer.md: what delay a CoaX stands with and without its bar (minutes).
 
 python scripts/stability_limits.py
 """
