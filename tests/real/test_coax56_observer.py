@@ -56,7 +56,7 @@ DISTURBED = Unrest(
 def observed(path: Path, *, servo: float, motor: float, lever: tuple[float, float, float], heading: float) -> Along:
     flight = sp.read(path).condition(rate=100.0, cutoff=0.0)
     piece = max(flight.split(), key=lambda part: part.duration)
-    camera = replace(suite("mocap@33.3333333333+0ms")[0], sigma=(7e-5,) * 3 + (5e-4,) * 3)
+    camera = replace(suite("mocap@33.3333333333+0ms")[0], sigma=(7e-5, 7e-5, 1.5e-4, 5e-4, 5e-4, 5e-4))
     delays = {"servo_roll": servo, "servo_pitch": servo, "motor_lower": motor, "motor_upper": motor}
     model = sp.vehicle("coax").with_values(LEARNT)
     observer = design(model, sensors=(camera,), rate=100.0, delays=delays, unrest=DISTURBED)
@@ -83,13 +83,15 @@ def test_rates_are_predicted_better_than_by_the_raw_model(name: str, request: py
             assert by_observer < 0.7 * size, (axis, found.rms())
 
 
-def test_innovations_are_near_white(august: Along) -> None:
-    """Roll and pitch within twice the bound of white noise at every lag but single ones; sizes as expected."""
+@pytest.mark.parametrize(("name", "tilt"), [("august", 0.18), ("july", 0.30)])
+def test_innovations_are_near_white(name: str, tilt: float, request: pytest.FixtureRequest) -> None:
+    """Largest correlation over 20 lags (white: 0.08 and 0.11) and sizes; place carries interpolation's correlation."""
+    along_it: Along = request.getfixturevalue(name)
     names = ("x", "y", "z", "phi", "theta", "psi")
-    found = {entry.channel: entry for entry in check(august.innovations, august.covariance, names)}
-    for name in ("phi", "theta"):
-        assert found[name].whiteness < 0.2, found[name]
-        assert 0.3 < found[name].consistency < 1.5, found[name]
-    assert all(entry.whiteness < 0.6 for entry in found.values()), found
-    assert all(0.1 < entry.consistency < 2.5 for entry in found.values()), found
-    assert np.all(np.isfinite(august.estimates))
+    found = {entry.channel: entry for entry in check(along_it.innovations, along_it.covariance, names)}
+    for axis in ("phi", "theta"):
+        assert found[axis].whiteness < tilt, found[axis]
+        assert 0.3 < found[axis].consistency < 1.5, found[axis]
+    assert all(entry.whiteness < 0.5 for entry in found.values()), found
+    assert all(0.1 < entry.consistency < 2.0 for entry in found.values()), found
+    assert np.all(np.isfinite(along_it.estimates))

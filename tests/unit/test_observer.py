@@ -76,9 +76,12 @@ def test_the_raptor_is_held_and_flown_to_ten_metres_a_second() -> None:
 
 # ---- its C -----------------------------------------------------------------------------------------------------------
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
-@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("float", 1e-4)])
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("float", 3e-4)])
 def test_the_c_step_is_the_python_step(precision: str, tolerance: float, tmp_path: Path) -> None:
-    """Commands and estimates in units of their sigmas, covariances in units of their diagonal, step by step."""
+    """Commands and estimates in units of their sigmas, covariances in units of their diagonal, step by step.
+
+    In single precision the first reading, which shrinks a variance a thousand times, costs most: 1.7e-4.
+    """
     pytest.importorskip("casadi", reason="the extra 'export' is not installed")
     from swashplate.export.controller_c import controller_code
 

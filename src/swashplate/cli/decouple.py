@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from swashplate.control.autopilot import Autopilot
+    from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.simulation.trim import Trim
     from swashplate.vehicles.vehicle import Vehicle
 
@@ -68,6 +69,10 @@ def decouple(
             "--step", help="Fly this step of the pitch command for 6 m, with and without the decoupling.", min=0.01
         ),
     ] = None,
+    sensors: Annotated[
+        str | None,
+        typer.Option("--sensors", help="Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."),
+    ] = None,
     fit: Annotated[
         Path | None,
         typer.Option("--fit", metavar="FILE", help="With --step: also on models drawn from a fit.json."),
@@ -116,7 +121,7 @@ def decouple(
     motor = hover.commands()["motor_lower"]
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
     if out is not None:
-        save_controller(made, out)
+        save_controller(made if sensors is None else _on_estimates(vehicle, made, sensors, volts), out)
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code
@@ -177,6 +182,14 @@ def decouple(
         written = ", ".join(str(path) for path in (out, c_code) if path is not None)
         if written:
             typer.echo(f"\nWritten: {written}")
+
+
+def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
+    from swashplate.control.lqg_design import design
+    from swashplate.control.observed_autopilot import ObservedAutopilot
+    from swashplate.control.sensor_suite import suite
+
+    return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
 
 
 def _steps(
