@@ -1,4 +1,4 @@
-"""The decoupling law on estimated velocity: as straight as on the true one, with flow and gyros but no motion capture."""
+"""The decoupling law on estimated velocity: as straight as on the true one, without motion capture."""
 
 from __future__ import annotations
 

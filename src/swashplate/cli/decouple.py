@@ -92,6 +92,8 @@ def decouple(
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     if c_code is not None and c_code.suffix != ".c":
         raise SwashError(f"ends in '{c_code.suffix}', expected .c.", where=c_code, channel="--c")
+    if sensors is not None and (c_code is not None or out is None):
+        raise SwashError("goes into the file of --out; the C of --c takes measurements.", channel="--sensors")
     import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
