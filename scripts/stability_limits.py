@@ -1,4 +1,4 @@
-"""The table and the picture of docs/explanation/lqg.md: what delay a CoaX stands with and without its bar (minutes).
+"""Table and picture of what delay a CoaX stands with and without its bar, for the how-to on observers (minutes).
 
 python scripts/stability_limits.py
 """

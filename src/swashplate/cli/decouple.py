@@ -15,7 +15,10 @@ from swashplate.errors import SwashError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from swashplate.control.autopilot import Autopilot
+    from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.control.straightness import StepRun
+    from swashplate.vehicles.vehicle import Vehicle
 
 
 _PAPERS_SPEED = 1.8  # m/s, Fankhauser et al., Fig. 10
@@ -77,6 +80,10 @@ def decouple(
         Path | None,
         typer.Option("--report", metavar="FILE", help="Compare the two paths as HTML; to 1.8 m/s without a --step."),
     ] = None,
+    sensors: Annotated[
+        str | None,
+        typer.Option("--sensors", help="Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."),
+    ] = None,
     fit: Annotated[
         Path | None,
         typer.Option("--fit", metavar="FILE", help="With a step: also on models drawn from a fit.json."),
@@ -104,6 +111,8 @@ def decouple(
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     if c_code is not None and c_code.suffix != ".c":
         raise SwashError(f"ends in '{c_code.suffix}', expected .c.", where=c_code, channel="--c")
+    if sensors is not None and (c_code is not None or out is None):
+        raise SwashError("goes into the file of --out; the C of --c takes measurements.", channel="--sensors")
     import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
@@ -135,7 +144,7 @@ def decouple(
     motor = hover.commands()["motor_lower"]
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
     if out is not None:
-        save_controller(made, out)
+        save_controller(made if sensors is None else _on_estimates(vehicle, made, sensors, volts), out)
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code
@@ -211,6 +220,14 @@ def decouple(
         written = ", ".join(str(path) for path in (out, c_code, report) if path is not None)
         if written:
             typer.echo(f"\nWritten: {written}")
+
+
+def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
+    from swashplate.control.lqg_design import design
+    from swashplate.control.observed_autopilot import ObservedAutopilot
+    from swashplate.control.sensor_suite import suite
+
+    return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
 
 
 def _figures(runs: Mapping[str, StepRun], draws: int) -> dict[str, dict[str, Any]]:

@@ -49,7 +49,7 @@ def simulate(
     switched: given.Switch = None,
     controller: Annotated[
         Path | None,
-        typer.Option("--controller", metavar="FILE", help="A controller from `swash decouple`, instead of the hold."),
+        typer.Option("--controller", metavar="FILE", help="A file of `swash decouple` or `swash control design`."),
     ] = None,
     pilot: Annotated[
         bool,
@@ -177,6 +177,7 @@ def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Control
     """
     from swashplate.control.controller_file import read_controller
     from swashplate.control.lqg import Lqg
+    from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.errors import ControllerError
 
     saved = read_controller(path)
@@ -185,7 +186,7 @@ def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Control
         of = saved.vehicle if isinstance(saved.vehicle, str) else saved.vehicle.name
         if of != vehicle.name:
             raise ControllerError(f"is for '{of}', not for '{vehicle.name}'.", where=path)
-        return saved.starting_at(trim, seed=seed) if isinstance(saved, Lqg) else saved
+        return saved.starting_at(trim, seed=seed) if isinstance(saved, Lqg | ObservedAutopilot) else saved
 
     return make
 

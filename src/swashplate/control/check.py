@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.control.check_steps import COUPLING_WITHIN, STEPS, Coupling, Step, couplings_of, fly_steps
 from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_analysis import analyse
 from swashplate.control.margins import Margins
+from swashplate.control.observed_autopilot import ObservedAutopilot
 from swashplate.control.requirements import (
-    ATTITUDE_COUPLING,
     BANDWIDTH,
     REJECTION,
     REJECTION_PEAK,
@@ -24,11 +24,9 @@ from swashplate.control.requirements import (
 )
 from swashplate.control.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.stability import frequencies_of, margins_of, modes_of
-from swashplate.control.step_response import StepMetrics, cross_ratio, step_metrics
-from swashplate.errors import ControllerError, DivergenceError, IdentificationError, SwashError
-from swashplate.flights.flight import Flight
+from swashplate.errors import ControllerError, IdentificationError, SwashError
 from swashplate.identification.handling import Handling, handling_qualities
-from swashplate.simulation.closed_loop import Controller, simulate_closed_loop
+from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -37,29 +35,16 @@ Command = Literal["auto", "rate", "attitude"]
 
 ATTITUDES: Mapping[str, tuple[str, float]] = {"phi": ("roll", 1.0), "theta": ("pitch", -1.0), "psi": ("psi", 1.0)}
 """Attitude by name: the reference that a pilot moves it by, and its sign (a pitch command is nose down positive)."""
-STEPS: Mapping[str, tuple[str, str, float]] = {
-    "roll": ("phi", "p", 0.1),
-    "pitch": ("theta", "q", 0.1),
-    "psi": ("psi", "r", math.radians(30.0)),
-    "z": ("z", "", -0.5),
-    "x": ("x", "", 1.0),
-    "y": ("y", "", 1.0),
-    "ahead": ("u", "", 0.5),
-    "right": ("v", "", 0.5),
-}
-"""Steps by reference: the state that answers, its measured rate, and the size [rad, m, m/s, share of the stick]."""
 _OBSERVED = (
     "With an observer, modes and margins are those of its steady filter on the model of its design. Disturbance "
     "rejection and bandwidth are not computed; the steps are flown with its noisy sensors."
 )
+_FED = (
+    "Modes, margins, disturbance rejection and bandwidth are those of the law fed with the true states: the observer's "
+    "own lag is not in them. The steps are flown with its noisy sensors."
+)
 _NEUTRAL = 1e-6
 """1/s."""
-_LEAD = 0.5
-"""Seconds of rest before a step."""
-_PHYSICS = 500.0
-"""Least rate of the simulation [Hz]."""
-_COUPLING_WITHIN = 4.0
-"""Seconds after the step in which couplings are read (as in ADS-33E-PRF, 3.3.9)."""
 _HALF_POWER = 10.0 ** (-3.0 / 20.0)
 _ATTITUDE_LAG = -60.0
 _LAST_LEAD = 60.0
@@ -114,27 +99,6 @@ class Rejection:
     size: Array
     level: int | None
     peak_level: int | None
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step of one reference, flown on the nonlinear vehicle."""
-
-    reference: str
-    state: str
-    size: float
-    flight: Flight
-    metrics: StepMetrics
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """What one axis does while another is commanded: `value` in `unit`, and its level where a standard has one."""
-
-    name: str
-    value: float
-    unit: str
-    level: int | None
 
 
 @dataclass(frozen=True)
@@ -207,12 +171,15 @@ def check_controller(
     """
     if task not in TASKS:
         raise SwashError(f"is '{task}', expected {', '.join(TASKS)}.", channel="task")
-    if duration <= _COUPLING_WITHIN:
-        raise SwashError(f"is {duration:g} s, expected more than {_COUPLING_WITHIN:g} s.", channel="duration")
+    if duration <= COUPLING_WITHIN:
+        raise SwashError(f"is {duration:g} s, expected more than {COUPLING_WITHIN:g} s.", channel="duration")
     n = scale if scale is not None else _scale_of(vehicle)
     if isinstance(controller, Lqg) and controller.plan.sensors:
         return _observed(vehicle, controller, trim, n, task, duration)
-    loop = sampled_loop(vehicle, controller, trim)
+    behind = isinstance(controller, ObservedAutopilot)
+    loop = sampled_loop(
+        vehicle, controller.autopilot if isinstance(controller, ObservedAutopilot) else controller, trim
+    )
     w = frequencies_of(loop, points=points)
     problems: list[str] = []
     try:
@@ -221,7 +188,7 @@ def check_controller(
         margins = None
         problems.append(f"No margins: {error.problem}")
     answered = [r for r, (s, _, _) in STEPS.items() if s in loop.states and loop.answers(r, s)]
-    steps = _steps(vehicle, controller, trim, answered, duration, problems)
+    steps = fly_steps(vehicle, controller, trim, answered, duration, problems)
     return ControlCheck(
         vehicle=vehicle,
         trim=trim,
@@ -235,8 +202,9 @@ def check_controller(
         attitudes=tuple(_attitude(loop, w, state, BANDWIDTH[task], command, n) for state in _commanded(loop)),
         rejections=tuple(_rejections(loop, w, n)) if margins else (),
         steps=tuple(steps),
-        couplings=tuple(_couplings({step.reference: step for step in steps})),
+        couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
+        notes=(_FED,) if behind else (),
     )
 
 
@@ -246,7 +214,7 @@ def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task:
     analysis = analyse(controller, at=int(np.argmin(np.abs(speeds - trim.speed))), where=vehicle.name)
     held = ("x", "y") if float(controller.feedback.place) > 0.5 else ("ahead", "right")
     problems: list[str] = []
-    steps = _steps(vehicle, controller, trim, ["psi", "z", *held], duration, problems)
+    steps = fly_steps(vehicle, controller, trim, ["psi", "z", *held], duration, problems)
     nothing = np.zeros(0)
     return ControlCheck(
         vehicle=vehicle,
@@ -261,7 +229,7 @@ def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task:
         attitudes=(),
         rejections=(),
         steps=tuple(steps),
-        couplings=tuple(_couplings({step.reference: step for step in steps})),
+        couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
         notes=(_OBSERVED,),
     )
@@ -334,66 +302,4 @@ def _rejections(loop: SampledLoop, w: Array, scale: float) -> list[Rejection]:
         level = None if standard is None else standard.level(bandwidth, scale=scale)
         peak_level = None if standard is None else REJECTION_PEAK.level(peak)
         found.append(Rejection(state, bandwidth, peak, float(w[worst]), w, size, level, peak_level))
-    return found
-
-
-def _steps(
-    vehicle: Vehicle,
-    controller: Controller,
-    trim: Trim,
-    answered: Sequence[str],
-    duration: float,
-    problems: list[str],
-) -> list[Step]:
-    rate = controller.rate * max(1, round(_PHYSICS / controller.rate))
-    samples = round((_LEAD + duration) * rate) + 1
-    on = np.arange(samples) / rate >= _LEAD
-    at_rest = trim.states()
-    found = []
-    for reference, (state, measured_rate, size) in STEPS.items():
-        if reference not in answered or (reference in ("ahead", "right") and "x" in answered):
-            continue  # a place that is held takes a speed back
-        try:
-            flight = simulate_closed_loop(
-                vehicle,
-                controller,
-                duration=_LEAD + duration,
-                reference={reference: at_rest.get(reference, 0.0) + size * on},
-                start=trim,
-                rate=rate,
-                environment=trim.environment,
-            )
-        except DivergenceError as error:
-            problems.append(f"The step of {reference} was lost after {error.time:.2f} s ({error.state}).")
-            continue
-        after = slice(int(np.argmax(on)), None)
-        metrics = step_metrics(
-            flight.time(state)[after],
-            flight.values(state)[after],
-            wanted=None if reference in ("roll", "pitch") else size,
-            rates=flight.values(measured_rate)[after] if measured_rate else None,
-        )
-        found.append(Step(reference, state, size, flight, metrics))
-    return found
-
-
-def _couplings(steps: Mapping[str, Step]) -> list[Coupling]:
-    lateral, forward = (
-        next((steps[r] for r in names if r in steps), None)
-        for names in (("roll", "right", "y"), ("pitch", "ahead", "x"))
-    )
-    found = []
-    for name, step, on, off, unit, factor in (
-        ("pitch from roll", lateral, "phi", "theta", "deg/deg", 1.0),
-        ("roll from pitch", forward, "theta", "phi", "deg/deg", 1.0),
-        ("height from pitch", forward, "theta", "z", "m/rad", 1.0),
-        ("yaw from collective", steps.get("z"), "z", "psi", "deg/m", math.degrees(1.0)),
-    ):
-        if step is None:
-            continue
-        t = step.flight.time(on)
-        part = (t >= _LEAD) & (t <= _LEAD + _COUPLING_WITHIN)
-        value = factor * cross_ratio(step.flight.values(on)[part], step.flight.values(off)[part])
-        level = ATTITUDE_COUPLING.level(value) if unit == "deg/deg" else None
-        found.append(Coupling(f"{name} (step of {step.reference})", value, unit, level))
     return found

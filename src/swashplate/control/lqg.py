@@ -7,7 +7,7 @@ readings only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -32,6 +32,10 @@ from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 _BODY = len(RigidBody._fields)
+
+
+Law = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
+"""(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""
 
 
 class Carried(NamedTuple):
@@ -64,6 +68,7 @@ def lqg_step(
     voltage: Any,
     reference: list[Any],
     M: Matrices,
+    law: Law | None = None,
 ) -> tuple[Carried, list[Any]]:
     """One step of the controller.
 
@@ -74,6 +79,7 @@ def lqg_step(
         voltage: the battery's [V].
         reference: the row of `REFERENCES`.
         M: the operations.
+        law: another feedback on the estimates than the linear-quadratic one.
 
     Returns:
         What is carried on, and the commands within their limits.
@@ -98,23 +104,13 @@ def lqg_step(
     else:
         x = M.scalars(y)
     names = plan.equations.vehicle.state_names
-    law, commands = lqr_law(
-        carried.law,
-        x,
-        waiting,
-        voltage,
-        reference,
-        names=names,
-        late_of=late,
-        feedback=feedback,
-        dt=plan.dt,
-        M=M,
-    )
+    decided = law or partial(lqr_law, names=names, late_of=late, feedback=feedback, dt=plan.dt, M=M)
+    kept, commands = decided(carried.law, x, waiting, voltage, reference)
     given = [commands, *carried.given[:-1]]
     if plan.sensors:
         acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
         estimate = observer.predicted(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
-    return Carried(estimate, given, counts, law), commands
+    return Carried(estimate, given, counts, kept), commands
 
 
 # ---- rows --------------------------------------------------------------------------------------------------------
@@ -194,9 +190,13 @@ class SensedStep:
         else:
             y = measured[: plan.n, None]
         wanted = [reference[i] for i in range(reference.shape[0])]
-        after, _ = lqg_step(plan, numbers, feedback, carried, y, voltage, wanted, M)
+        after, _ = lqg_step(plan, numbers, feedback, carried, y, voltage, wanted, M, self.law(gains))
         acting = jnp.stack([jnp.asarray(after.given[delay][j]) for j, delay in enumerate(plan.delays)])
         return jnp.concatenate([carried_row(after), own]), acting
+
+    def law(self, gains: Any) -> Law | None:
+        """The feedback, where it is not the linear-quadratic one."""
+        return None
 
     def _read(self, own: Any, x: Any, force: Any, numbers: Numbers) -> tuple[Any, Any]:
         """Readings that arrive now, and what the sensors carry: biases, seed, count, the last readings."""

@@ -212,7 +212,7 @@ def analyse_loop(
     closed, entering = _closed(plant, compensator, L is not None)
     values = np.linalg.eigvals(closed).astype(np.complex128)
     values = values[np.abs(values) > 1e-8]
-    modes: NDArray[np.complex128] = np.log(values) * plan.rate
+    modes = np.asarray(np.log(values) * plan.rate, dtype=np.complex128)
     modes = modes[np.argsort(-modes.real, kind="stable")]
     if modes[0].real >= 0.0:
         raise ControllerError(

@@ -30,9 +30,14 @@ _SINGLE = ("voltage", "reach", "pace", "place")
 
 def save_lqg(controller: Lqg, path: str | Path) -> None:
     """Write a controller as a TOML file."""
+    write_text(path, tomli_w.dumps(lqg_document(controller)))
+
+
+def lqg_document(controller: Lqg) -> dict[str, Any]:
+    """What its file says."""
     plan, f = controller.plan, controller.feedback
     about = controller.start.environment
-    document: dict[str, Any] = {
+    return {
         "kind": "controller",
         "schema": SCHEMA,
         "type": TYPE,
@@ -46,7 +51,6 @@ def save_lqg(controller: Lqg, path: str | Path) -> None:
         "feedback": {name: np.asarray(part).tolist() for name, part in f._asdict().items()},
         "card": tomllib.loads(controller.vehicle.card.to_toml()),
     }
-    write_text(path, tomli_w.dumps(document))
 
 
 def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:

@@ -177,7 +177,7 @@ class Plan:
                     f"gives {sensor.rate:g} readings per second; "
                     f"the controller's {self.rate:g} Hz is no whole multiple.",
                     channel=sensor.kind,
-                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz, or the sensor at another rate.",
+                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz or change the sensor.",
                 )
         return self
 
