@@ -83,15 +83,20 @@ def test_rates_are_predicted_better_than_by_the_raw_model(name: str, request: py
             assert by_observer < 0.7 * size, (axis, found.rms())
 
 
-@pytest.mark.parametrize(("name", "tilt"), [("august", 0.18), ("july", 0.30)])
-def test_innovations_are_near_white(name: str, tilt: float, request: pytest.FixtureRequest) -> None:
-    """Largest correlation over 20 lags (white: 0.08 and 0.11) and sizes; place carries interpolation's correlation."""
+@pytest.mark.parametrize(("name", "tilt", "height"), [("august", 0.18, 0.3), ("july", 0.30, 0.75)])
+def test_innovations_are_near_white(name: str, tilt: float, height: float, request: pytest.FixtureRequest) -> None:
+    """Largest correlation over 20 lags (white: 0.08 and 0.11) and sizes.
+
+    Roll and pitch are near white in both; July's height is not: the vertical model is August's, and July's controller
+    hides how wrong it is there (docs/real-flights.md: heave cannot be judged).
+    """
     along_it: Along = request.getfixturevalue(name)
     names = ("x", "y", "z", "phi", "theta", "psi")
     found = {entry.channel: entry for entry in check(along_it.innovations, along_it.covariance, names)}
     for axis in ("phi", "theta"):
         assert found[axis].whiteness < tilt, found[axis]
         assert 0.3 < found[axis].consistency < 1.5, found[axis]
-    assert all(entry.whiteness < 0.5 for entry in found.values()), found
+    assert found["z"].whiteness < height, found["z"]
+    assert all(entry.whiteness < 0.5 for axis, entry in found.items() if axis != "z"), found
     assert all(0.1 < entry.consistency < 2.0 for entry in found.values()), found
     assert np.all(np.isfinite(along_it.estimates))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Any
 
 import jax
@@ -17,6 +16,7 @@ from swashplate.errors import CardError, SwashError
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -114,7 +114,8 @@ def simulate_closed_loops(
         part = slice(first, min(first + BLOCK, size))
         count = part.stop - first
         key = jax.random.fold_in(jax.random.key(seed), first)
-        found = _fly_many(
+        fly = _fly_many_quickly_compiled if getattr(controller.step, "feels", False) else _fly_many
+        found = fly(
             equations_of(vehicle),
             controller.step,
             round(substeps),
@@ -162,8 +163,7 @@ def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
     return np.broadcast_to(table[:samples], (samples, size))
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4, 5))
-def _fly_many(
+def _flying_many(
     equations: Equations,
     control: Step,
     substeps: int,
@@ -229,3 +229,7 @@ def _fly_many(
     sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
     _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), sent, 0), tables)
     return record  # type: ignore[no-any-return]
+
+
+_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5))
+_fly_many_quickly_compiled = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5), compiler_options=QUICK_TO_COMPILE)
