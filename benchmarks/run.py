@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import export, frequency, helicopter, identifying, link, live, many, peers, single
+from benchmarks import closed_loops, export, frequency, helicopter, identifying, link, live, many, peers, single
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -85,6 +85,7 @@ def main() -> None:
     Console().print(table)
     repeats = 2 if options.short else 5
     spans = [
+        closed_loops.flights(count=256 if options.short else 1000),
         *identifying.measure(short=options.short),
         frequency.responses(repeats=repeats),
         frequency.fit(repeats=1),

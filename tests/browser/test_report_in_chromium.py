@@ -9,8 +9,13 @@ from typing import Any
 
 import pytest
 
+import swashplate as sp
 from report_samples import fit, modes, validation
+from swashplate.control.check import check_controller
+from swashplate.control.straightness import step_run
+from swashplate.reporting.control_check import control_report
 from swashplate.reporting.report import report
+from swashplate.reporting.straightness import straightness_report
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -45,6 +50,23 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "both": report(fit(name=NASTY), validation(name=NASTY), path=folder / "both.html", modes=modes()),
         "failed": report(fit(failed=True, simulated=True), path=folder / "failed.html", modes=modes()),
         "validation": report(None, validation(), path=folder / "validation.html", modes=modes()),
+    }
+
+
+@pytest.fixture(scope="module")
+def controllers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Reports about a controller: its check, and the paper's comparison of paths."""
+    folder = tmp_path_factory.mktemp("controllers")
+    coax = sp.vehicle("coax")
+    hover = sp.trim(coax)
+    runs = {
+        name: step_run(coax, sp.autopilot(coax, hover, mode="manual", decoupled=law), hover, command=0.2)
+        for name, law in (("without", False), ("with", True))
+    }
+    check = check_controller(coax, sp.autopilot(coax, hover), hover, duration=6.0)
+    return {
+        "check": control_report(check, path=folder / "check.html"),
+        "path": straightness_report(coax, runs, command=0.2, lag=17.0, path=folder / "path.html"),
     }
 
 
@@ -90,6 +112,28 @@ def test_draws_everything_and_fetches_nothing(visit: Any, name: str, size: str) 
     assert len(drawn) > 4
     assert all(each["svg"] > 0 and each["marks"] > 0 for each in drawn)
     assert all(abs(each["drawing"] - each["width"]) <= 1 for each in drawn)
+
+
+@pytest.mark.parametrize(("name", "size"), [("check", "telephone"), ("check", "desk"), ("path", "telephone")])
+def test_reports_about_controllers_draw_everything_in_its_place(
+    browser: Any, controllers: dict[str, Path], name: str, size: str
+) -> None:
+    seen = Visit(browser, controllers[name], SIZES[size])
+    assert seen.said == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+    page = seen.page
+    names = page.evaluate("Array.from(document.querySelectorAll('[id]'), e => e.id)")
+    names = [n for n in names if "-" in n or n.isalpha()]  # plotly's own are random
+    assert len(names) == len(set(names)), "two things of one name: a plot would land in the other"
+    drawn = page.evaluate(
+        "Array.from(document.querySelectorAll('.canvas'), c => c.querySelectorAll('svg.main-svg').length > 0"
+        " && c.querySelectorAll('.trace').length > 0)"
+    )
+    assert len(drawn) == {"check": 6, "path": 2}[name]
+    assert all(drawn)
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size][0]
+    page.close()
 
 
 @pytest.mark.parametrize("name", ["both", "failed"])

@@ -64,10 +64,24 @@ def test_json_says_what_the_table_says() -> None:
     [
         (("decouple", "coax", "--lag", "wrong"), "lag: is 'wrong', expected hover, motor, battery or a number."),
         (("decouple", "coax", "--lag", "44", "--mixing", "as_printed"), "no inverse at 45 deg"),
+        (("decouple", "coax", "--lag", "1e9"), "--lag: is 1e9 degrees, expected at most 180 either way"),
+        (("decouple", "coax", "--voltage", "nan"), "coax: voltage: is not a finite number"),
+        (("trim", "raptor50", "--climb", "nan"), "climb: is not a finite number"),
         (("decouple", "coax", "--out", "c.json"), "ends in '.json', expected .toml"),
         (("decouple", "coax", "--c", "c.h"), "ends in '.h', expected .c"),
         (("decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
         (("decouple", "coax", "--mode", "place", "--rate", "6"), "growing mode"),
+        (("decouple", "coax", "--step", "0.2", "--to-speed", "1.8"), "--step and --to-speed: are two steps"),
+        (("decouple", "coax", "--to-speed", "-1"), "--to-speed: is -1 m/s, expected a positive speed"),
+        (("decouple", "coax", "--to-speed", "40"), "reaches"),
+        (("decouple", "coax", "--report", "path.pdf"), "ends in '.pdf', expected .html"),
+        (("decouple", "raptor50"), "`swash control decouple` takes any linear model"),
+        (("control", "decouple", "raptor50", "--pair", "cyclic=p"), "has no input cyclic; it has theta0, B1, A1"),
+        (("control", "decouple", "hybrid", "--pair", "lateral=p", "--pair", "longitudinal=p"), "gives p to two inputs"),
+        (("control", "decouple", "hybrid", "--at", "1,0"), "--at: '1,0' is not all positive"),
+        (("control", "decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
+        (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("control", "check", "coax", "--controller", "x.toml", "--scale", "0"), "--scale: is 0, expected a positive"),
         (
             ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--pilot", "--out", "f.nc"),
             "--pilot: is for",
@@ -147,4 +161,94 @@ def test_many_flights_are_summarised_and_the_worst_is_kept(tmp_path: Path) -> No
     assert "moves yaw; with --monte-carlo a maneuver is a pilot's roll or pitch" in yaw.err
     windy = swash(*command[:7], "--maneuver", "doublet:pitch,1s", "--gusts", "indoor")
     assert windy.code == 2
-    assert "are for --monte-carlo" in windy.err
+    assert "--gusts: is for --monte-carlo" in windy.err
+
+
+def test_a_controller_is_checked_and_the_report_written(tmp_path: Path) -> None:
+    controller, out = tmp_path / "place.toml", tmp_path / "check"
+    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
+    outcome = swash("control", "check", "coax", "--controller", controller, "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert "all at once: gain +- 3.9 dB" in outcome.out
+    assert "provisional" in outcome.out
+    found = json.loads((out / "check.json").read_text())
+    assert found["margins"]["together"]["disc"] == pytest.approx(0.45, abs=0.01)
+    assert found["handling"]["phi"]["level"] == 2
+    assert found["steps"]["psi"]["overshoot"] == pytest.approx(0.19, abs=0.03)
+    assert not any(boundary["checked"] for boundary in found["boundaries"])
+    page = (out / "report.html").read_text()
+    assert "Disturbance rejection" in page
+    assert "Level 2" in page
+    for options, level in ((("--scale", "1"), 1), (("--task", "tracking"), 3)):
+        again = swash("control", "check", "coax", "--controller", controller, *options, "--json")
+        assert json.loads(again.out)["handling"]["phi"]["level"] == level
+
+
+def test_a_loop_that_does_not_stand_ends_with_2_and_is_still_reported(tmp_path: Path) -> None:
+    controller, out = tmp_path / "manual.toml", tmp_path / "check"
+    assert swash("decouple", "coax", "--out", controller, "--quiet").code == 0
+    outcome = swash("control", "check", "coax", "--controller", controller, "--out", out, "--quiet")
+    assert outcome.code == 2
+    assert "growing mode at +0.247" in outcome.err
+    assert "PROBLEM: No margins" in (out / "report.html").read_text()
+    other = swash("control", "check", "raptor50", "--controller", controller)
+    assert other.code == 2
+    assert "is for 'coax', not for 'conventional'" in other.err
+
+
+def test_the_papers_figure_as_a_report(tmp_path: Path) -> None:
+    page = tmp_path / "path.html"
+    outcome = swash("decouple", "coax", "--report", page, "--json")
+    assert outcome.code == 0, outcome.err
+    found = json.loads(outcome.out)["step"]
+    assert found["with"]["speed"] == pytest.approx(1.8, abs=0.01)
+    assert found["without"]["rightmost"] > 0.6
+    assert found["without"]["drift"] < -0.6
+    text = page.read_text()
+    assert "SIMULATED FLIGHT" in text
+    assert f"{found['with']['drift']:+.2f} m with it" in text
+
+
+def test_aircraft_that_differ_by_more_than_a_fit_says(tmp_path: Path) -> None:
+    controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
+    assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0
+    command = ("simulate", "--vehicle", "coax", "--controller", controller, "--out", worst)
+    many = (*command, "--maneuver", "doublet:pitch,1s,0.1", "--monte-carlo", "20")
+    scatter = ("--battery", "12.5-10.5", "--vary", "linkage_lower=10%", "--payload", "0.02", "--delay", "0.015")
+    outcome = swash(*many, *scatter)
+    assert outcome.code == 0, outcome.err
+    flight = sp.read(worst)
+    assert flight.values("voltage")[0] == pytest.approx(12.5, abs=0.01)
+    assert flight.values("voltage")[-1] == pytest.approx(10.5, abs=0.02)
+    drawn = next(step for step in flight.history if step.operation == "drawn").details
+    assert set(drawn["parameters"]) == {"linkage_lower", "mass"}
+    assert 0.0 < drawn["delay"] <= 0.015
+    for options, said in (
+        (("--vary", "weight=5%"), "weight: is not a number of the card"),
+        (("--tolerances",), "no number of the card has a sigma"),
+        (("--battery", "10.5-12.5"), "does not fall"),
+        (("--battery", "12.5-10.5", "--sag", "0.1"), "says what --voltage and --sag say"),
+    ):
+        refused = swash(*many, *options)
+        assert refused.code == 2
+        assert said in refused.err
+    alone = swash(*command, "--maneuver", "doublet:pitch,1s,0.1", "--delay", "0.01", "--payload", "0.1")
+    assert alone.code == 2
+    assert "--payload, --delay: is for --monte-carlo" in alone.err
+
+
+def test_any_linear_model_is_decoupled_with_its_ratios_against_frequency(tmp_path: Path) -> None:
+    out = tmp_path / "raptor.json"
+    outcome = swash("control", "decouple", "raptor50", "--at", "1,3", "--out", out)
+    assert outcome.code == 0, outcome.err
+    found = json.loads(out.read_text())
+    assert found["axes"] == {"inputs": ["A1", "B1"], "outputs": ["p", "q"]}
+    ratios = found["off_over_on_axis"]
+    assert set(ratios) >= {"bare", "matrix"}
+    for axis, bare in ratios["bare"].items():
+        assert ratios["matrix"][axis][1] < bare[1]  # at 3 rad/s, where the matrix was made
+    rigid = ("x", "y", "z", "psi", "u", "v", "w", "phi", "theta", "p", "q", "r")
+    refused = swash("control", "decouple", "raptor50", "--keep", ",".join(rigid), "--json")
+    assert refused.code == 2
+    assert "No filter" in refused.err
+    assert "matrix" in json.loads(refused.out)["off_over_on_axis"]

@@ -10,6 +10,7 @@ import typer
 
 from swashplate.cli import (
     bench,
+    control,
     data,
     decouple,
     demo,
@@ -84,6 +85,7 @@ app.command("derivatives", short_help="Stability and control derivatives, by con
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")
 app.add_typer(link.app, name="link")
+app.add_typer(control.app, name="control")
 app.add_typer(vehicles.app, name="vehicles")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)

@@ -16,8 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from swashplate.control.autopilot import Autopilot
-    from swashplate.simulation.trim import Trim
+    from swashplate.control.observed_autopilot import ObservedAutopilot
+    from swashplate.control.straightness import StepRun
     from swashplate.vehicles.vehicle import Vehicle
+
+
+_PAPERS_SPEED = 1.8  # m/s, Fankhauser et al., Fig. 10
 
 
 class Mode(StrEnum):
@@ -68,9 +72,21 @@ def decouple(
             "--step", help="Fly this step of the pitch command for 6 m, with and without the decoupling.", min=0.01
         ),
     ] = None,
+    to_speed: Annotated[
+        float | None,
+        typer.Option("--to-speed", help="The same with the step that reaches this speed [m/s]; the paper's is 1.8."),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="FILE", help="Compare the two paths as HTML; to 1.8 m/s without a --step."),
+    ] = None,
+    sensors: Annotated[
+        str | None,
+        typer.Option("--sensors", help="Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."),
+    ] = None,
     fit: Annotated[
         Path | None,
-        typer.Option("--fit", metavar="FILE", help="With --step: also on models drawn from a fit.json."),
+        typer.Option("--fit", metavar="FILE", help="With a step: also on models drawn from a fit.json."),
     ] = None,
     draws: Annotated[int, typer.Option("--draws", help="How many of them.", min=2)] = 500,
     seed: Annotated[int, typer.Option("--seed", help="Of the draws.", min=0)] = 0,
@@ -81,12 +97,22 @@ def decouple(
 
     The law inverts the lower rotor's equations with the model's numbers (Fankhauser et al., eqs 19 to 22).
     """
-    if fit is not None and step is None:
+    if step is not None and to_speed is not None:
+        raise SwashError("are two steps.", channel="--step and --to-speed", hint="Give one.")
+    if to_speed is not None and not to_speed > 0.0:
+        raise SwashError(f"is {to_speed:g} m/s, expected a positive speed.", channel="--to-speed")
+    if report is not None and report.suffix != ".html":
+        raise SwashError(f"ends in '{report.suffix}', expected .html.", where=report, channel="--report")
+    if report is not None and step is None and to_speed is None:
+        to_speed = _PAPERS_SPEED
+    if fit is not None and step is None and to_speed is None:
         raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
     if out is not None and out.suffix != ".toml":
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     if c_code is not None and c_code.suffix != ".c":
         raise SwashError(f"ends in '{c_code.suffix}', expected .c.", where=c_code, channel="--c")
+    if sensors is not None and (c_code is not None or out is None):
+        raise SwashError("goes into the file of --out; the C of --c takes measurements.", channel="--sensors")
     import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
@@ -98,6 +124,8 @@ def decouple(
     vehicle = sp.vehicle(model)
     hover = sp.trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage)
     named = lag in LAGS or lag.isalpha()
+    if not named and not abs(options.numbers(lag, option="--lag", count=1)[0]) <= 180.0:
+        raise SwashError(f"is {lag} degrees, expected at most 180 either way.", channel="--lag")
     wanted: Any = lag if named else math.radians(options.numbers(lag, option="--lag", count=1)[0])
     made = autopilot(
         vehicle,
@@ -111,12 +139,12 @@ def decouple(
     law, slowest = made.numbers.law, loop_modes(vehicle, made, hover)[0]
     if made.mode != "manual":  # a pilot damps what "manual" leaves alone
         require_stable(slowest, rate=made.rate, where=model)
-    margins = None if slowest.real > 0.0 or made.mode == "manual" else loop_margins(vehicle, made, hover)
+    margins = None if made.mode == "manual" else loop_margins(vehicle, made, hover)
     volts = float(hover.environment.voltage)
     motor = hover.commands()["motor_lower"]
     degrees = {u: math.degrees(estimated_lag(law, motor, u)) for u in (volts, volts - 1.0)}
     if out is not None:
-        save_controller(made, out)
+        save_controller(made if sensors is None else _on_estimates(vehicle, made, sensors, volts), out)
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code
@@ -140,10 +168,25 @@ def decouple(
             "together": {"disc": together.alpha, "gain": together.gain, "phase_deg": math.degrees(together.phase)},
         }
     flown = {}
-    if step is not None:
+    if step is not None or to_speed is not None:
+        from swashplate.control.robustness import draw_models
+        from swashplate.control.straightness import command_for_speed, step_run
+
+        if step is None:
+            assert to_speed is not None
+            step = command_for_speed(vehicle, made, hover, speed=to_speed)
         bare = autopilot(vehicle, hover, mode="manual", rate=rate, decoupled=False)
-        flown = _steps(vehicle, hover, {"without": bare, "with": made}, step, fit, draws, seed)
-        found["step"] = flown
+        drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+        runs = {
+            name: step_run(vehicle, controller, hover, command=step, parameters=drawn)
+            for name, controller in (("without", bare), ("with", made))
+        }
+        flown = _figures(runs, draws)
+        found["step"] = {"command": step, **flown}
+        if report is not None:
+            from swashplate.reporting.straightness import straightness_report
+
+            straightness_report(vehicle, runs, command=step, lag=degrees[volts], path=report)
     if json:
         typer.echo(as_json(found))
     elif not quiet:
@@ -164,46 +207,40 @@ def decouple(
         if margins is not None:
             typer.echo(f"\n{margins!r}")
         if flown:
+            typer.echo(f"\nstep of the pitch command: {step:.3f}")
             head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
             cells = [
                 (name, *(f"{entry[key]:+.2f}" for key in ("drift", "leftmost", "rightmost", "speed")), entry["models"])
                 for name, entry in flown.items()
             ]
-            typer.echo()
             console().print(table(head, cells))
         if code is not None:
             told = f"{code.operations} operations a step, {code.work_bytes} bytes of temporaries"
             typer.echo(f"\nC of one step: {told}")
-        written = ", ".join(str(path) for path in (out, c_code) if path is not None)
+        written = ", ".join(str(path) for path in (out, c_code, report) if path is not None)
         if written:
             typer.echo(f"\nWritten: {written}")
 
 
-def _steps(
-    vehicle: Vehicle,
-    hover: Trim,
-    controllers: Mapping[str, Autopilot],
-    command: float,
-    fit: Path | None,
-    draws: int,
-    seed: int,
-) -> dict[str, dict[str, Any]]:
+def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
+    from swashplate.control.lqg_design import design
+    from swashplate.control.observed_autopilot import ObservedAutopilot
+    from swashplate.control.sensor_suite import suite
+
+    return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
+
+
+def _figures(runs: Mapping[str, StepRun], draws: int) -> dict[str, dict[str, Any]]:
     """Paths on the step: of the model itself, and percentiles over drawn models."""
     import numpy as np
 
-    from swashplate.control.robustness import draw_models
-    from swashplate.control.straightness import step_paths
-
     figures = ("drift", "leftmost", "rightmost", "speed")
-    drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
     found: dict[str, dict[str, Any]] = {}
-    for name, controller in controllers.items():
-        path = step_paths(vehicle, controller, hover, command=command)
-        found[name] = {key: float(getattr(path, key)[0]) for key in figures} | {"models": "this one"}
-        if drawn is not None:
-            paths = step_paths(vehicle, controller, hover, command=command, size=draws, parameters=drawn)
-            arrived = int(np.sum(np.isfinite(paths.drift)))
+    for name, run in runs.items():
+        found[name] = {key: float(getattr(run.path, key)[0]) for key in figures} | {"models": "this one"}
+        if run.drawn is not None:
+            arrived = int(np.sum(np.isfinite(run.drawn.drift)))
             for percent in (5, 50, 95):
-                values = {key: float(np.nanpercentile(getattr(paths, key), percent)) for key in figures}
+                values = {key: float(np.nanpercentile(getattr(run.drawn, key), percent)) for key in figures}
                 found[f"{name}, {percent} %"] = values | {"models": f"{arrived} of {draws}"}
     return found

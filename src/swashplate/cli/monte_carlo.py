@@ -30,6 +30,11 @@ def fly(
     seed: int,
     voltage: float | None,
     sag: float,
+    battery: str | None = None,
+    tolerances: bool = False,
+    vary: list[str] | None = None,
+    payload: float = 0.0,
+    delay: float = 0.0,
 ) -> tuple[Spread, Flight]:
     """The summary of many flights, and the worst of them.
 
@@ -42,12 +47,18 @@ def fly(
         gusts: "none", "indoor" or a mean wind [m/s].
         seed: of draws, gusts and sensor noise.
         voltage, sag: the battery's at the start [V] and its fall [V/s].
+        battery: instead of both, its voltage at the start and at the end, "12.5-10.5".
+        tolerances: draw the card's numbers from their sigmas too.
+        vary: "NAME=SIGMA" or "NAME=PERCENT%" of the card's numbers.
+        payload: the most that an aircraft carries [kg].
+        delay: the longest of the commands to the actuators [s].
     """
     import numpy as np
 
     import swashplate as sp
     from swashplate.cli.simulate import from_file
     from swashplate.control.robustness import SENSOR_NOISE, draw_models, spread
+    from swashplate.control.variations import draw_delays, draw_numbers, load_them, tolerances_of
     from swashplate.simulation.closed_loop_batch import simulate_closed_loops
     from swashplate.simulation.wind import dryden
 
@@ -57,23 +68,35 @@ def fly(
             f"moves {', '.join(strange)}; with --monte-carlo a maneuver is a pilot's roll or pitch.",
             channel="--maneuver",
         )
-    hover = sp.trim(vehicle, voltage=voltage)
-    pilot = from_file(controller)(vehicle, hover)
+    ends = _battery(battery)
+    hover = sp.trim(vehicle, voltage=voltage if ends is None else ends[0])
+    drawn = {} if fit is None else draw_models(vehicle, fit, count=count, seed=seed)
+    sigmas = {
+        name: value for name, value in (tolerances_of(vehicle) if tolerances else {}).items() if name not in drawn
+    }
+    # Every source of randomness has its own seed, so that adding one leaves the others as they were.
+    drawn = draw_numbers(vehicle, sigmas | _varied(vehicle, vary), count=count, seed=seed + 1_000_003, about=drawn)
+    if payload:
+        drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
+    pilot = from_file(controller, seed=seed)(vehicle, hover)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)
     time = np.arange(samples) / pilot.rate
     setting = _setting(gusts)
+    fall = sag if ends is None else (ends[0] - ends[1]) / duration
+    late = draw_delays(most=delay, count=count, seed=seed + 3_000_003)
     flown = simulate_closed_loops(
         vehicle,
         pilot,
         duration=duration,
         size=count,
-        parameters=None if fit is None else draw_models(vehicle, fit, count=count, seed=seed),
+        parameters=drawn or None,
         reference=maneuver.signals(time - _LEAD),
         wind=None if setting is None else dryden(setting, samples=samples, rate=pilot.rate, seed=seed, count=count),
-        voltage=float(hover.environment.voltage) - sag * time,
-        noise=SENSOR_NOISE,
+        voltage=float(hover.environment.voltage) - fall * time,
+        noise=None if getattr(pilot.step, "feels", False) else SENSOR_NOISE,  # it brings its own sensors
+        delay=late,
         seed=seed,
         start=hover,
         rate=pilot.rate * max(1, round(_PHYSICS / pilot.rate)),
@@ -81,11 +104,36 @@ def fly(
     )
     found = spread(flown)
     try:
-        return found, flown.flight(found.worst)
+        worst = flown.flight(found.worst)
     except DivergenceError as error:
         if error.flight is None:
             raise
-        return found, error.flight  # type: ignore[return-value]
+        worst = error.flight  # type: ignore[assignment]
+    own = {name: float(values[found.worst]) for name, values in drawn.items()}
+    return found, worst.done("drawn", seed=seed, number=found.worst, delay=float(late[found.worst]), parameters=own)
+
+
+def _battery(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    from swashplate.cli.options import numbers
+
+    ends = numbers(text.replace("-", ","), option="--battery", count=2)
+    if not 0.0 < ends[1] <= ends[0]:
+        raise SwashError(f"'{text}' does not fall.", channel="--battery", hint="Example: --battery 12.5-10.5")
+    return ends[0], ends[1]
+
+
+def _varied(vehicle: Vehicle, texts: list[str] | None) -> dict[str, float]:
+    """`NAME=SIGMA` and `NAME=PERCENT%` as standard deviations."""
+    from swashplate.cli.options import assignments, numbers
+
+    found = {}
+    for name, text in assignments(texts, option="--vary").items():
+        value = numbers(text.removesuffix("%"), option="--vary", count=1)[0]
+        known = vehicle.card.parameters.get(name)
+        found[name] = value if known is None or not text.endswith("%") else abs(known.value) * value / 100.0
+    return found
 
 
 def _setting(gusts: str) -> Gusts | None:

@@ -49,7 +49,7 @@ def simulate(
     switched: given.Switch = None,
     controller: Annotated[
         Path | None,
-        typer.Option("--controller", metavar="FILE", help="A controller from `swash decouple`, instead of the hold."),
+        typer.Option("--controller", metavar="FILE", help="A file of `swash decouple` or `swash control design`."),
     ] = None,
     pilot: Annotated[
         bool,
@@ -65,6 +65,25 @@ def simulate(
     gusts: Annotated[
         str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
     ] = "none",
+    battery: Annotated[
+        str | None,
+        typer.Option("--battery", metavar="FROM-TO", help="With --monte-carlo: voltage at start and end, 12.5-10.5."),
+    ] = None,
+    tolerances: Annotated[
+        bool, typer.Option("--tolerances", help="With --monte-carlo: the card's numbers drawn from their sigmas.")
+    ] = False,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary", metavar="NAME=SIGMA", help="With --monte-carlo: a number of the card, also NAME=5%; repeatable."
+        ),
+    ] = None,
+    payload: Annotated[
+        float, typer.Option("--payload", help="With --monte-carlo: up to so much mass more [kg].", min=0.0)
+    ] = 0.0,
+    delay: Annotated[
+        float, typer.Option("--delay", help="With --monte-carlo: commands late by up to [s].", min=0.0, max=1.0)
+    ] = 0.0,
     rate: options.Rate = 100.0,
     quiet: options.Quiet = False,
 ) -> None:
@@ -81,8 +100,20 @@ def simulate(
     excitation, aircraft = parse(maneuver), given.vehicle_of(vehicle, None, switched)
     if pilot and controller is None:
         raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
-    if many is None and (fit is not None or gusts != "none"):
-        raise SwashError("are for --monte-carlo.", channel="--fit and --gusts", hint="Add --monte-carlo 100.")
+    scatter = {
+        "--fit": fit,
+        "--gusts": gusts != "none",
+        "--battery": battery,
+        "--tolerances": tolerances,
+        "--vary": vary,
+        "--payload": payload,
+        "--delay": delay,
+    }
+    alone = [name for name, wanted in scatter.items() if wanted] if many is None else []
+    if alone:
+        raise SwashError("is for --monte-carlo.", channel=", ".join(alone), hint="Add --monte-carlo 100.")
+    if battery is not None and (voltage is not None or sag):
+        raise SwashError("says what --voltage and --sag say.", channel="--battery", hint="Give one of them.")
     if many is not None:
         if controller is None:
             raise SwashError("needs a --controller.", channel="--monte-carlo", hint="`swash decouple` writes one.")
@@ -100,6 +131,11 @@ def simulate(
                 seed=seed,
                 voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
                 sag=sag,
+                battery=battery,
+                tolerances=tolerances,
+                vary=vary,
+                payload=payload,
+                delay=delay,
             )
             paths = _save(worst, out)
         if not quiet:
@@ -113,7 +149,7 @@ def simulate(
         flight = sp.simulate_maneuver(
             aircraft,
             excitation,
-            controller=hold if controller is None else from_file(controller),
+            controller=hold if controller is None else from_file(controller, seed=seed),
             pilot=pilot,
             speed=speed,
             voltage=aircraft.card.values().get("voltage_nominal") if voltage is None else voltage,
@@ -132,17 +168,25 @@ def simulate(
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
 
 
-def from_file(path: Path) -> Callable[[Vehicle, Trim], Controller]:
-    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle."""
+def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle.
+
+    Args:
+        path: the file.
+        seed: of the noise that a controller with sensors of its own sees.
+    """
     from swashplate.control.controller_file import read_controller
+    from swashplate.control.lqg import Lqg
+    from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.errors import ControllerError
 
     saved = read_controller(path)
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
-        if saved.vehicle != vehicle.name:
-            raise ControllerError(f"is for '{saved.vehicle}', not for '{vehicle.name}'.", where=path)
-        return saved
+        of = saved.vehicle if isinstance(saved.vehicle, str) else saved.vehicle.name
+        if of != vehicle.name:
+            raise ControllerError(f"is for '{of}', not for '{vehicle.name}'.", where=path)
+        return saved.starting_at(trim, seed=seed) if isinstance(saved, Lqg | ObservedAutopilot) else saved
 
     return make
 

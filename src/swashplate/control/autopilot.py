@@ -256,7 +256,11 @@ def autopilot(
         SwashError: for a vehicle with other inputs, an unknown mode, or a card that lacks a number.
     """
     if vehicle.input_names != CoaxInputs._fields:
-        raise SwashError(f"the autopilot is for inputs {', '.join(CoaxInputs._fields)}.", where=vehicle.name)
+        raise SwashError(
+            f"the autopilot is for inputs {', '.join(CoaxInputs._fields)}.",
+            where=vehicle.name,
+            hint="`swash control decouple` takes any linear model, `swash control design` any vehicle.",
+        )
     if mode not in MODES:
         raise SwashError(f"is '{mode}', expected {', '.join(MODES)}.", channel="mode")
     law = decoupler(vehicle, trim, lag=lag if decoupled else 0.0, speed=speed_terms and decoupled, mixing=mixing)

@@ -13,6 +13,11 @@ from swashplate.atomic import write_text
 from swashplate.control.autopilot import MODES, Autopilot, CyclicGains, Gains
 from swashplate.control.decoupling import Decoupler
 from swashplate.control.height_yaw import CoaxialRotors, HeightYawGains
+from swashplate.control.lqg import Lqg
+from swashplate.control.lqg_file import TYPE as LQG
+from swashplate.control.lqg_file import lqg_from, save_lqg
+from swashplate.control.observed_autopilot import TYPE as OBSERVED
+from swashplate.control.observed_autopilot import ObservedAutopilot, save_observed
 from swashplate.errors import ControllerError
 
 SCHEMA = 1
@@ -25,9 +30,18 @@ _GROUPS: dict[str, Any] = {
 }
 
 
-def save_controller(controller: Autopilot, path: str | Path) -> None:
+def save_controller(controller: Autopilot | Lqg | ObservedAutopilot, path: str | Path) -> None:
     """Write a controller as a TOML file."""
-    document = {
+    if isinstance(controller, Lqg):
+        save_lqg(controller, path)
+    elif isinstance(controller, ObservedAutopilot):
+        save_observed(controller, tomli_w.dumps(_autopilot_document(controller.autopilot)), path)
+    else:
+        write_text(path, tomli_w.dumps(_autopilot_document(controller)))
+
+
+def _autopilot_document(controller: Autopilot) -> dict[str, Any]:
+    return {
         "kind": "controller",
         "schema": SCHEMA,
         "type": TYPE,
@@ -37,10 +51,9 @@ def save_controller(controller: Autopilot, path: str | Path) -> None:
         "rate": controller.rate,
         **{name: getattr(controller.numbers, name)._asdict() for name in _GROUPS},
     }
-    write_text(path, tomli_w.dumps(document))
 
 
-def read_controller(path: str | Path) -> Autopilot:
+def read_controller(path: str | Path) -> Autopilot | Lqg | ObservedAutopilot:
     """A controller from its file.
 
     Raises:
@@ -58,6 +71,16 @@ def read_controller(path: str | Path) -> Autopilot:
             where=path,
             hint="`swash decouple MODEL --out FILE` writes one.",
         )
+    if document.get("type") == LQG:
+        return lqg_from(document, path)
+    if document.get("type") == OBSERVED:
+        observer = document.pop("observer", {})
+        law = _autopilot_from({**document, "type": TYPE}, path)
+        return ObservedAutopilot(law, lqg_from(observer, path))
+    return _autopilot_from(document, path)
+
+
+def _autopilot_from(document: dict[str, Any], path: str | Path) -> Autopilot:
     if document.get("type") != TYPE or document.get("schema") != SCHEMA:
         found = f"type {document.get('type')!r}, schema {document.get('schema')!r}"
         raise ControllerError(f"{found}: expected type '{TYPE}', schema {SCHEMA}.", where=path)

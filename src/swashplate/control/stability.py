@@ -1,37 +1,23 @@
-"""Modes of a vehicle under a sampled controller: the loop's own map from one sample to the next, linearised."""
+"""Modes and margins of a vehicle under a sampled controller, from the linearised map of `sampled_loop`."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control.margins import Margins, margins
-from swashplate.errors import ControllerError, SwashError
-from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
-from swashplate.simulation.dynamics import (
-    SURROUNDINGS,
-    Equations,
-    enable_double_precision,
-    equations_of,
-    parameter_row,
-    rk4_step,
-    row_rates,
-)
+from swashplate.control.sampled_loop import SampledLoop, sampled_loop
+from swashplate.errors import ControllerError
+from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
-Array = NDArray[np.float64]
-
-_SUBSTEPS = 10
 _LOWEST = 0.02
 """rad/s; below it an aircraft with integrators has gain to spare."""
 _SAMPLES = 20.0
 """Samples per period that a controller needs for a mode that it must hold."""
+_NEUTRAL = 1e-6
+"""1/s; a mode that grows slower is one that nobody asked to be held: the place of an aircraft that holds its speed."""
 _NO_STATE = 1e-8
 """Below this modulus an eigenvalue of the map is no mode: memory that every sample writes anew."""
 
@@ -50,9 +36,13 @@ def loop_modes(vehicle: Vehicle, controller: Controller, trim: Trim) -> NDArray[
     Raises:
         SwashError: where the loop is not finite there.
     """
-    matrix, _ = _map(vehicle, controller, trim)
-    values = np.linalg.eigvals(matrix).astype(np.complex128)
-    modes = np.log(values[np.abs(values) > _NO_STATE]) * controller.rate
+    return modes_of(sampled_loop(vehicle, controller, trim))
+
+
+def modes_of(loop: SampledLoop) -> NDArray[np.complex128]:
+    """The same for a loop that is already linearised."""
+    values = np.linalg.eigvals(loop.matrix).astype(np.complex128)
+    modes = np.log(values[np.abs(values) > _NO_STATE]) * loop.rate
     return np.asarray(modes[np.argsort(-modes.real, kind="stable")])
 
 
@@ -66,48 +56,23 @@ def loop_margins(vehicle: Vehicle, controller: Controller, trim: Trim, *, points
     Raises:
         ControllerError: where the closed loop is not stable: it has no margins.
     """
-    matrix, parts = _map(vehicle, controller, trim)
-    n, size = len(vehicle.state_names), matrix.shape[0]
-    slowest = np.max(np.abs(np.linalg.eigvals(matrix)))
-    if slowest >= 1.0:
-        require_stable(complex(loop_modes(vehicle, controller, trim)[0]), rate=controller.rate, where=vehicle.name)
-    by_state, by_input, command = parts
-    memory = slice(n, size)
-    w = np.geomspace(_LOWEST, np.pi * controller.rate * 0.999, points)
-    loop = []
-    for z in np.exp(1j * w / controller.rate):
-        plant = np.linalg.solve(z * np.eye(n) - by_state, by_input)
-        inner = np.linalg.solve(z * np.eye(size - n) - matrix[memory, memory], matrix[memory, :n])
-        loop.append(-(command[:, :n] + command[:, n:] @ inner) @ plant)
-    return margins(w, np.array(loop), vehicle.input_names)
+    return margins_of(sampled_loop(vehicle, controller, trim), points=points, where=vehicle.name)
 
 
-def _map(vehicle: Vehicle, controller: Controller, trim: Trim) -> tuple[Array, tuple[Array, Array, Array]]:
-    """The loop's map from sample to sample, and of it the vehicle by state, by input, and the command by both."""
-    enable_double_precision()
-    surroundings = np.array([getattr(trim.environment, name) for name in SURROUNDINGS], dtype=np.float64)
-    states = trim.states()
-    reference = np.array([states.get(name, 0.0) for name in REFERENCES])
-    found = _jacobians(
-        equations_of(vehicle),
-        controller.step,
-        trim.state,
-        controller.memory,
-        controller.gains,
-        reference,
-        surroundings,
-        parameter_row(vehicle, trim.environment),
-        np.array(vehicle.input_limits).T,
-        1.0 / controller.rate,
-    )
-    by_state, by_input, command, memory = (np.asarray(part, dtype=np.float64) for part in found)
-    n = len(vehicle.state_names)
-    states_after = by_input @ command
-    states_after[:, :n] += by_state
-    matrix = np.concatenate([states_after, memory])
-    if not np.all(np.isfinite(matrix)):
-        raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
-    return matrix, (by_state, by_input, command)
+def frequencies_of(loop: SampledLoop, *, points: int) -> NDArray[np.float64]:
+    """The grid [rad/s] from 0.02 rad/s to Nyquist's frequency, shape (points,)."""
+    return np.geomspace(_LOWEST, np.pi * loop.rate * 0.999, points)
+
+
+def margins_of(loop: SampledLoop, *, points: int = 400, where: str = "") -> Margins:
+    """The same for a loop that is already linearised.
+
+    Raises:
+        ControllerError: where the closed loop is not stable.
+    """
+    require_stable(complex(modes_of(loop)[0]), rate=loop.rate, where=where)
+    w = frequencies_of(loop, points=points)
+    return margins(w, loop.opened(w), loop.inputs)
 
 
 def require_stable(mode: complex, *, rate: float, where: str) -> None:
@@ -119,9 +84,10 @@ def require_stable(mode: complex, *, rate: float, where: str) -> None:
         where: the model.
 
     Raises:
-        ControllerError: where the mode grows; fewer than `_SAMPLES` samples per period are named as the likely reason.
+        ControllerError: where the mode grows (one at the origin does not); fewer than `_SAMPLES` samples per period are
+            named as the likely reason.
     """
-    if mode.real < 0.0:
+    if mode.real < _NEUTRAL:
         return
     frequency = abs(mode) / (2.0 * np.pi)
     slow = frequency * _SAMPLES > rate
@@ -130,38 +96,3 @@ def require_stable(mode: complex, *, rate: float, where: str) -> None:
         where=where,
         hint=f"Run it at {_SAMPLES * frequency:.0f} Hz or more." if slow else "Change its gains.",
     )
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _jacobians(
-    equations: Equations,
-    control: Step,
-    x: Any,
-    memory: Any,
-    gains: Any,
-    reference: Any,
-    surroundings: Any,
-    p: Any,
-    limits: Any,
-    dt: Any,
-) -> Any:
-    rates = row_rates(equations, padded=False)
-    n = x.shape[0]
-
-    def deciding(both: Any) -> tuple[Any, Any]:
-        measured = jnp.concatenate([both[:n], surroundings[-1:]])
-        after, command = control(both[n:], 0.0, measured, reference, gains)
-        return jnp.clip(command, limits[0], limits[1]), after
-
-    def flying(x: Any, command: Any) -> Any:
-        w = jnp.concatenate([command, surroundings])
-
-        def substep(x: Any, _: Any) -> tuple[Any, None]:
-            return rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt / _SUBSTEPS), None
-
-        return jax.lax.scan(substep, x, None, length=_SUBSTEPS)[0]  # a loop: unrolled it takes a minute to compile
-
-    both = jnp.concatenate([x, memory])
-    by_state, by_input = jax.jacfwd(flying, argnums=(0, 1))(x, deciding(both)[0])
-    command, after = jax.jacfwd(deciding)(both)
-    return by_state, by_input, command, after

@@ -10,11 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import ControllerError
+from swashplate.flights.flight import Flight
+from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+
+_TRACKS = 60
+"""Drawn models whose tracks are kept, for a plot."""
+_HALVINGS = 16
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,23 @@ class Path:
     rightmost: Array
     speed: Array
     time: Array
+
+
+@dataclass(frozen=True)
+class StepRun:
+    """The step flown with one controller.
+
+    Attributes:
+        flight: of the model itself, until the distance is covered.
+        path: of it, one entry each.
+        drawn: paths of drawn models, None where there are none.
+        tracks: place ahead and to the right of some of them, until the distance is covered [m].
+    """
+
+    flight: Flight
+    path: Path
+    drawn: Path | None
+    tracks: tuple[tuple[Array, Array], ...]
 
 
 def step_paths(
@@ -60,7 +83,93 @@ def step_paths(
     Raises:
         ControllerError: where no flight covers the distance.
     """
-    flown = simulate_closed_loops(
+    flown = _fly(vehicle, controller, trim, command, duration, size, parameters)
+    return _paths(flown, command, distance)
+
+
+def step_run(
+    vehicle: Vehicle,
+    controller: Autopilot,
+    trim: Trim,
+    *,
+    command: float,
+    distance: float = 6.0,
+    duration: float = 10.0,
+    parameters: Mapping[str, Array] | None = None,
+) -> StepRun:
+    """The same with the flights themselves, of the model and of drawn models.
+
+    Args:
+        vehicle, controller, trim, command, distance, duration: as in `step_paths`.
+        parameters: numbers of the drawn models by name, shape (models,) each.
+
+    Raises:
+        ControllerError: where no flight covers the distance.
+    """
+    own = _fly(vehicle, controller, trim, command, duration, 1, None)
+    path = _paths(own, command, distance)
+    flight = own.flight(0).between(0.0, float(path.time[0]))
+    if not parameters:
+        return StepRun(flight, path, None, ())
+    size = len(next(iter(parameters.values())))
+    many = _fly(vehicle, controller, trim, command, duration, size, parameters)
+    drawn = _paths(many, command, distance)
+    tracks = []
+    for i in range(min(size, _TRACKS)):
+        until = many.time <= (drawn.time[i] if np.isfinite(drawn.time[i]) else duration)
+        tracks.append((many["x"][until, i], many["y"][until, i]))
+    return StepRun(flight, path, drawn, tuple(tracks))
+
+
+def command_for_speed(
+    vehicle: Vehicle,
+    controller: Autopilot,
+    trim: Trim,
+    *,
+    speed: float,
+    distance: float = 6.0,
+    duration: float = 10.0,
+) -> float:
+    """The step of the pitch command after which an aircraft gets this fast before it has covered the distance.
+
+    Args:
+        vehicle, controller, trim, distance, duration: as in `step_paths`.
+        speed: ahead [m/s].
+
+    Raises:
+        ControllerError: where the full stick is not enough.
+    """
+    low, high = 0.0, 1.0
+    fastest = 0.0
+    for _ in range(_HALVINGS):
+        command = 0.5 * (low + high) if fastest else high
+        flown = _fly(vehicle, controller, trim, command, duration, 1, None)
+        x, y, u = (flown[name][:, 0] for name in ("x", "y", "u"))
+        covered = np.flatnonzero(~(np.hypot(x, y) < distance))
+        reached = float(np.nanmax(u[: covered[0] + 1] if covered.size else u))
+        if not fastest:
+            fastest = reached
+            if not fastest >= speed:
+                raise ControllerError(
+                    f"reaches {fastest:.2f} m/s with the full stick over {distance:g} m, not {speed:g} m/s.",
+                    where=vehicle.name,
+                    hint="Ask for less speed.",
+                )
+            continue
+        low, high = (command, high) if reached < speed else (low, command)
+    return 0.5 * (low + high)
+
+
+def _fly(
+    vehicle: Vehicle,
+    controller: Autopilot,
+    trim: Trim,
+    command: float,
+    duration: float,
+    size: int,
+    parameters: Mapping[str, ArrayLike] | None,
+) -> Batch:
+    return simulate_closed_loops(
         vehicle,
         controller,
         duration=duration,
@@ -70,13 +179,16 @@ def step_paths(
         start=trim,
         rate=controller.rate * max(1, round(500.0 / controller.rate)),
     )
+
+
+def _paths(flown: Batch, command: float, distance: float) -> Path:
     x, y, u = flown["x"], flown["y"], flown["u"]
     covered = np.hypot(x, y) >= distance
     arrived = np.any(covered, axis=0)
     if not np.any(arrived):
         raise ControllerError(
-            f"no flight covers {distance:g} m in {duration:g} s with a pitch command of {command:g}.",
-            where=vehicle.name,
+            f"no flight covers {distance:g} m in {flown.time[-1]:.0f} s with a pitch command of {command:g}.",
+            where=flown.vehicle.name,
             hint="Give a larger step or more time.",
         )
     last = np.argmax(covered, axis=0)

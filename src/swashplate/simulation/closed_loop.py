@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any, Protocol
 
 import jax
@@ -16,6 +15,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.flights.maneuvers import parse as parse_maneuver
 from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -23,6 +23,7 @@ from swashplate.simulation.dynamics import (
     equations_of,
     parameter_row,
     rk4_step_looped,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence, simulated_flight
@@ -45,7 +46,8 @@ class Controller(Protocol):
         memory: its state at the start, a row of numbers.
         gains: its numbers, a row, so that other gains compile nothing anew.
         step: a module's function `(memory, time, measured, reference, gains) -> (memory, inputs)`; `measured` is the
-            vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it.
+            vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it. A step with
+            an attribute `feels` that is true is given the specific force at the centre of gravity between the two.
     """
 
     @property
@@ -103,7 +105,8 @@ def simulate_closed_loop(
     at_start = dict(zip(vehicle.state_names, x0, strict=True))
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
-    states, inputs = _fly(
+    fly = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly
+    states, inputs = fly(
         equations_of(vehicle),
         controller.step,
         round(every),
@@ -123,8 +126,7 @@ def simulate_closed_loop(
     return flight
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _fly(
+def _flying(
     equations: Equations,
     control: Step,
     every: int,
@@ -142,10 +144,17 @@ def _fly(
     def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
         x, memory, command, k = carry
         surroundings, reference, excitation = now
-        measured = jnp.concatenate([x, surroundings[-1:]])
-        fresh_memory, fresh = control(memory, k * dt, measured, reference, gains)
+        measured = told(control, equations, x, jnp.clip(command, limits[0], limits[1]), surroundings, p)
         due = k % every == 0
-        memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
+
+        def decided() -> tuple[Any, Any]:
+            return control(memory, k * dt, measured, reference, gains)
+
+        if getattr(control, "feels", False):  # too much work to be thrown away between its samples
+            memory, command = jax.lax.cond(due, decided, lambda: (memory, command))
+        else:
+            fresh_memory, fresh = decided()
+            memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
         inputs = jnp.clip(command + excitation, limits[0], limits[1])
         w = jnp.concatenate([inputs, surroundings])
         after = rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
@@ -154,6 +163,18 @@ def _fly(
     nothing = jnp.zeros(added.shape[1])
     _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, 0), (around, wanted, added))
     return record  # type: ignore[no-any-return]
+
+
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2))
+# An observer's derivatives take minutes to compile as XLA usually does it.
+_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+
+
+def told(control: Step, equations: Equations, x: Any, inputs: Any, surroundings: Any, p: Any) -> Any:
+    """What a controller is given as `measured`: the state, the specific force if it feels it, the voltage."""
+    if not getattr(control, "feels", False):
+        return jnp.concatenate([x, surroundings[-1:]])
+    return jnp.concatenate([x, row_force(equations)(x, jnp.concatenate([inputs, surroundings]), p), surroundings[-1:]])
 
 
 def _table(names: tuple[str, ...], given: Mapping[str, ArrayLike], n: int, default: list[Any]) -> Array:

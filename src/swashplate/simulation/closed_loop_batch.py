@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Any
 
 import jax
@@ -17,6 +16,7 @@ from swashplate.errors import CardError, SwashError
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -24,6 +24,7 @@ from swashplate.simulation.dynamics import (
     equations_of,
     parameter_row,
     rk4_step,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.trigonometry import vector_backend
@@ -48,6 +49,7 @@ def simulate_closed_loops(
     wind: Mapping[str, ArrayLike] | None = None,
     voltage: ArrayLike | None = None,
     noise: Mapping[str, float] | None = None,
+    delay: ArrayLike = 0.0,
     seed: int = 0,
     start: Trim | None = None,
     rate: float = 500.0,
@@ -65,6 +67,8 @@ def simulate_closed_loops(
         reference: as in `simulate_closed_loop`, numbers or series (n,) at the controller's rate, the same for all.
         wind, voltage: numbers, series (n,) or (n, size) at the controller's rate, held between samples.
         noise: standard deviation of the white noise on a measured state, by its name [its unit].
+        delay: of each vehicle's commands on their way to the actuators [s], a number or shape (size,); to the nearest
+            step of the physics. Before the first command arrives the actuators get those of the start.
         seed: of that noise.
         start: where all start; the hover of `vehicle` where it is not given.
         rate: of the physics [Hz], a whole multiple of the controller's.
@@ -98,6 +102,10 @@ def simulate_closed_loops(
         if name not in vehicle.parameter_names:
             raise CardError("is not a parameter of the vehicle.", where=vehicle.name, channel=name)
         p[vehicle.parameter_names.index(name)] = values
+    late = np.round(np.broadcast_to(np.asarray(delay, dtype=np.float64), (size,)) * rate)
+    if not np.all(late >= 0.0):
+        raise SwashError("is negative or no number.", channel="delay")
+    waiting = int(np.ceil(late.max() / round(substeps)))
     sigma = np.zeros(len(vehicle.state_names))
     for name, value in (noise or {}).items():
         sigma[vehicle.index(name)] = value
@@ -106,20 +114,24 @@ def simulate_closed_loops(
         part = slice(first, min(first + BLOCK, size))
         count = part.stop - first
         key = jax.random.fold_in(jax.random.key(seed), first)
-        found = _fly_many(
+        fly = _fly_many_quickly_compiled if getattr(controller.step, "feels", False) else _fly_many
+        found = fly(
             equations_of(vehicle),
             controller.step,
             round(substeps),
             keep,
             bool(np.any(sigma)),
+            waiting,
             np.repeat(begin.state[:, None], count, axis=1),
-            np.repeat(np.asarray(controller.memory)[:, None], count, axis=1),
+            _memories(controller, seed + first + np.arange(count)),
             np.asarray(controller.gains),
             around if around.shape[2] == 1 else around[:, :, part],
             wanted,
             p[:, part],
             np.array(vehicle.input_limits).T[:, :, None],
             sigma[:, None],
+            late[part].astype(int),
+            begin.inputs,
             key,
             1.0 / rate,
         )
@@ -133,6 +145,13 @@ def simulate_closed_loops(
     return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
 
 
+def _memories(controller: Controller, seeds: NDArray[np.int64]) -> Array:
+    """A column per vehicle; a controller that draws its sensors' biases and noise draws others for each."""
+    if hasattr(controller, "memories"):
+        return np.asarray(controller.memories(seeds))
+    return np.repeat(np.asarray(controller.memory)[:, None], len(seeds), axis=1)
+
+
 def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
     """A series (samples, size or 1) from a number, (n,) or (n, size) with n at least the samples."""
     given = np.asarray(values, dtype=np.float64)
@@ -144,13 +163,13 @@ def _series(name: str, values: ArrayLike, samples: int, size: int) -> Array:
     return np.broadcast_to(table[:samples], (samples, size))
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
-def _fly_many(
+def _flying_many(
     equations: Equations,
     control: Step,
     substeps: int,
     keep: int,
     noisy: bool,
+    waiting: int,
     x0: Any,
     memory: Any,
     gains: Any,
@@ -159,6 +178,8 @@ def _fly_many(
     p: Any,
     limits: Any,
     sigma: Any,
+    late: Any,
+    first: Any,
     key: Any,
     dt: Any,
 ) -> tuple[Any, Any]:
@@ -169,23 +190,46 @@ def _fly_many(
     deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
     voltage = SURROUNDINGS.index("voltage")
 
-    def sample(carry: tuple[Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
-        x, memory, k = carry
+    feels = getattr(control, "feels", False)
+    feeling: Any = jax.vmap(row_force(equations, xp=vector_backend()), in_axes=(1, 1, 1), out_axes=1)
+
+    def arrived(sent: Any, j: Any) -> Any:
+        """What the actuators get in step j of a sample: the command of so many samples ago."""
+        ago = jnp.clip(-((j - late) // substeps), 0, waiting)
+        return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
+
+    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
+        x, memory, sent, k = carry
         surroundings, reference = now
         measured = x
         if noisy:
             measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
-        measured = jnp.concatenate([measured, surroundings[voltage][None]])
+        acting = arrived(sent, substeps - 1) if waiting else sent[0]  # until now
+        felt = [feeling(x, jnp.concatenate([acting, surroundings]), p)] if feels else []
+        measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
         inputs = jnp.clip(command, limits[0], limits[1])
-        w = jnp.concatenate([inputs, surroundings])
-        after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
-        return (after, memory, k + 1), (x, inputs)
+        if not waiting:
+            w = jnp.concatenate([inputs, surroundings])
+            after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
+            return (after, memory, inputs[None], k + 1), (x, inputs)
+        sent = jnp.concatenate([inputs[None], sent[:-1]])
+
+        def step(x: Any, j: Any) -> tuple[Any, None]:
+            return flying(x, jnp.concatenate([arrived(sent, j), surroundings]), p), None
+
+        after, _ = jax.lax.scan(step, x, jnp.arange(substeps))
+        return (after, memory, sent, k + 1), (x, arrived(sent, 0))
 
     def kept(carry: Any, now: Any) -> Any:
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
         return carry, (x[0], inputs[0])
 
     tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted))
-    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), 0), tables)
+    sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
+    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), sent, 0), tables)
     return record  # type: ignore[no-any-return]
+
+
+_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5))
+_fly_many_quickly_compiled = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5), compiler_options=QUICK_TO_COMPILE)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import compile_small_loops_whole
+from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
@@ -126,6 +127,19 @@ def row_rates(equations: Equations, *, padded: bool, xp: JaxBackend | None = Non
         )
 
     return rates
+
+
+def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates:
+    """`f(x, w, p)`: the specific force at the centre of gravity [m/s^2], three numbers; rows as in `row_rates`."""
+    vehicle, operations = equations.vehicle, xp or jax_backend()
+
+    def felt(x: Any, w: Any, p: Any) -> Any:
+        u, parameters, environment = unpack_rows(equations, w, p)
+        nested = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
+        commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
+        return jnp.stack(vehicle.specific_force(nested, commands, parameters, environment, operations))
+
+    return felt
 
 
 def rk4_step_looped(rates: Callable[[Any, Any], Any], x: Any, w: Callable[[Any], Any], dt: Any) -> Any:

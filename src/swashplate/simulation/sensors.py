@@ -20,11 +20,9 @@ from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
     equations_of,
-    jax_backend,
     parameter_row,
-    unpack_rows,
+    row_force,
 )
-from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -193,12 +191,5 @@ def specific_forces(flight: Flight, vehicle: Vehicle, *, environment: Environmen
 
 @partial(jax.jit, static_argnums=0)
 def _specific_forces(equations: Equations, states: Any, rows: Any, p: Any) -> Any:
-    vehicle = equations.vehicle
-
-    def one(x: Any, w: Any) -> Any:
-        u, parameters, environment = unpack_rows(equations, w, p)
-        nested = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
-        commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
-        return jax.numpy.stack(vehicle.specific_force(nested, commands, parameters, environment, jax_backend()))
-
-    return jax.vmap(one)(states, rows)
+    felt = row_force(equations)
+    return jax.vmap(lambda x, w: felt(x, w, p))(states, rows)

@@ -128,6 +128,11 @@ def trim(
     course = np.array([speed, lateral, -climb, heading, turn, -height])
     row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
     p = parameter_row(vehicle, surroundings)
+    asked = {"speed": speed, "lateral": lateral, "climb": climb, "turn": turn, "heading": heading, "height": height}
+    around = dict(zip(SURROUNDINGS, row.tolist(), strict=True))
+    strange = [name for name, value in (asked | around).items() if not np.isfinite(value)]
+    if strange:
+        raise TrimError("is not a finite number.", where=vehicle.name, channel=", ".join(strange))
 
     def residual(z: Array) -> tuple[Array, Array]:
         value, slope = _residual(equations, z, course, row, p)

@@ -1,0 +1,69 @@
+"""Closed-loop CoaX flights in gusts with sensor noise, many at once, against one flight after the other."""
+
+from __future__ import annotations
+
+import resource
+import time
+
+import numpy as np
+
+from benchmarks.timing import Span
+from swashplate.control.autopilot import autopilot
+from swashplate.control.robustness import SENSOR_NOISE, spread
+from swashplate.control.variations import draw_numbers
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.trim import trim
+from swashplate.simulation.wind import INDOOR, dryden
+from swashplate.vehicles.catalogue import vehicle as load_vehicle
+
+SECONDS, CONTROLLER, PHYSICS = 20.0, 100.0, 500.0
+WITHIN, OF = 30.0, 1000
+"""Seconds that are promised for so many flights."""
+MEMORY = 2.0  # GB
+
+
+def flights(*, count: int, one_by_one: int = 5) -> Span:
+    """The controller at 100 Hz, the physics at 500 Hz; the second call in a process, gusts and draws included."""
+    coax = load_vehicle("coax")
+    hover = trim(coax)
+    place = autopilot(coax, hover, rate=CONTROLLER)
+    samples = round(SECONDS * CONTROLLER)
+
+    def run() -> None:
+        many = simulate_closed_loops(
+            coax,
+            place,
+            duration=SECONDS,
+            size=count,
+            parameters=draw_numbers(coax, {"mass": 0.005}, count=count, seed=0),
+            wind=dryden(INDOOR, samples=samples, rate=CONTROLLER, seed=0, count=count),
+            noise=SENSOR_NOISE,
+            start=hover,
+            rate=PHYSICS,
+            keep=5,
+        )
+        assert spread(many).lost == 0
+
+    run()
+    begin = time.perf_counter()
+    run()
+    seconds = time.perf_counter() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+    gusts = {
+        name: np.repeat(series[:, 0], round(PHYSICS / CONTROLLER))
+        for name, series in dryden(INDOOR, samples=samples + 1, rate=CONTROLLER, seed=0).items()
+    }
+    n = round(SECONDS * PHYSICS) + 1
+    gusts = {name: series[:n] for name, series in gusts.items()}
+
+    def one() -> None:
+        simulate_closed_loop(coax, place, duration=SECONDS, wind=gusts, start=hover, rate=PHYSICS)
+
+    one()
+    begin = time.perf_counter()
+    for _ in range(one_by_one):
+        one()
+    single = (time.perf_counter() - begin) / one_by_one
+    note = f"{single * count / seconds:.1f} times faster than one after the other; peak of the process {peak:.2f} GB"
+    return Span(f"{count} closed-loop flights of 20 s", seconds, WITHIN * count / OF, note, kept=peak < MEMORY)

@@ -1,0 +1,341 @@
+"""A linear-quadratic controller with an observer, one pure step: readings in, commands out.
+
+`Lqg` is a controller for `simulate_closed_loop`: there its step first makes the readings from the true flight, with
+noise, biases, rates and delays, and holds the commands back by their delays. `lqg_step`, what an aircraft runs, sees
+readings only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.control import observer
+from swashplate.control.lqg_law import LAW_MEMORY, Feedback, lqr_law
+from swashplate.control.matrices import JaxMatrices, Matrices
+from swashplate.control.observer import Estimate, Numbers, Plan
+from swashplate.control.sensor_suite import BIASED, readings
+from swashplate.errors import ControllerError
+from swashplate.physics.frames import Vector
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.trim import Trim
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+_BODY = len(RigidBody._fields)
+
+
+Law = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
+"""(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""
+
+
+class Carried(NamedTuple):
+    """What a step carries to the next.
+
+    Attributes:
+        estimate: of the observer.
+        given: commands, newest first, a row per sample, as many as the longest delay and one.
+        counts: samples since each sensor last took a reading.
+        law: memory of the feedback.
+    """
+
+    estimate: Estimate
+    given: list[list[Any]]
+    counts: list[Any]
+    law: list[Any]
+
+
+def late_inputs(plan: Plan) -> list[int]:
+    """The input of each late command, in the order of the design's states."""
+    return [j for j, delay in enumerate(plan.delays) for _ in range(delay)]
+
+
+def lqg_step(
+    plan: Plan,
+    numbers: Numbers,
+    feedback: Feedback,
+    carried: Carried,
+    y: Any,
+    voltage: Any,
+    reference: list[Any],
+    M: Matrices,
+    law: Law | None = None,
+) -> tuple[Carried, list[Any]]:
+    """One step of the controller.
+
+    Args:
+        plan, numbers, feedback: the controller.
+        carried: from the last step.
+        y: readings of all channels, a column; those not due may be anything finite. Without sensors the states.
+        voltage: the battery's [V].
+        reference: the row of `REFERENCES`.
+        M: the operations.
+        law: another feedback on the estimates than the linear-quadratic one.
+
+    Returns:
+        What is carried on, and the commands within their limits.
+    """
+    xp, late = M.xp, late_inputs(plan)
+    before = [carried.given[delay][j] for j, delay in enumerate(plan.delays)]
+    waiting = [carried.given[ago][j] for j, delay in enumerate(plan.delays) for ago in range(delay)]
+    estimate = carried.estimate
+    taken, counts = [], []
+    if plan.sensors:
+        due = [
+            xp.where(xp.abs(count - at.arrives) < 0.5, 1.0, 0.0)
+            for count, at in zip(carried.counts, plan.sampling, strict=True)
+        ]
+        taken = [xp.where(count < 0.5, 1.0, 0.0) for count in carried.counts]
+        counts = [
+            xp.where(count > at.every - 1.5, 0.0, count + 1.0)
+            for count, at in zip(carried.counts, plan.sampling, strict=True)
+        ]
+        estimate, _, _ = observer.corrected(plan, numbers, estimate, y, due, M.column([*before, voltage]), M)
+        x = M.scalars(estimate.mean)[: plan.n]
+    else:
+        x = M.scalars(y)
+    names = plan.equations.vehicle.state_names
+    decided = law or partial(lqr_law, names=names, late_of=late, feedback=feedback, dt=plan.dt, M=M)
+    kept, commands = decided(carried.law, x, waiting, voltage, reference)
+    given = [commands, *carried.given[:-1]]
+    if plan.sensors:
+        acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
+        estimate = observer.predicted(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
+    return Carried(estimate, given, counts, kept), commands
+
+
+# ---- rows --------------------------------------------------------------------------------------------------------
+def carried_size(plan: Plan) -> int:
+    N = len(plan.names) if plan.sensors else 0
+    return N + N * N + (max(plan.delays) + 1) * plan.inputs + len(plan.sensors) + LAW_MEMORY
+
+
+def carried_from(plan: Plan, row: Any) -> Carried:
+    """What is carried, from a flat row."""
+    N = len(plan.names) if plan.sensors else 0
+    m, depth, sensors = plan.inputs, max(plan.delays) + 1, len(plan.sensors)
+    mean, covariance, rest = row[:N, None], row[N : N + N * N].reshape(N, N), row[N + N * N :]
+    given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
+    rest = rest[depth * m :]
+    return Carried(
+        Estimate(mean, covariance),
+        given,
+        [rest[i] for i in range(sensors)],
+        [rest[sensors + i] for i in range(LAW_MEMORY)],
+    )
+
+
+def carried_row(carried: Carried) -> Any:
+    flat = [value for row in carried.given for value in row] + carried.counts + carried.law
+    return jnp.concatenate(
+        [carried.estimate.mean.ravel(), carried.estimate.covariance.ravel(), jnp.stack([jnp.asarray(v) for v in flat])]
+    )
+
+
+def _shapes(plan: Plan, speeds: int) -> list[tuple[int, ...]]:
+    n, m, late = plan.n, plan.inputs, sum(plan.delays)
+    N, channels = len(plan.names), len(plan.channels)
+    parameters = len(plan.equations.vehicle.parameter_names) + 2
+    of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), ()]
+    return [(parameters,), (6,), (N,), (channels,), *of_feedback]
+
+
+def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
+    return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in (*numbers, *feedback)])
+
+
+def numbers_from(plan: Plan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
+    parts, place = [], 0
+    for shape in _shapes(plan, speeds):
+        size = int(np.prod(shape))
+        parts.append(row[place : place + size].reshape(shape))
+        place += size
+    return Numbers(*parts[: len(Numbers._fields)]), Feedback(*parts[len(Numbers._fields) :])
+
+
+# ---- in simulation -----------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class SensedStep:
+    """The controller with its sensors, as `simulate_closed_loop` calls it; equal for equal plans.
+
+    `measured` is the true state row, the specific force at the centre of gravity (`feels`), and the voltage.
+    """
+
+    plan: Plan
+    speeds: int
+    feels: bool = True
+
+    @property
+    def depth(self) -> int:
+        """Readings kept until they arrive, in samples."""
+        return max((at.late for at in self.plan.sampling), default=0) + 1
+
+    def __call__(self, memory: Any, time: Any, measured: Any, reference: Any, gains: Any) -> tuple[Any, Any]:
+        plan, M = self.plan, JaxMatrices()
+        inner = carried_size(plan)
+        numbers, feedback = numbers_from(plan, self.speeds, gains)
+        carried, own = carried_from(plan, memory[:inner]), memory[inner:]
+        voltage = measured[-1]
+        if plan.sensors:
+            y, own = self._read(own, measured[:_BODY], measured[-4:-1], numbers)
+        else:
+            y = measured[: plan.n, None]
+        wanted = [reference[i] for i in range(reference.shape[0])]
+        after, _ = lqg_step(plan, numbers, feedback, carried, y, voltage, wanted, M, self.law(gains))
+        acting = jnp.stack([jnp.asarray(after.given[delay][j]) for j, delay in enumerate(plan.delays)])
+        return jnp.concatenate([carried_row(after), own]), acting
+
+    def law(self, gains: Any) -> Law | None:
+        """The feedback, where it is not the linear-quadratic one."""
+        return None
+
+    def _read(self, own: Any, x: Any, force: Any, numbers: Numbers) -> tuple[Any, Any]:
+        """Readings that arrive now, and what the sensors carry: biases, seed, count, the last readings."""
+        plan = self.plan
+        nb, channels = len(plan.biases), len(plan.channels)
+        bias, seed, count = own[:nb], own[nb], own[nb + 1]
+        queue = own[nb + 2 :].reshape(self.depth, channels)
+        now = true_readings(plan, x, force, bias)
+        queue = jnp.where(count < 0.5, jnp.broadcast_to(now, queue.shape), jnp.concatenate([now[None], queue[:-1]]))
+        key = jax.random.fold_in(jax.random.key(seed.astype(int)), count.astype(int))
+        drawn = jax.random.normal(key, (channels + nb,))
+        place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
+        arrived = jnp.stack([queue[late, i] for i, late in enumerate(place)])
+        noisy = arrived + jnp.sqrt(numbers.measurement) * drawn[:channels]
+        wander = jnp.sqrt(numbers.process[plan.n + 6 : plan.n + 6 + nb])
+        bias = bias + wander * drawn[channels:]
+        return noisy[:, None], jnp.concatenate([bias, jnp.stack([seed, count + 1.0]), queue.ravel()])
+
+
+def true_readings(plan: Plan, x: Any, force: Any, bias: Any) -> Any:
+    """All channels of a true state row, without noise."""
+    M = JaxMatrices()
+    body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
+    named = {name: bias[i] for i, name in enumerate(plan.biases)}
+    shown = [value for sensor in plan.sensors for value in readings(sensor, body, felt, named, M.xp).values()]
+    return jnp.stack([jnp.asarray(value) for value in shown])
+
+
+@dataclass(frozen=True)
+class Lqg:
+    """A linear-quadratic controller.
+
+    Attributes:
+        vehicle: the model that it was designed on (and that its observer predicts with).
+        plan: sensors, rate, delays. Without sensors it is fed with the true states (LQR).
+        numbers, feedback: its numbers.
+        start: the trim that it begins at.
+        unrest: what its process noise was made of.
+        seed: of the simulated sensors.
+        figures: what the design found, by name (modes, margins, expected spread), for its file and reader.
+    """
+
+    vehicle: Vehicle
+    plan: Plan
+    numbers: Numbers
+    feedback: Feedback
+    start: Trim
+    unrest: observer.Unrest
+    seed: int = 0
+    figures: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    @property
+    def rate(self) -> float:
+        """How often it runs [Hz]."""
+        return self.plan.rate
+
+    @property
+    def step(self) -> Step:
+        return SensedStep(self.plan, len(self.feedback.speeds))
+
+    @property
+    def gains(self) -> Array:
+        return numbers_row(self.numbers, self.feedback)
+
+    @property
+    def memory(self) -> Array:
+        """At the start: estimates at the trim; the simulated sensors' biases are drawn with the seed."""
+        return np.concatenate([self.inner_memory, self._sensor_memory(self.seed)])
+
+    @property
+    def inner_memory(self) -> Array:
+        """What an aircraft carries at the start."""
+        plan = self.plan
+        given = np.tile(self.start.inputs, max(plan.delays) + 1)
+        law = [*[0.0] * 4, self.start.speed, self.start.speed]
+        tail = np.concatenate([given, np.zeros(len(plan.sensors)), law])
+        if not plan.sensors:
+            return tail
+        estimate = self.first_estimate()
+        return np.concatenate([estimate.mean.ravel(), estimate.covariance.ravel(), tail])
+
+    def first_estimate(self) -> Estimate:
+        """At the trim, stored readings included."""
+        plan, n = self.plan, self.plan.n
+        N, own = len(plan.names), n + 6 + len(plan.biases)
+        mean = np.zeros((N, 1))
+        mean[:n, 0] = self.start.state
+        variance = np.zeros(N)
+        variance[:own] = observer.start_variance(plan, self.unrest)
+        w = np.array([*self.start.inputs, float(self.start.environment.voltage)])[:, None]
+        P = np.diag(variance)
+        if own < N:
+            deepest = max(at.kept for at in plan.sampling)
+            for _ in range(deepest):  # every stored reading is one of the start
+                found = _stored(plan, self.numbers, mean, w)
+                mean, G = (np.asarray(part, dtype=np.float64) for part in found)
+                P = G @ P @ G.T
+        return Estimate(mean, P)
+
+    def _sensor_memory(self, seed: int) -> Array:
+        plan = self.plan
+        if not plan.sensors:
+            return np.zeros(0)
+        random = np.random.default_rng(seed)
+        bias = np.array([BIASED[name][0] for name in plan.biases]) * random.standard_normal(len(plan.biases))
+        depth = SensedStep(plan, 1).depth
+        return np.concatenate([bias, [float(seed), 0.0], np.zeros(depth * len(plan.channels))])
+
+    def memories(self, seeds: Any) -> Array:
+        """Starts with other noise and biases each, shape (memory, number of seeds)."""
+        inner = self.inner_memory
+        return np.stack([np.concatenate([inner, self._sensor_memory(int(seed))]) for seed in seeds], axis=1)
+
+    def starting_at(self, trim: Trim, *, seed: int | None = None) -> Lqg:
+        """The same at another start, with other noise.
+
+        Raises:
+            ControllerError: where the trim is of a vehicle with other inputs, or, without an observer, other states.
+        """
+        own = self.vehicle
+        strange = trim.input_names != own.input_names or (not self.plan.sensors and trim.state_names != own.state_names)
+        if strange:
+            raise ControllerError(
+                f"was designed on another aircraft than this {len(trim.state_names)}-state one.", where=own.name
+            )
+        known = trim.states()
+        state = [
+            known.get(n, float(v)) for n, v in zip(own.state_names, np.asarray(self.feedback.states)[0], strict=True)
+        ]
+        start = replace(trim, state=np.array(state), state_names=own.state_names)
+        return replace(self, start=start, seed=self.seed if seed is None else seed)
+
+
+def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
+    return _stored_compiled(plan, Numbers(*(jnp.asarray(part) for part in numbers)), jnp.asarray(mean), jnp.asarray(w))
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _stored_compiled(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
+    M = JaxMatrices()
+    flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])
+    return M.linearised(lambda e, w: observer.keeping(plan, numbers, e, w, M.xp), mean, flags)

@@ -1,0 +1,69 @@
+"""The few matrix operations of the observer, for JAX here and for CasADi in `swashplate.export`.
+
+The observer is written once, on columns (n, 1) and matrices with `@`, `.T`, `*`, `+` and slices, which both have; what
+they write differently is here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from swashplate.physics.backend import Backend
+from swashplate.simulation.dynamics import jax_backend
+
+Scalars = Callable[[Sequence[Any], Sequence[Any]], Sequence[Any]]
+"""A function of two rows of scalars; scalars back."""
+
+
+class Matrices(Protocol):
+    """Operations beyond `@`, `.T`, `*`, `+` and slices."""
+
+    @property
+    def xp(self) -> Backend: ...
+    def column(self, scalars: Sequence[Any], /) -> Any: ...
+    def scalars(self, column: Any, /) -> list[Any]: ...
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any: ...
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]: ...
+    def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any: ...
+    def chosen(self, values: Sequence[float], i: Any, /) -> Any: ...
+    def row(self, matrix: Any, i: Any, /) -> Any: ...
+
+
+class JaxMatrices:
+    """Columns are arrays (n, 1); a repeated part is a loop, so that it is compiled once."""
+
+    def __init__(self) -> None:
+        self.xp: Backend = jax_backend()
+
+    def column(self, scalars: Sequence[Any], /) -> Any:
+        return jnp.stack([jnp.reshape(jnp.asarray(s, dtype=float), ()) for s in scalars])[:, None]
+
+    def scalars(self, column: Any, /) -> list[Any]:
+        return [column[i, 0] for i in range(column.shape[0])]
+
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+        return self.column(f(self.scalars(x), self.scalars(w)))
+
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+        """Value (m, 1) and Jacobian by x (m, n)."""
+        rest = self.scalars(w)
+
+        def both(row: Any) -> tuple[Any, Any]:
+            found = self.column(f([row[i] for i in range(x.shape[0])], rest))[:, 0]
+            return found, found
+
+        J, found = jax.jacfwd(both, has_aux=True)(x[:, 0])
+        return found[:, None], J
+
+    def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any:
+        return jax.lax.fori_loop(0, count, body, start)
+
+    def chosen(self, values: Sequence[float], i: Any, /) -> Any:
+        return jnp.asarray(values)[i]
+
+    def row(self, matrix: Any, i: Any, /) -> Any:
+        return jax.lax.dynamic_slice_in_dim(matrix, i, 1, 0)

@@ -1,0 +1,368 @@
+"""The observer: an extended Kalman filter on a vehicle's nonlinear equations, one pure step per sample.
+
+Estimated are the vehicle's states, six disturbing accelerations (first-order Gauss-Markov: gusts, and what the model
+does not know), the sensors' biases, and, for sensors whose readings arrive late, the readings at the time they were
+taken (Roumeliotis and Burdick 2002, stochastic cloning), so that a late reading corrects the past that it belongs to.
+Prediction is one Runge-Kutta step whose Jacobian is the product of the stages' exact ones; the update takes one scalar
+after the other and inverts no matrix (Bar-Shalom, Li and Kirubarajan 2001, secs 5.2, 7.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.control.matrices import Matrices
+from swashplate.control.sensor_suite import BIASED, Suite, biased, readings
+from swashplate.errors import ControllerError
+from swashplate.physics.backend import Backend
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Vector
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.dynamics import Equations
+from swashplate.vehicles.card import Card
+from swashplate.vehicles.structure import rebuild
+
+Array = NDArray[np.float64]
+
+DISTURBED = ("u", "v", "w", "p", "q", "r")
+"""States whose rates are disturbed."""
+_BODY = len(RigidBody._fields)
+
+
+class Unrest(NamedTuple):
+    """How far a vehicle strays from its equations.
+
+    Attributes:
+        force, force_down, moment, moment_yaw: standard deviation of the disturbing accelerations: level and down
+            [m/s^2], of roll and pitch and of yaw [rad/s^2].
+        force_time, moment_time: their time constants [s].
+        jolt, twist, twist_yaw: white noise on velocity and body rates [m/s^2, rad/s^2 per root of Hz].
+        flapping, bar: white noise on the tilt of rotors and of the bar [rad/s per root of Hz].
+        speed: white noise on rotor speeds [rad/s^2 per root of Hz].
+        other: white noise on every other inner state, per second and root of Hz.
+    """
+
+    force: float = 0.1
+    force_down: float = 0.1
+    moment: float = 0.5
+    moment_yaw: float = 0.5
+    force_time: float = 1.0
+    moment_time: float = 0.5
+    jolt: float = 0.02
+    twist: float = 0.1
+    twist_yaw: float = 0.1
+    flapping: float = 0.02
+    bar: float = 0.01
+    speed: float = 3.0
+    other: float = 0.01
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations of the disturbances in the order of `DISTURBED`."""
+        return np.array([self.force, self.force, self.force_down, self.moment, self.moment, self.moment_yaw])
+
+
+def unrest_of(card: Card) -> Unrest:
+    """What an identification learnt of the disturbances beside the parameters; the usual numbers where it did not.
+
+    A gust that fades with T and is driven by white noise of intensity g has a standard deviation of g sqrt(T / 2).
+    """
+    noise = card.observer.get("noise", {})
+    if not noise:
+        return Unrest()
+    force, moment = np.sqrt(0.5 * noise["tau_gust_force"]), np.sqrt(0.5 * noise["tau_gust_moment"])
+    return Unrest(
+        force=float(force * noise["gust_horizontal"]),
+        force_down=float(force * noise["gust_vertical"]),
+        moment=float(moment * noise["gust_tilt"]),
+        moment_yaw=float(moment * noise["gust_yaw"]),
+        force_time=noise["tau_gust_force"],
+        moment_time=noise["tau_gust_moment"],
+        jolt=max(noise["white_horizontal"], noise["white_vertical"]),
+        twist=noise["white_tilt"],
+        twist_yaw=noise["white_yaw"],
+    )
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """When a sensor is heard, in samples of the controller: every so many, so many late, with so many readings kept."""
+
+    every: int
+    late: int
+
+    @property
+    def kept(self) -> int:
+        return -(-self.late // self.every)
+
+    @property
+    def arrives(self) -> int:
+        return self.late % self.every
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What compiled code of an observer depends on: everything but numbers.
+
+    Attributes:
+        equations: of the vehicle.
+        sensors: the suite.
+        rate: steps per second [Hz].
+        delays: of each input, in samples.
+    """
+
+    equations: Equations
+    sensors: Suite
+    rate: float
+    delays: tuple[int, ...]
+
+    @property
+    def dt(self) -> float:
+        return 1.0 / self.rate
+
+    @property
+    def n(self) -> int:
+        return len(self.equations.vehicle.state_names)
+
+    @property
+    def inputs(self) -> int:
+        return len(self.equations.vehicle.input_names)
+
+    @property
+    def biases(self) -> tuple[str, ...]:
+        return biased(self.sensors)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the measurements, e.g. "flow.u", in the order of the measured row."""
+        return tuple(f"{sensor.kind}.{name}" for sensor in self.sensors for name in sensor.channels)
+
+    @property
+    def sampling(self) -> tuple[Sampling, ...]:
+        return tuple(
+            Sampling(round(self.rate / s.rate), int(np.ceil(s.delay * self.rate - 1e-9))) for s in self.sensors
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Everything that is estimated."""
+        late = [
+            f"{sensor.kind}.{name} {i + 1} ago"
+            for sensor, at in zip(self.sensors, self.sampling, strict=True)
+            for i in range(at.kept)
+            for name in sensor.channels
+        ]
+        return (
+            *self.equations.vehicle.state_names,
+            *(f"disturbance {name}" for name in DISTURBED),
+            *(f"bias {name}" for name in self.biases),
+            *late,
+        )
+
+    def checked(self) -> Plan:
+        """The plan itself where every sensor fits the controller's rate.
+
+        Raises:
+            ControllerError: naming the sensor.
+        """
+        for sensor in self.sensors:
+            ratio = self.rate / sensor.rate
+            if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6:
+                raise ControllerError(
+                    f"gives {sensor.rate:g} readings per second; "
+                    f"the controller's {self.rate:g} Hz is no whole multiple.",
+                    channel=sensor.kind,
+                    hint=f"Run the controller at {sensor.rate * max(1, round(ratio)):g} Hz or change the sensor.",
+                )
+        return self
+
+
+class Numbers(NamedTuple):
+    """Numbers of an observer.
+
+    Attributes:
+        parameters: of the vehicle, and air density and gravity behind them, a row.
+        fade: 1 / time constant of the disturbances, six [1/s].
+        process: variance that a sample adds to each estimate.
+        measurement: variance of each channel.
+    """
+
+    parameters: Any
+    fade: Any
+    process: Any
+    measurement: Any
+
+
+class Estimate(NamedTuple):
+    """Estimates, a column (N, 1), and their covariance (N, N)."""
+
+    mean: Any
+    covariance: Any
+
+
+def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
+    """(1 / time constants of the disturbances, variance per sample of everything estimated)."""
+    u, dt = unrest, plan.dt
+    fade = np.repeat([1.0 / u.force_time, 1.0 / u.moment_time], 3)
+    vehicle = plan.equations.vehicle
+    white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pq", u.twist), "r": u.twist_yaw}
+    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1"), u.flapping)
+    white |= dict.fromkeys(("eta_bar", "zeta_bar", "c", "d"), u.bar)
+    white |= dict.fromkeys(("omega_lower", "omega_upper", "omega"), u.speed)
+    inner = vehicle.state_names[_BODY:]
+    states = [white.get(name, u.other if name in inner else 0.0) ** 2 * dt for name in vehicle.state_names]
+    spread = u.spread**2 * (1.0 - np.exp(-2.0 * fade * dt))
+    wander = [BIASED[name][1] ** 2 * dt for name in plan.biases]
+    late = len(plan.names) - plan.n - len(DISTURBED) - len(wander)
+    # A stored reading is not disturbed; the last digit keeps the covariance positive in rounding.
+    return fade, np.array([*states, *spread, *wander, *[0.0] * late])
+
+
+def measurement_noise(plan: Plan) -> Array:
+    return np.array([sigma**2 for sensor in plan.sensors for sigma in sensor.sigma])
+
+
+def start_variance(plan: Plan, unrest: Unrest) -> Array:
+    """Variances before the first reading, of states, disturbances and biases."""
+    units = dict(zip(plan.equations.vehicle.state_names, plan.equations.vehicle.state_units, strict=True))
+    usual = {"m": 0.05, "m/s": 0.05, "rad": 0.01, "rad/s": 0.02}
+    first = [4.0 if name.startswith("omega") else usual.get(unit, 0.01) ** 2 for name, unit in units.items()]
+    spread = unrest.spread**2
+    return np.array([*first, *spread, *(BIASED[name][0] ** 2 for name in plan.biases)])
+
+
+# ---- scalar functions --------------------------------------------------------------------------------------------
+def _surrounded(plan: Plan, numbers: Any, voltage: Any) -> tuple[Any, Environment]:
+    vehicle = plan.equations.vehicle
+    count = len(vehicle.parameter_names)
+    parameters = vehicle.parameters(*(numbers[i] for i in range(count)))
+    return parameters, Environment(voltage=voltage, air_density=numbers[count], gravity=numbers[count + 1])
+
+
+def moving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+    """Rates of everything estimated; `w` is the inputs and the voltage."""
+    vehicle, n = plan.equations.vehicle, plan.n
+    parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
+    rates = vehicle.rates(e[:n], w[: plan.inputs], parameters, around, xp)
+    pushed = dict(zip(DISTURBED, e[n : n + 6], strict=True))
+    rates = [
+        rate + pushed[name] if name in pushed else rate for name, rate in zip(vehicle.state_names, rates, strict=True)
+    ]
+    fading = [-numbers.fade[i] * e[n + i] for i in range(6)]
+    return [*rates, *fading, *[0.0] * (len(e) - n - 6)]
+
+
+def shown(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+    """What every sensor would read now of an estimate, channel by channel."""
+    vehicle, n = plan.equations.vehicle, plan.n
+    body = RigidBody(*e[:_BODY])
+    bias = dict(zip(plan.biases, e[n + 6 : n + 6 + len(plan.biases)], strict=True))
+    force = Vector(0.0, 0.0, 0.0)
+    if any(sensor.kind == "imu" for sensor in plan.sensors):
+        parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
+        commands = vehicle.inputs(*w[: plan.inputs])
+        nested = rebuild(vehicle.state, list(e[:n]))
+        force = vehicle.specific_force(nested, commands, parameters, around, xp) + Vector(*e[n : n + 3])
+    return [value for sensor in plan.sensors for value in readings(sensor, body, force, bias, xp).values()]
+
+
+def _pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
+    """Of each sensor its sampling, its channels, and where its kept readings begin."""
+    found, channel, place = [], 0, plan.n + 6 + len(plan.biases)
+    for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
+        m = len(sensor.channels)
+        found.append((at, slice(channel, channel + m), place))
+        channel, place = channel + m, place + m * at.kept
+    return found
+
+
+def arriving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+    """What should arrive now: fresh readings, and for late sensors the oldest one kept."""
+    now = shown(plan, numbers, e, w, xp)
+    for at, part, place in _pieces(plan):
+        if at.kept:
+            m = part.stop - part.start
+            now[part] = list(e[place + m * (at.kept - 1) : place + m * at.kept])
+    return now
+
+
+def keeping(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+    """Estimates with the readings taken now put in store; `w` ends in a flag per sensor: 1 where it takes one."""
+    now, after = shown(plan, numbers, e, w, xp), list(e)
+    for number, (at, part, place) in enumerate(_pieces(plan)):
+        m, taken = part.stop - part.start, w[plan.inputs + 1 + number]
+        for i in reversed(range(m * at.kept)):
+            fresh = now[part.start + i] if i < m else e[place + i - m]
+            after[place + i] = taken * fresh + (1.0 - taken) * e[place + i]
+    return after
+
+
+# ---- the filter --------------------------------------------------------------------------------------------------
+def corrected(
+    plan: Plan, numbers: Numbers, estimate: Estimate, y: Any, due: Sequence[Any], w: Any, M: Matrices
+) -> tuple[Estimate, Any, Any]:
+    """The estimate after the readings that are due, the innovations (channels, 1) and their covariance.
+
+    Args:
+        plan, numbers: the observer.
+        estimate: predicted.
+        y: readings, a column; those not due may be anything finite.
+        due: per sensor 1 or 0.
+        w: inputs and voltage, a column.
+        M: the operations.
+    """
+    xp = M.xp
+    expected, H = M.linearised(lambda e, w: arriving(plan, numbers, e, w, xp), estimate.mean, w)
+    heard = M.column([flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels])
+    away = M.scalars(y - expected)
+    for i, name in enumerate(plan.channels):
+        if name.endswith(".psi"):
+            away[i] = xp.atan2(xp.sin(away[i]), xp.cos(away[i]))
+    innovations, noise = M.column(away), M.column([numbers.measurement[i] for i in range(len(away))])
+
+    def channel(i: Any, carry: Any) -> Any:
+        e, P = carry
+        row = M.row(H, i)
+        spread = P @ row.T
+        gain = spread * (M.row(heard, i) / (row @ spread + M.row(noise, i)))
+        return e + gain * (M.row(innovations, i) - row @ (e - estimate.mean)), P - gain @ spread.T
+
+    after = M.repeated(len(away), channel, (estimate.mean, estimate.covariance))
+    return Estimate(*after), innovations, H @ estimate.covariance @ H.T + np.eye(len(away)) * noise
+
+
+def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: Sequence[Any], M: Matrices) -> Estimate:
+    """The estimate one sample later.
+
+    Args:
+        plan, numbers, estimate, M: as in `corrected`.
+        w: inputs that act during the sample and the voltage, a column.
+        taken: per sensor 1 where it takes a reading now.
+    """
+    xp, dt = M.xp, plan.dt
+    e, P = estimate
+    if any(at.kept for at in plan.sampling):
+        with_flags = M.column([*M.scalars(w), *taken])
+        e, G = M.linearised(lambda e, w: keeping(plan, numbers, e, w, xp), e, with_flags)
+        P = G @ P @ G.T
+    begin, identity = e, np.eye(len(plan.names))
+
+    def stage(i: Any, carry: Any) -> Any:
+        """Classical Runge-Kutta; `D` is the derivative of the stage's rate by the first state."""
+        k, D, total, slope = carry
+        ahead, weight = M.chosen((0.0, 0.5, 0.5, 1.0), i) * dt, M.chosen((1 / 6, 1 / 3, 1 / 3, 1 / 6), i) * dt
+        k, A = M.linearised(lambda e, w: moving(plan, numbers, e, w, xp), begin + ahead * k, w)
+        D = A @ (identity + ahead * D)
+        return k, D, total + weight * k, slope + weight * D
+
+    zero, flat = 0.0 * begin, 0.0 * P
+    _, _, moved, slope = M.repeated(4, stage, (zero, flat, zero, flat))
+    F = identity + slope
+    P = F @ P @ F.T
+    P = 0.5 * (P + P.T) + np.eye(len(plan.names)) * numbers.process
+    return Estimate(begin + moved, P)

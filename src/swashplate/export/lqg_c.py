@@ -1,0 +1,101 @@
+"""The step of an LQG controller with its observer as C: the same step that Python runs, traced by CasADi.
+
+The equations of the vehicle and their exact Jacobians become straight-line code, the covariance's algebra small loops
+over fixed sizes; nothing is allocated, and of the C library only sin, cos, sqrt and atan2 are called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from swashplate.control.lqg import Carried, Lqg, lqg_step
+from swashplate.control.lqg_law import LAW_MEMORY
+from swashplate.control.matrices import Scalars
+from swashplate.control.observer import Estimate
+from swashplate.physics.backend import Backend, CasadiBackend
+from swashplate.simulation.closed_loop import REFERENCES
+
+
+class CasadiMatrices:
+    """The observer's matrix operations as CasADi expressions; see `swashplate.control.matrices`."""
+
+    def __init__(self) -> None:
+        self.xp: Backend = CasadiBackend()
+        self._made: dict[Any, Any] = {}
+
+    def column(self, scalars: Sequence[Any], /) -> Any:
+        import casadi
+
+        return casadi.vertcat(*scalars)
+
+    def scalars(self, column: Any, /) -> list[Any]:
+        return [column[i] for i in range(column.shape[0])]
+
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+        return self.linearised(f, x, w)[0]
+
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+        """Traced once per place in the program: the four stages of a Runge-Kutta step call one function."""
+        import casadi
+
+        key = (f.__code__, x.shape[0], w.shape[0])
+        if key not in self._made:
+            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
+            found = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            slopes = casadi.jacobian(found, xs)
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [found, slopes])
+        return tuple(self._made[key](x, w))
+
+    def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any:
+        for i in range(count):
+            start = body(i, start)
+        return start
+
+    def chosen(self, values: Sequence[float], i: Any, /) -> Any:
+        return values[i]
+
+    def row(self, matrix: Any, i: Any, /) -> Any:
+        return matrix[i, :]
+
+
+def lqg_function(controller: Lqg) -> Any:
+    """`(memory, measured, reference) -> (memory, command)` as one CasADi function; `measured` ends in the voltage."""
+    import casadi
+
+    plan = controller.plan
+    N = len(plan.names) if plan.sensors else 0
+    m, depth, sensors = plan.inputs, max(plan.delays) + 1, len(plan.sensors)
+    readings = len(plan.channels) if plan.sensors else plan.n
+    memory = casadi.MX.sym("memory", controller.inner_memory.size)
+    measured, reference = casadi.MX.sym("measured", readings + 1), casadi.MX.sym("reference", len(REFERENCES))
+    rest = memory[N + N * N :]
+    given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
+    counts = [rest[depth * m + i] for i in range(sensors)]
+    law = [rest[depth * m + sensors + i] for i in range(LAW_MEMORY)]
+    estimate = Estimate(memory[:N], casadi.reshape(memory[N : N + N * N], N, N))
+    gains = [casadi.DM(np.asarray(each)) for each in controller.feedback.gains]
+    feedback = controller.feedback._replace(gains=gains)
+    after, commands = lqg_step(
+        plan,
+        controller.numbers,
+        feedback,
+        Carried(estimate, given, counts, law),
+        measured[:readings],
+        measured[readings],
+        [reference[i] for i in range(len(REFERENCES))],
+        CasadiMatrices(),
+    )
+    flat = [value for row in after.given for value in row] + after.counts + after.law
+    covariance = [casadi.reshape(casadi.densify(after.estimate.covariance), N * N, 1)] if N else []
+    mean = [after.estimate.mean] if N else []
+    result = casadi.vertcat(*mean, *covariance, *flat, *commands)
+    return casadi.Function("swash_traced", [memory, measured, reference], [result])
+
+
+def measured_names(controller: Lqg) -> tuple[str, ...]:
+    """What the measured row of the C holds."""
+    plan = controller.plan
+    return (*(plan.channels if plan.sensors else controller.vehicle.state_names), "voltage")

@@ -1,0 +1,273 @@
+"""The report on a controller: what it stands, what it rejects, how it flies, and by which standard that is good."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.atomic import write_text
+from swashplate.control.check import ControlCheck
+from swashplate.control.requirements import (
+    ATTITUDE_COUPLING,
+    GAIN_MARGIN,
+    PHASE_MARGIN,
+    REFERENCE_RADIUS,
+    REJECTION,
+    REJECTION_PEAK,
+    Boundary,
+)
+from swashplate.errors import SwashError
+from swashplate.flights.schema import channel
+from swashplate.reporting import figures_control as figures
+from swashplate.reporting.html import render
+from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.reporting.words import counted, listed, value_words
+
+_TONES = {1: "good", 2: "caution", 3: "bad"}
+
+
+def control_report(check: ControlCheck, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
+    """Write one self-contained HTML file about a controller's check.
+
+    Args:
+        check: from `check_controller`.
+        path: where to write; the folder is made where it is missing.
+        title: heading of the page.
+
+    Raises:
+        SwashError: a place that cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(compose_check(check, title=title)))
+    except OSError as error:
+        raise SwashError(
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
+
+
+def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
+    """The report's structure."""
+    sections = [_loops(check), _rejection(check), _handling(check), _steps(check), _boundaries(check), _made(check)]
+    slowest = check.slowest
+    words = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
+    return Report(
+        title=title or f"A controller on {check.vehicle.name}",
+        banners=tuple(("bad", f"PROBLEM: {words}") for words in check.problems),
+        summary=(
+            ("Modes", words, "bad" if check.problems else "good"),
+            ("Margins", *_margins_line(check)),
+            ("Rejection", *_rejection_line(check)),
+            ("Handling", *_handling_line(check)),
+            ("Coupling", *_coupling_line(check)),
+        ),
+        picture=None,
+        sections=tuple(section for section in sections if section is not None),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def _tone(levels: list[int]) -> str:
+    return _TONES[max(levels)] if levels else "plain"
+
+
+def _decibel(factor: float) -> float:
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
+
+
+def margins_level(gain: float, gain_down: float, phase: float) -> int | None:
+    """Level of one loop's margins (factors, rad)."""
+    levels = [
+        GAIN_MARGIN.level(min(_decibel(gain), -_decibel(gain_down), 1e3)),
+        PHASE_MARGIN.level(min(math.degrees(phase), 1e3)),
+    ]
+    known = [level for level in levels if level is not None]
+    return max(known) if known else None
+
+
+def _margins_line(check: ControlCheck) -> tuple[str, str]:
+    if check.margins is None:
+        return "none: the loop does not stand.", "bad"
+    t = check.margins.together
+    worst = max(check.margins.axes, key=lambda a: margins_level(a.gain, a.gain_down, a.phase) or 0)
+    level = margins_level(worst.gain, worst.gain_down, worst.phase)
+    return (
+        f"all loops at once ±{_decibel(t.gain):.1f} dB or ±{math.degrees(t.phase):.0f}° (disc {t.alpha:.2f} at "
+        f"{t.frequency:.3g} rad/s, where that phase is {1e3 * t.phase / t.frequency:.2g} ms of delay); the weakest "
+        f"single loop is {worst.name}, {math.degrees(worst.phase):.0f}°.",
+        "good" if level == 1 else "caution",
+    )
+
+
+def _rejection_line(check: ControlCheck) -> tuple[str, str]:
+    if not check.rejections:
+        return ("not computed with an observer." if check.notes else "no state is held."), "plain"
+    worst = max(check.rejections, key=lambda r: r.peak)
+    levels = [x for r in check.rejections for x in (r.level, r.peak_level) if x is not None]
+    names = listed([r.state for r in check.rejections], most=8)
+    return f"{names} are held; largest peak {worst.peak:.1f} dB ({worst.state}).", _tone(levels)
+
+
+def _handling_line(check: ControlCheck) -> tuple[str, str]:
+    rows = [(a, a.handling) for a in check.attitudes if a.handling]
+    if not rows:
+        return ("not computed with an observer." if check.notes else "no bandwidth could be read off."), "caution"
+    words = [
+        f"{figures.ATTITUDE_WORDS[a.state]} {h.bandwidth.value:.3g} rad/s, Level {a.level or '–'}" for a, h in rows
+    ]
+    return f"{'; '.join(words)} (boundaries scaled, not checked).", _tone([a.level for a, _ in rows if a.level])
+
+
+def _coupling_line(check: ControlCheck) -> tuple[str, str]:
+    words = [f"{c.name.split(' (')[0]} {value_words(c.value)} {c.unit}" for c in check.couplings]
+    return f"{'; '.join(words) or 'no step was flown'}.", _tone([c.level for c in check.couplings if c.level])
+
+
+def _level(level: int | None) -> Cell:
+    return Cell("–" if level is None else f"Level {level}", tone=_TONES.get(level or 0, "quiet"))
+
+
+def _number(value: float, form: str = ".3g") -> Cell:
+    return Cell(format(value, form) if math.isfinite(value) else "∞" if value == math.inf else "–", number=True)
+
+
+def _loops(check: ControlCheck) -> Section:
+    blocks: list[Block] = []
+    if check.margins is not None:
+        rows = []
+        for a in check.margins.axes:
+            level = margins_level(a.gain, a.gain_down, a.phase)
+            told = ("meets 6 dB, 45°", "good") if level == 1 else ("below 6 dB or 45°", "caution")
+            rows.append(
+                (Cell(a.name), _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
+                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), _number(a.disc.alpha, ".2f"),
+                 _number(_decibel(a.sensitivity), ".1f"),
+                 Cell(told[0], tone=told[1]))
+            )  # fmt: skip
+        t = check.margins.together
+        columns = (
+            "loop",
+            "gain down [dB]",
+            "gain up [dB]",
+            "phase [deg]",
+            "crossover [rad/s]",
+            "disc",
+            "max |S| [dB]",
+            "",
+        )
+        note = (
+            f"All loops at once: gain ±{_decibel(t.gain):.1f} dB, phase ±{math.degrees(t.phase):.0f}° (disc "
+            f"{t.alpha:.2f} at {t.frequency:.3g} rad/s), by the diagonally scaled upper bound of the structured "
+            "singular value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
+        )
+        blocks.append(Table("Margins at the inputs, one loop opened at a time", columns, tuple(rows), note=note))
+    blocks += [Text(note, tone="caution") for note in check.notes]
+    blocks += [figures.loops_figure(check)] if check.omega.size else []
+    blocks.append(figures.modes_figure(check))
+    return Section("margins", "Margins", tuple(blocks))
+
+
+def _rejection(check: ControlCheck) -> Section | None:
+    if not check.rejections:
+        return None
+    rows = tuple(
+        (Cell(r.state), _number(r.bandwidth), _level(r.level), _number(r.peak, ".1f"), _level(r.peak_level),
+         _number(r.peak_frequency))
+        for r in check.rejections
+    )  # fmt: skip
+    columns = ("state", "bandwidth [rad/s]", "", "peak [dB]", "", "at [rad/s]")
+    note = (
+        "Bandwidth: the lowest frequency at which a disturbance added to the measured state is reduced by 3 dB. "
+        "An attitude under a held place gives way to slow disturbances: its bandwidth counts from there on."
+    )
+    table = Table("Disturbance rejection", columns, rows, note=note)
+    return Section("rejection", "Disturbance rejection", (table, figures.rejection_figure(check)))
+
+
+def _handling(check: ControlCheck) -> Section | None:
+    if not check.attitudes:
+        return None
+    rows = []
+    for a in check.attitudes:
+        h = a.handling
+        remark = a.problem or ("6 dB bandwidth lower or none: a pilot may oscillate" if a.oscillates else "")
+        numbers = (h.bandwidth_phase, h.bandwidth_gain, h.bandwidth, h.phase_delay) if h else (None,) * 4
+        rows.append(
+            (Cell(f"{a.state} of {a.reference}"), Cell(a.kind if h else "–"),
+             *(_number(math.nan if n is None else n.value) for n in numbers),
+             _number(check.boundary(a.state).scaled(check.scale)[0]), _level(a.level), Cell(remark))
+        )  # fmt: skip
+    columns = (
+        "response", "type", "45° [rad/s]", "6 dB [rad/s]", "bandwidth [rad/s]", "phase delay [s]",
+        "Level 1 from [rad/s]", "", "remark",
+    )  # fmt: skip
+    note = (
+        "ADS-33E-PRF: an attitude response counts its bandwidth by phase, a rate response the lower of both. The type "
+        "is taken from the phase at a tenth of the bandwidth where it was not given."
+    )
+    blocks: list[Block] = [Table("Bandwidth and phase delay", columns, tuple(rows), note=note)]
+    if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):
+        blocks.append(figures.bandwidth_chart(check))
+    blocks.append(figures.attitude_figure(check))
+    return Section("handling", "Handling qualities", tuple(blocks))
+
+
+def _steps(check: ControlCheck) -> Section | None:
+    if not check.steps:
+        return None
+    rows = []
+    for s in check.steps:
+        known, m = channel(s.state), s.metrics
+        rows.append(
+            (Cell(s.reference), Cell(s.state), _number(m.peak * known.shown_factor), Cell(unit_words(known.shown_unit)),
+             _number(m.rise), _number(100.0 * m.overshoot, ".0f"), _number(m.settling), _number(m.quickness),
+             _number(100.0 * m.error, ".1f"))
+        )  # fmt: skip
+    columns = (
+        "step of", "answer", "largest", "unit", "rise [s]", "overshoot [%]", "settled [s]", "quickness [1/s]",
+        "left [%]",
+    )  # fmt: skip
+    note = "Rise from 10 to 90 %, settled within 5 %; quickness: largest rate over largest change."
+    couplings = Table(
+        "What other axes do within 4 s of the step",
+        ("coupling", "largest over largest", "unit", ""),
+        tuple((Cell(c.name), _number(c.value), Cell(c.unit), _level(c.level)) for c in check.couplings),
+        note="On the nonlinear vehicle. ADS-33E-PRF takes the on-axis attitude at 4 s, here it is the largest so far.",
+    )
+    steps = Table("Steps", columns, tuple(rows), note=note)
+    return Section("steps", "Steps and cross-coupling", (steps, figures.steps_figure(check), couplings))
+
+
+def _boundaries(check: ControlCheck) -> Section:
+    used: list[Boundary] = [GAIN_MARGIN, PHASE_MARGIN, *(check.boundary(a.state) for a in check.attitudes)]
+    used += [*(REJECTION[r.state] for r in check.rejections if r.state in REJECTION), REJECTION_PEAK, ATTITUDE_COUPLING]
+    rows = []
+    for b in used:
+        first, second = b.scaled(check.scale)
+        rows.append(
+            (Cell(b.name), Cell("at least" if b.least else "at most"), _number(b.level1), _number(first),
+             _number(second), Cell("yes", tone="good") if b.checked else Cell("no", tone="caution"), Cell(b.source))
+        )  # fmt: skip
+    columns = ("quantity", "", "Level 1, full size", "scaled", "Level 2, scaled", "checked", "source")
+    words = (
+        f"Frequencies are scaled by √N with N = {check.scale:.3g}: the rotor radius of the UH-60 ({REFERENCE_RADIUS} "
+        "m) over this one's, unless a scale was given (Froude). The boundaries are for manned helicopters."
+    )
+    note = (
+        "checked: whether the number was compared with the standard's text. Where it says no, treat it as provisional."
+    )
+    table = Table("Boundaries that were used", columns, tuple(rows), note=note)
+    return Section("boundaries", "Where the boundaries come from", (Text(words), table), folded=True)
+
+
+def _made(check: ControlCheck) -> Section:
+    lines = [f"{name} {version}" for name, version in versions().items()]
+    lines.append(f"card of {check.vehicle.name}, SHA-256 {card_hash(check.vehicle.card)}")
+    lines.append(f"{counted(len(check.steps), 'step')} flown; task of the boundaries: {check.task}")
+    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)

@@ -1,0 +1,238 @@
+"""Figures of a controller's check: loops, sensitivities, attitude responses, the bandwidth chart and steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from swashplate.control.check import ControlCheck
+from swashplate.flights.schema import channel
+from swashplate.reporting.structure import Figure, Key
+from swashplate.reporting.theme import (
+    BLACK,
+    GREEN,
+    GREY,
+    MODEL,
+    ORANGE,
+    PUBLISHED,
+    PURPLE,
+    SKY,
+    VERMILION,
+    axis,
+    axis_title,
+    base_layout,
+    grid,
+    line,
+    packed,
+    stacked,
+)
+
+_COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
+_DASHES = ("solid", "dash", "dot", "dashdot")
+_PANEL = 170
+ATTITUDE_WORDS = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
+
+
+def style(i: int) -> tuple[str, str]:
+    """Colour and line style number i."""
+    return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
+
+
+def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
+    layout = stacked(titles, height=height, x_title="frequency [rad/s]")
+    for k in range(len(titles)):
+        layout[f"xaxis{'' if k == 0 else k + 1}"]["type"] = "log"
+    return layout
+
+
+def loops_figure(check: ControlCheck) -> Figure:
+    """Every loop opened at its input, the others closed: gain and phase."""
+    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    traces, keys = [], []
+    m = len(check.vehicle.input_names)
+    inverse = np.linalg.inv(np.eye(m) + check.opened)
+    for i, name in enumerate(check.vehicle.input_names):
+        single = 1.0 / inverse[:, i, i] - 1.0
+        if np.max(np.abs(single)) < 1e-9:
+            continue
+        color, dash = style(i)
+        hover = f"{name}<br>%{{x:.3g}} rad/s, %{{y:.3g}}"
+        gain, phase = 20.0 * np.log10(np.abs(single)), np.degrees(np.unwrap(np.angle(single)))
+        phase -= 360.0 * np.round(np.median(phase + 180.0) / 360.0)
+        traces += [
+            line(check.omega, gain, name=name, color=color, dash=dash, hover=hover),
+            line(check.omega, phase, name=name, color=color, dash=dash, hover=hover, axis="2"),
+        ]
+        keys.append(Key(name, color, dash))
+    ends = check.omega[[0, -1]]
+    traces.append(line(ends, [0.0, 0.0], name="0 dB", color=GREY, width=1.0, hover="0 dB"))
+    traces.append(line(ends, [-180.0, -180.0], name="-180", color=GREY, width=1.0, hover="-180 deg", axis="2"))
+    return Figure(
+        identifier="loops-bode",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="One loop opened at its input, the others closed. The margins are read where the gain is 0 dB and "
+        "where the phase is -180 degrees.",
+        alt="Bode diagram of each broken loop.",
+        keys=tuple(keys),
+    )
+
+
+def rejection_figure(check: ControlCheck) -> Figure:
+    """What is left of a disturbance on each state that is held."""
+    layout = _over_frequency(["|S| [dB]"], height=280)
+    layout["yaxis"]["range"] = [-40, 12]
+    traces, keys = [], []
+    for i, r in enumerate(check.rejections):
+        color, dash = style(i)
+        hover = f"{r.state}<br>%{{x:.3g}} rad/s, %{{y:.2f}} dB"
+        traces.append(line(r.omega, 20.0 * np.log10(r.size), name=r.state, color=color, dash=dash, hover=hover))
+        keys.append(Key(r.state, color, dash))
+    ends = check.omega[[0, -1]]
+    for level, words in ((-3.0, "-3 dB: bandwidth"), (5.0, "5 dB: Level 1 peak")):
+        traces.append(line(ends, [level, level], name=words, color=GREY, dash="dot", hover=words))
+    keys.append(Key("-3 dB (bandwidth) and 5 dB (peak)", GREY, "dot"))
+    return Figure(
+        identifier="rejection-curves",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="What the closed loop leaves of a disturbance added to a measured state. Far below 0 dB it is "
+        "rejected, above 0 dB the loop makes it larger.",
+        alt="Sensitivity of each held state over frequency.",
+        keys=tuple(keys),
+    )
+
+
+def attitude_figure(check: ControlCheck) -> Figure:
+    """Responses of the attitudes to the pilot's commands, with the bandwidths."""
+    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    traces, keys = [], []
+    for i, a in enumerate(check.attitudes):
+        color, dash = style(i)
+        gain, phase = 20.0 * np.log10(np.abs(a.response)), np.degrees(np.unwrap(np.angle(a.response)))
+        if a.handling:
+            at = a.handling.omega_180.value
+            phase -= 360.0 * np.round((np.interp(at, a.omega, phase) + 180.0) / 360.0)
+        hover = f"{a.state} of {a.reference}<br>%{{x:.3g}} rad/s, %{{y:.3g}}"
+        name = f"{a.state} of {a.reference}"
+        traces += [
+            line(a.omega, gain, name=name, color=color, dash=dash, hover=hover),
+            line(a.omega, phase, name=name, color=color, dash=dash, hover=hover, axis="2"),
+        ]
+        keys.append(Key(name, color, dash))
+        if a.handling and np.isfinite(a.handling.bandwidth.value):
+            bandwidth = a.handling.bandwidth.value
+            lag = float(np.interp(bandwidth, a.omega, phase))
+            marker = {"color": color, "size": 9, "symbol": "circle"}
+            traces.append(
+                {"type": "scatter", "mode": "markers", "x": [bandwidth], "y": [lag],
+                 "xaxis": "x2", "yaxis": "y2", "marker": marker, "name": "bandwidth",
+                 "hovertemplate": f"bandwidth {a.state}<br>%{{x:.3g}} rad/s<extra></extra>"}
+            )  # fmt: skip
+    keys.append(Key("bandwidth", GREY, "circle"))
+    for level in (-135.0, -180.0):
+        ends = check.omega[[0, -1]]
+        traces.append(line(ends, [level] * 2, name="", color=GREY, dash="dot", hover=f"{level:g} deg", axis="2"))
+    return Figure(
+        identifier="attitude-bode",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="Attitude over the pilot's command, all loops closed; -135 and -180 degrees are dotted.",
+        alt="Bode diagram of the attitude responses with their bandwidths.",
+        keys=tuple(keys),
+    )
+
+
+def bandwidth_chart(check: ControlCheck) -> Figure:
+    """Phase delay over bandwidth, one panel an axis, with the scaled level boundaries."""
+    found = [a for a in check.attitudes if a.handling and np.isfinite(a.handling.bandwidth.value)]
+    titles = [ATTITUDE_WORDS[a.state] for a in found]
+    layout = grid(titles, columns=min(3, len(titles)), height=240, x_title="bandwidth [rad/s]")
+    delays = [a.handling.phase_delay.value for a in found if a.handling]
+    highest = 1.4 * max([d for d in delays if np.isfinite(d)] or [0.1])
+    traces: list[dict[str, Any]] = []
+    for i, a in enumerate(found):
+        assert a.handling is not None
+        number = "" if i == 0 else str(i + 1)
+        bandwidth, delay = a.handling.bandwidth.value, a.handling.phase_delay.value
+        first, second = check.boundary(a.state).scaled(check.scale)
+        right = 1.3 * max(bandwidth, first)
+        for low, high, color, words in (
+            (first, right, "rgba(0,158,115,0.18)", "Level 1"),
+            (second, first, "rgba(230,159,0,0.18)", "Level 2"),
+            (0.0, second, "rgba(213,94,0,0.18)", "Level 3"),
+        ):
+            around = ([low, high, high, low, low], [0.0, 0.0, highest, highest, 0.0])
+            box = line(*around, name=words, color=GREY, width=1.0, axis=number)
+            traces.append({**box, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None})
+            layout["annotations"].append(
+                {"text": words, "x": 0.5 * (low + high), "y": 0.93 * highest, "xref": f"x{number}",
+                 "yref": f"y{number}", "showarrow": False, "font": {"size": 10}}
+            )  # fmt: skip
+        traces.append(
+            {"type": "scatter", "mode": "markers", "x": [bandwidth], "y": packed([delay]), "xaxis": f"x{number}",
+             "yaxis": f"y{number}", "marker": {"color": BLACK, "size": 11, "symbol": "circle"}, "name": a.state,
+             "hovertemplate": "%{x:.3g} rad/s, %{y:.3g} s<extra></extra>"}
+        )  # fmt: skip
+        layout[f"xaxis{number}"]["range"] = [0.0, right]
+        layout[f"yaxis{number}"]["range"] = [0.0, highest]
+    layout["yaxis"]["title"] = {"text": "phase delay [s]", "standoff": 4, "font": {"size": 12}}
+    layout["margin"]["l"] = 58
+    return Figure(
+        identifier="bandwidth-chart",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"ADS-33E-PRF bandwidth and phase delay, boundaries scaled for N = {check.scale:.3g}. Only the "
+        "vertical part of the boundaries is drawn, and their numbers were not checked against the standard's text.",
+        alt="Bandwidth and phase delay of each axis against the boundaries of Levels 1 and 2.",
+        keys=(Key("this loop", BLACK, "circle"),),
+        min_width=620,
+    )
+
+
+def steps_figure(check: ControlCheck) -> Figure:
+    """Every step, the wanted value dotted."""
+    titles = [f"{s.reference}: {axis_title(s.state)}" for s in check.steps]
+    layout = grid(titles, columns=2, height=190, x_title="time [s]")
+    traces = []
+    for i, s in enumerate(check.steps):
+        number = "" if i == 0 else str(i + 1)
+        factor = channel(s.state).shown_factor
+        t, values = s.flight.time(s.state), s.flight.values(s.state) * factor
+        every = max(1, t.size // 1500)
+        traces.append(line(t[::every], values[::every], name=s.state, color=MODEL, axis=number))
+        if s.reference not in ("roll", "pitch"):
+            goal = (values[0] + s.size * factor,) * 2
+            traces.append(line(t[[0, -1]], goal, name="wanted", color=PUBLISHED, dash="dot", axis=number))
+    return Figure(
+        identifier="step-responses",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="Steps flown on the nonlinear vehicle, half a second after the start. Roll and pitch are a pilot's "
+        "step of a tenth of the stick, which outer loops take back where they hold speed or place.",
+        alt="Time histories of the responses to steps.",
+        keys=(Key("response", MODEL), Key("wanted", PUBLISHED, "dot")),
+    )
+
+
+def modes_figure(check: ControlCheck) -> Figure:
+    """The closed loop's modes."""
+    layout = base_layout(300)
+    layout["xaxis"], layout["yaxis"] = axis("real part [1/s]", zeroline=True), axis("imaginary part [rad/s]")
+    bad = [complex(m) for m in check.modes if m.real > 1e-6]
+    good = [complex(m) for m in check.modes if m.real <= 1e-6]
+    traces = [
+        {"type": "scatter", "mode": "markers", "x": [m.real for m in group], "y": [m.imag for m in group],
+         "name": words, "marker": {"color": color, "symbol": "x", "size": 8},
+         "hovertemplate": "%{x:.3g} %{y:+.3g}j 1/s<extra></extra>"}
+        for group, words, color in ((good, "held", MODEL), (bad, "growing", VERMILION)) if group
+    ]  # fmt: skip
+    return Figure(
+        identifier="modes-plane",
+        spec={"data": traces, "layout": layout},
+        height=300,
+        caption="Modes of the closed loop with the controller's sampling in it.",
+        alt=f"{len(check.modes)} modes in the complex plane, {len(bad)} of them growing.",
+        keys=(Key("held", MODEL, "x"), *((Key("growing", VERMILION, "x"),) if bad else ())),
+    )

@@ -1,0 +1,185 @@
+"""The paper's Fig. 10 for any model: the path on a longitudinal step with and without the decoupling."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swashplate.atomic import write_text
+from swashplate.control.straightness import StepRun
+from swashplate.errors import SwashError
+from swashplate.flights.schema import channel
+from swashplate.reporting.html import render
+from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
+from swashplate.reporting.theme import GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
+from swashplate.reporting.versions import card_hash, date, versions
+from swashplate.vehicles.vehicle import Vehicle
+
+_STYLES = ((PUBLISHED, "dash"), (MODEL, "solid"))
+_FAINT = ("rgba(213,94,0,0.22)", "rgba(0,114,178,0.22)")
+_SHOWN = ("u", "v", "psi", "z", "phi", "theta", "servo_roll", "servo_pitch", "motor_lower", "motor_upper")
+_PERCENTILES = (5.0, 50.0, 95.0)
+_STRAIGHT = 0.15
+"""m at the end of the step; what the law promises with the constant lag that absorbs the bar's misalignment too."""
+
+
+def straightness_report(
+    vehicle: Vehicle, runs: Mapping[str, StepRun], *, command: float, lag: float, path: str | os.PathLike[str]
+) -> Path:
+    """Write one self-contained HTML file that compares the step's paths.
+
+    Args:
+        vehicle: what flew.
+        runs: "without" and "with" the decoupling, from `step_run`.
+        command: the step of the pitch command.
+        lag: that the law takes out at hover [deg].
+        path: where to write; the folder is made where it is missing.
+
+    Raises:
+        SwashError: a place that cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(compose_straightness(vehicle, runs, command=command, lag=lag)))
+    except OSError as error:
+        raise SwashError(
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
+
+
+def compose_straightness(vehicle: Vehicle, runs: Mapping[str, StepRun], *, command: float, lag: float) -> Report:
+    """The report's structure."""
+    bare, law = runs["without"], runs["with"]
+    drift = [float(run.path.drift[0]) for run in (bare, law)]
+    speeds = [float(run.path.speed[0]) for run in (bare, law)]
+    turned = [_largest(run, "psi") for run in (bare, law)]
+    lost = [_largest(run, "z") for run in (bare, law)]
+    used = max(_largest(law, name) for name in ("servo_roll", "servo_pitch"))
+    summary = [
+        ("Step", f"pitch command {command:.3g} from hover; fastest {speeds[0]:.2f} m/s without the law, "
+         f"{speeds[1]:.2f} m/s with it.", "plain"),
+        ("Drift", f"at the end {drift[0]:+.2f} m to the right without, {drift[1]:+.2f} m with it.",
+         "good" if abs(drift[1]) < _STRAIGHT else "caution"),
+        ("Heading", f"held within {turned[0]:.2g}° without, {turned[1]:.2g}° with it; height within "
+         f"{100 * lost[0]:.2g} and {100 * lost[1]:.2g} cm.", "plain"),
+        ("Inputs", f"largest servo command with the law {used:.2f} of 1.", "caution" if used >= 0.999 else "good"),
+        ("Models", *_models(runs)),
+    ]  # fmt: skip
+    return Report(
+        title=f"{vehicle.name}: the path on a step of the pitch command",
+        banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
+        summary=tuple(summary),
+        picture=_path_figure(runs),
+        sections=(_numbers(runs, lag), _time(runs), _made(vehicle)),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def _largest(run: StepRun, name: str) -> float:
+    """Largest change from the start, in the unit that people expect."""
+    values = run.flight.values(name) * channel(name).shown_factor
+    return float(np.max(np.abs(values - values[0] if name in ("z", "psi") else values)))
+
+
+def _models(runs: Mapping[str, StepRun]) -> tuple[str, str]:
+    drawn = {name: run.drawn for name, run in runs.items() if run.drawn is not None}
+    if not drawn:
+        return "flown on the model that the law was made from, where it must work; see --fit.", "caution"
+    words = []
+    for name, paths in drawn.items():
+        low, middle, high = np.nanpercentile(paths.drift, _PERCENTILES)
+        words.append(f"{name} {middle:+.2f} m ({low:+.2f} to {high:+.2f} m)")
+    size = len(next(iter(drawn.values())).drift)
+    return f"{size} drawn from the fit's covariance, drift median (5 to 95 %): {'; '.join(words)}.", "plain"
+
+
+def _path_figure(runs: Mapping[str, StepRun]) -> Figure:
+    layout = base_layout(380)
+    layout["xaxis"] = axis("ahead [m]")
+    layout["yaxis"] = axis("to the right [m]", autorange="reversed", zeroline=True, zerolinecolor=GREY)
+    traces: list[dict[str, Any]] = []
+    keys = []
+    hover = "%{x:.2f} m ahead, %{y:+.2f} m right"
+    for (_, run), faint in zip(runs.items(), _FAINT, strict=False):
+        for x, y in run.tracks:
+            every = max(1, x.size // 60)
+            thin = line(x[::every], y[::every], name="drawn", color=faint, width=0.8)
+            traces.append({**thin, "hoverinfo": "skip", "hovertemplate": None})
+    for (name, run), (color, dash) in zip(runs.items(), _STYLES, strict=False):
+        x, y = run.flight.values("x"), run.flight.values("y")
+        words = f"{name} the decoupling"
+        traces.append(line(x, y, name=words, color=color, dash=dash, width=2.4, hover=f"{words}<br>{hover}"))
+        keys.append(Key(words, color, dash))
+    if any(run.tracks for run in runs.values()):
+        keys.append(Key("models that the data cannot tell apart (thin)", GREY))
+    return Figure(
+        identifier="key-picture",
+        spec={"data": traces, "layout": layout},
+        height=380,
+        caption="Seen from above, from hover at 0 m until the distance is covered; right is down (as in Fig. 10).",
+        alt="Path of the step with and without the decoupling.",
+        keys=tuple(keys),
+    )
+
+
+def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
+    rows = []
+    for name, run in runs.items():
+        own = [float(getattr(run.path, key)[0]) for key in ("drift", "leftmost", "rightmost", "speed", "time")]
+        rows.append(_row(name, "this one", own))
+        if run.drawn is not None:
+            for percent in _PERCENTILES:
+                values = [
+                    float(np.nanpercentile(getattr(run.drawn, key), percent))
+                    for key in ("drift", "leftmost", "rightmost", "speed", "time")
+                ]
+                arrived = int(np.sum(np.isfinite(run.drawn.drift)))
+                rows.append(_row(name, f"{percent:g} % of {arrived} that arrived", values))
+    columns = ("decoupling", "models", "drift [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "time [s]")
+    blocks: list[Block] = [
+        Table("The path", columns, tuple(rows), note="Offsets to the right of the first heading."),
+        Text(
+            f"The law turns the commands back by the lower rotor's lag, {lag:.1f}° at hover, and cancels what speed "
+            "does to its disc. The stabilizer bar is out of its sight: the upper rotor's misalignment stays in it, "
+            "unless a constant lag is chosen that absorbs it."
+        ),
+    ]
+    return Section("path", "The path in numbers", tuple(blocks))
+
+
+def _row(name: str, models: str, values: list[float]) -> tuple[Cell, ...]:
+    shown = [f"{v:+.2f}" if math.isfinite(v) else "–" for v in values[:3]] + [f"{v:.2f}" for v in values[3:]]
+    return (Cell(name), Cell(models), *(Cell(words, number=True) for words in shown))
+
+
+def _time(runs: Mapping[str, StepRun]) -> Section:
+    present = [name for name in _SHOWN if all(name in run.flight for run in runs.values())]
+    layout = stacked([axis_title(name) for name in present], height=105)
+    traces, keys = [], []
+    for (words, run), (color, dash) in zip(runs.items(), _STYLES, strict=False):
+        keys.append(Key(f"{words} the decoupling", color, dash))
+        for i, name in enumerate(present):
+            number = "" if i == 0 else str(i + 1)
+            values = run.flight.values(name) * channel(name).shown_factor
+            traces.append(line(run.flight.time(name), values, name=name, color=color, dash=dash, axis=number))
+    figure = Figure(
+        identifier="step-time",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="Speeds, heading, height (down positive), lean and inputs; all panels zoom in time together.",
+        alt=f"{', '.join(present)} against time, with and without the decoupling.",
+        keys=tuple(keys),
+    )
+    return Section("time", "Heading, height and inputs", (figure,))
+
+
+def _made(vehicle: Vehicle) -> Section:
+    lines = [f"{name} {version}" for name, version in versions().items()]
+    lines.append(f"card of {vehicle.name}, SHA-256 {card_hash(vehicle.card)}")
+    return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)

@@ -1,0 +1,130 @@
+"""The observer in flight: as sure as it may be, with and without bar; loops held on it; its C is its Python."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from swashplate.control.lqg import Lqg, carried_from, carried_row, lqg_step, numbers_from
+from swashplate.control.lqg_analysis import analyse
+from swashplate.control.lqg_design import design
+from swashplate.control.matrices import JaxMatrices
+from swashplate.control.observer_trial import trial
+from swashplate.control.sensor_suite import suite
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.wind import INDOOR
+from swashplate.vehicles.catalogue import vehicle
+
+HIDDEN = ("alpha_lower", "beta_lower", "eta_bar", "zeta_bar")
+COMPILER = shutil.which("cc")
+
+
+def made(*, bar: bool = True) -> Lqg:
+    return design(vehicle("coax", bar=bar), sensors=suite("imu@100,mocap@50+20ms"), rate=100.0, delays=0.02)
+
+
+def test_the_observer_is_as_sure_as_it_may_be() -> None:
+    """Hidden states within three sigmas 98 % of the time and (error / sigma)^2 of 0.5 to 2, in gusts, held on it."""
+    controller = made()
+    found = trial(controller.vehicle, controller, duration=12.0, seeds=range(2), gusts=INDOOR)
+    for name in HIDDEN:
+        assert found.of(name).within >= 0.98, found
+        assert 0.5 < found.of(name).nees < 2.0, found
+    expected = analyse(controller).uncertainty
+    for name in ("alpha_lower", "eta_bar", "omega_lower"):
+        assert found.of(name).sigma == pytest.approx(expected[name], rel=0.15)
+    assert np.sqrt(np.mean(found.place**2)) < 0.08
+    assert np.sqrt(np.mean(found.height**2)) < 0.04
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("bar", [True, False])
+def test_many_flights_with_and_without_the_bar(bar: bool) -> None:
+    controller = made(bar=bar)
+    found = trial(controller.vehicle, controller, duration=20.0, seeds=range(40), gusts=INDOOR)
+    for state in found.states:
+        if state.name in HIDDEN:
+            assert state.within >= 0.98, found
+            assert 0.5 < state.nees < 2.0, found
+    assert np.sqrt(np.mean(found.place**2)) < 0.06
+    assert np.max(found.place) < 0.12
+
+
+@pytest.mark.proof
+def test_the_raptor_is_held_and_flown_to_ten_metres_a_second() -> None:
+    """Gains from the 13 states of body, rotor, bar and yaw loop (and place, height, heading) over speed."""
+    raptor = vehicle("raptor50", bar=True, gyro=True)
+    sensors = suite("gyro@100,mocap@100")
+    held = design(raptor, sensors=sensors, delays=0.02)
+    flight = simulate_closed_loop(raptor, held, duration=15.0, reference={"x": 1.0}, rate=500.0)
+    assert np.max(np.abs(flight.between(12.0, 15.0).values("x") - 1.0)) < 0.03
+    fast = design(raptor, sensors=sensors, delays=0.02, holding="speed", speeds=(0.0, 5.0, 10.0))
+    flight = simulate_closed_loop(raptor, fast, duration=20.0, reference={"ahead": 10.0}, rate=500.0)
+    assert np.max(np.abs(flight.between(17.0, 20.0).values("u") - 10.0)) < 0.1
+    assert np.max(np.abs(flight.values("z"))) < 0.06
+    assert np.max(np.abs(flight.values("psi"))) < 0.1
+
+
+# ---- its C -----------------------------------------------------------------------------------------------------------
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("float", 3e-4)])
+def test_the_c_step_is_the_python_step(precision: str, tolerance: float, tmp_path: Path) -> None:
+    """Commands and estimates in units of their sigmas, covariances in units of their diagonal, step by step.
+
+    In single precision the first reading, which shrinks a variance a thousand times, costs most: 1.7e-4.
+    """
+    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    from swashplate.export.controller_c import controller_code
+
+    controller = made()
+    code = controller_code(controller, precision=precision)  # type: ignore[arg-type]
+    assert set(code.calls) <= {"sin", "cos", "sqrt", "atan2"}
+    assert "malloc" not in code.source
+    file, library = tmp_path / "controller.c", tmp_path / "controller.so"
+    file.write_text(code.source)
+    assert COMPILER is not None
+    strict = ["-std=c99", "-pedantic", "-Werror", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
+    subprocess.run([COMPILER, *strict, "-o", library, file, "-lm"], check=True)
+    function = ctypes.CDLL(str(library)).swash_step
+    kind, real = (np.float64, ctypes.c_double) if precision == "double" else (np.float32, ctypes.c_float)
+
+    plan, gains = controller.plan, jnp.asarray(controller.gains)
+
+    def in_python(memory: Any, measured: Any, reference: Any) -> Any:
+        numbers, feedback = numbers_from(plan, 1, gains)
+        after, commands = lqg_step(
+            plan,
+            numbers,
+            feedback,
+            carried_from(plan, memory),
+            measured[:-1, None],
+            measured[-1],
+            [reference[i] for i in range(8)],
+            JaxMatrices(),
+        )
+        return carried_row(after), jnp.stack(commands)
+
+    step = jax.jit(in_python, compiler_options=QUICK_TO_COMPILE)
+    random, N = np.random.default_rng(0), len(plan.names)
+    gravity = np.where([name == "imu.az" for name in plan.channels], -9.81, 0.0)
+    memory, worst = controller.inner_memory, 0.0
+    for _ in range(60):
+        measured = np.append(gravity + 0.02 * random.standard_normal(len(plan.channels)), 11.5)
+        reference = 0.1 * random.standard_normal(8)
+        after, commands = (np.asarray(part) for part in step(memory, measured, reference))
+        rows = [np.ascontiguousarray(row, dtype=kind) for row in (memory, measured, reference, np.zeros(4))]
+        function(*(row.ctypes.data_as(ctypes.POINTER(real)) for row in rows))
+        sigma = np.sqrt(np.diag(after[N : N + N * N].reshape(N, N)))
+        scale = np.concatenate([sigma, np.outer(sigma, sigma).ravel(), np.maximum(1.0, np.abs(after[N + N * N :]))])
+        worst = max(worst, float(np.max(np.abs(rows[0] - after) / scale)), float(np.max(np.abs(rows[3] - commands))))
+        memory = after
+    assert worst < tolerance
