@@ -111,6 +111,7 @@ def _kind(model: str) -> str:
 
 def _controller(model: str, form: Format, name: str, precision: Precision, refused: list[str]) -> Export:
     from swashplate.control.controller_file import read_controller
+    from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.export.c_text import identifier
     from swashplate.export.controller_c import controller_code
     from swashplate.export.formats import Export
@@ -119,7 +120,14 @@ def _controller(model: str, form: Format, name: str, precision: Precision, refus
         raise SwashError("is a controller: --format c writes its step.", where=model, channel=f"--format {form.value}")
     if refused:
         raise SwashError("is for vehicles, and this is a controller.", where=model, channel=", ".join(refused))
-    code = controller_code(read_controller(model), precision="float" if precision is Precision.SINGLE else "double")
+    read = read_controller(model)
+    if isinstance(read, ObservedAutopilot):
+        raise SwashError(
+            "flies on estimates, and its C is not written yet.",
+            where=model,
+            hint="Export the law alone (`swash decouple` without --sensors) or an LQG (`swash control design`).",
+        )
+    code = controller_code(read, precision="float" if precision is Precision.SINGLE else "double")
     told = f"One step: {code.operations} operations, {code.work_bytes} bytes of temporaries."
     return Export({f"{identifier(name)}.c": code.source.encode()}, (told,))
 

@@ -51,12 +51,20 @@ def live(
         vehicle = given.vehicle_of(model, None, switched)
         with progress(quiet=quiet) as line:
             line.say("preparing (compiling takes longest the first time)")
+            from swashplate.control.autopilot import Autopilot
             from swashplate.control.controller_file import read_controller
             from swashplate.links.live.session import Session
             from swashplate.simulation.compilation import enable_compilation_cache
 
             enable_compilation_cache()
             chosen = None if controller is None else read_controller(controller)
+            if chosen is not None and not isinstance(chosen, Autopilot):
+                raise SwashError(
+                    "flies on sensors of its own, and the page has none.",
+                    where=controller,
+                    channel="--controller",
+                    hint="Give an autopilot, as `swash decouple` writes it without --sensors.",
+                )
             session = Session(vehicle, controller=chosen, folder=out)
         session.clock.start()
         try:
