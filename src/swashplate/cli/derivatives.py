@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,26 +14,16 @@ if TYPE_CHECKING:
     from swashplate.vehicles.derivatives import DerivativeTable
 
 
+@given.flown
 def derivatives(
-    vehicle: given.Name,
-    speed: given.Speed = "0",
-    climb: given.Climb = 0.0,
-    lateral: given.Lateral = 0.0,
-    turn: given.Turn = 0.0,
-    wind: given.Wind = "0,0,0",
-    altitude: given.Altitude = 0.0,
-    mass: given.Mass = None,
-    changed: given.Set = None,
-    switched: given.Switch = None,
+    asked: given.Conditions,
     imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as Bhandari et al. have them.")] = False,
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
     ] = False,
     draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
-    ] = None,
+    plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Stability and control derivatives: force per mass and moment per inertia, split by what contributes to them."""
@@ -43,18 +32,6 @@ def derivatives(
     from swashplate.simulation.uncertainty import spread
     from swashplate.vehicles.derivatives import factor_to_feet, split_name, unit
 
-    asked = given.conditions(
-        vehicle,
-        speed=speed,
-        climb=climb,
-        lateral=lateral,
-        turn=turn,
-        wind=wind,
-        altitude=altitude,
-        mass=mass,
-        changed=changed,
-        switched=switched,
-    )
     if uncertainty and len(asked.speeds) > 1:
         raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
     found = asked.trims()
@@ -82,7 +59,7 @@ def derivatives(
             }
             for at, table in zip(found, tables, strict=True)
         ]
-        typer.echo(as_json({"vehicle": vehicle, "tables": document}))
+        typer.echo(as_json({"vehicle": asked.name, "tables": document}))
         return
     for at, table in zip(found, tables, strict=True):
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
