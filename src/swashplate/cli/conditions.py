@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -71,6 +71,19 @@ class Conditions:
             turn=self.turn,
             environment=self.environment,
         )
+
+    def doubts(self, trims: Sequence[Trim]) -> tuple[str, ...]:
+        """Where the vehicle's equations do not hold; said on standard error."""
+        from swashplate.vehicles.helicopter_limits import doubts
+
+        found = tuple(
+            f"At {at.speed:g} m/s {words}."
+            for at in trims
+            for words in doubts(self.vehicle, at.state, at.inputs, at.environment)
+        )
+        for words in found:
+            typer.echo(f"Careful: {words}", err=True)
+        return found
 
 
 def speeds(text: str) -> tuple[float, ...]:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 def derivatives(
     asked: given.Conditions,
     imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as Bhandari et al. have them.")] = False,
+    primed: Annotated[
+        bool,
+        typer.Option("--primed", help="Roll and yaw rows mixed by the product of inertia, as most published tables."),
+    ] = False,
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
     ] = False,
@@ -34,13 +38,19 @@ def derivatives(
 
     if uncertainty and len(asked.speeds) > 1:
         raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
+    if uncertainty and primed:
+        raise SwashError("has no bounds.", channel="--primed", hint="Leave out --uncertainty or --primed.")
     found = asked.trims()
+    remarks = asked.doubts(found)
     tables = [derivative_table(asked.vehicle, at) for at in found]
+    if primed:
+        card = asked.vehicle.card.values()
+        tables = [t.primed(**{name: card[name] for name in ("inertia_xx", "inertia_zz", "inertia_xz")}) for t in tables]
     wide = spread(asked.vehicle, found[0], draws=draws, seed=seed) if uncertainty else None
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot, tables=tables)
+        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks)
     factors = {name: factor_to_feet(*split_name(name)) if imperial else 1.0 for name in tables[0].names()}
     if json:
         document = [

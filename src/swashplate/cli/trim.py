@@ -24,14 +24,9 @@ def trim(
     """Find the steady flight of a vehicle: attitude and controls, at one speed or over a range."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.vehicles.helicopter_limits import doubts
 
     found = asked.trims()
-    remarks = [
-        f"At {at.speed:g} m/s {words}."
-        for at in found
-        for words in doubts(asked.vehicle, at.state, at.inputs, at.environment)
-    ]
+    remarks = asked.doubts(found)
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
@@ -51,8 +46,6 @@ def trim(
             for at in found
         ]
         console().print(table(head, rows, left=0))
-    for remark in remarks:
-        typer.echo(f"Careful: {remark}", err=True)
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
@@ -89,11 +82,12 @@ def linearize(
     from swashplate.simulation.linearize import linearize as about
 
     found = asked.trims()
+    remarks = asked.doubts(found)
     models = [about(asked.vehicle, at) for at in found]
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot)
+        speed_page(asked.vehicle, found, path=plot, remarks=remarks)
     if json:
         typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(model) for model in models]}))
         return

@@ -190,7 +190,7 @@ def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p
         after = _linear_step(A, _product(B, command - u0) - _product(A, x0), x, dt)
         return (after, disc - _product(inverse, value[8:])), x
 
-    start = tuple(map(jnp.asarray, begin))
+    start: Any = tuple(map(jnp.asarray, begin))
     chunks = jnp.asarray(u).reshape(-1, _CHUNK, u.shape[1])
     _, states = jax.lax.scan(lambda carry, commands: jax.lax.scan(step, carry, commands), start, chunks)
     return states.reshape(-1, len(PAPER_STATES))
