@@ -84,8 +84,9 @@ class Command:
 
     @property
     def slow(self) -> bool:
-        """Minutes long: real flights are identified from, or predicted."""
-        return self.words[0] == "swash" and self.words[1] in _SLOW and (_REAL in self.line or self.words[1] == "demo")
+        """Minutes long: real flights are identified from, or predicted; a helicopter's derivatives are compiled."""
+        long = _REAL in self.line or self.words[1] == "demo" or (self.words[1] == "identify" and "raptor" in self.line)
+        return self.words[0] == "swash" and self.words[1] in _SLOW and long
 
     @property
     def runs(self) -> bool:
