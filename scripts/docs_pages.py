@@ -84,8 +84,9 @@ class Command:
 
     @property
     def slow(self) -> bool:
-        """Minutes long: real flights are identified from, or predicted."""
-        return self.words[0] == "swash" and self.words[1] in _SLOW and (_REAL in self.line or self.words[1] == "demo")
+        """Minutes long: real flights are identified from, or predicted; a helicopter's derivatives are compiled."""
+        long = _REAL in self.line or self.words[1] == "demo" or (self.words[1] == "identify" and "raptor" in self.line)
+        return self.words[0] == "swash" and self.words[1] in _SLOW and long
 
     @property
     def runs(self) -> bool:
@@ -306,23 +307,20 @@ def trust_text() -> str:
 def choices_text() -> str:
     """The ready choices of free parameters with their priors."""
     import swashplate as sp
+    from swashplate.identification.choices import choices_for
 
-    parts = []
-    for choice in sp.CHOICES.values():
-        rows = [
-            (
-                f"`{f.name}`",
-                "none" if f.mean is None else f"{f.mean:g} ± {f.sigma:g}",
-                f.source,
-            )
-            for f in choice.free
-        ]
-        set_too = ", ".join(f"`{name} = {value:g}`" for name, value in choice.fixed)
-        parts.append(
-            f"`{choice.name}`: {choice.description}.\n\n{_table(('free', 'prior (mean ± sigma)', 'from'), rows)}\n\n"
-            f"Ties: {', '.join(f'`{tie}`' for tie in choice.ties)}." + (f" Set: {set_too}." if set_too else "")
-        )
-    return "\n\n".join(parts)
+    coax = "\n\n".join(map(_choice, sp.CHOICES.values()))
+    others = "\n\n".join(map(_choice, choices_for(sp.vehicle("raptor50", bar=True)).values()))
+    words = "A single-rotor helicopter's take their priors from its card; here those of `raptor50` with `bar = true`."
+    return f"For the CoaX:\n\n{coax}\n\n{words}\n\n{others}"
+
+
+def _choice(choice: Any) -> str:
+    rows = [(f"`{f.name}`", "none" if f.mean is None else f"{f.mean:g} ± {f.sigma:g}", f.source) for f in choice.free]
+    set_too = ", ".join(f"`{name} = {value:g}`" for name, value in choice.fixed)
+    ties = f"\n\nTies: {', '.join(f'`{tie}`' for tie in choice.ties)}." if choice.ties else ""
+    text = f"`{choice.name}`: {choice.description}.\n\n{_table(('free', 'prior (mean ± sigma)', 'from'), rows)}{ties}"
+    return text + (f" Set: {set_too}." if set_too else "")
 
 
 def channels_text() -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import pytest
 
 import swashplate as sp
+from chromium import Visit, running_browser
 from report_samples import fit, modes, validation
 from swashplate.control.check import check_controller
 from swashplate.control.straightness import step_run
@@ -17,30 +17,13 @@ from swashplate.reporting.control_check import control_report
 from swashplate.reporting.report import report
 from swashplate.reporting.straightness import straightness_report
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 NASTY = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">.mat"
 SIZES = {"desk": (1200, 900), "telephone": (390, 844)}
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        yield running
-        running.close()
+    yield from running_browser()
 
 
 @pytest.fixture(scope="module")
@@ -68,20 +51,6 @@ def controllers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "check": control_report(check, path=folder / "check.html"),
         "path": straightness_report(coax, runs, command=0.2, lag=17.0, path=folder / "path.html"),
     }
-
-
-class Visit:
-    """A page that was opened and drawn, with what it said and what it asked for."""
-
-    def __init__(self, browser: Any, path: Path, size: tuple[int, int]) -> None:
-        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.said.append(f"error: {error}"))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(path.as_uri())
-        self.page.wait_for_selector("html[data-drawn=all]", state="attached", timeout=60_000)
 
 
 @pytest.fixture(scope="module")

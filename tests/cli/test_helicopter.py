@@ -11,6 +11,7 @@ from commands import one_message, swash
 
 from swashplate.flights.flight import Flight
 from swashplate.vehicles.card import read_card
+from swashplate.vehicles.catalogue import vehicle
 from swashplate.vehicles.helicopter_parameters import MEANING
 
 
@@ -28,8 +29,9 @@ def test_trim_at_one_speed_and_over_a_range(tmp_path: Path) -> None:
     assert "B1 [deg]" in table[0]
 
 
-def test_trim_says_where_it_is_not_to_be_believed() -> None:
-    outcome = swash("trim", "raptor50", "--climb=-4")
+@pytest.mark.parametrize("verb", ["trim", "linearize", "derivatives"])
+def test_every_verb_says_where_it_is_not_to_be_believed(verb: str) -> None:
+    outcome = swash(verb, "raptor50", "--climb=-4")
     assert outcome.code == 0
     assert "vortex ring" in outcome.err
 
@@ -64,6 +66,18 @@ def test_derivatives_by_contributor_in_both_units(tmp_path: Path) -> None:
     page = tmp_path / "derivatives.html"
     swash("derivatives", "raptor50", "--speed", "0-8/4", "--plot", page)
     assert "Derivatives by contributor" in page.read_text(encoding="utf-8")
+
+
+def test_primed_rows_mix_roll_and_yaw_by_the_product_of_inertia() -> None:
+    plain, mixed = (
+        json.loads(swash("derivatives", "lynx", "--json", *extra).out)["tables"][0]["derivatives"]
+        for extra in ((), ("--primed",))
+    )
+    assert mixed["Mq"] == plain["Mq"]
+    card = vehicle("lynx").card.values()
+    whole = 1.0 - card["inertia_xz"] ** 2 / (card["inertia_xx"] * card["inertia_zz"])
+    expected = (plain["Lp"]["value"] + card["inertia_xz"] / card["inertia_xx"] * plain["Np"]["value"]) / whole
+    assert mixed["Lp"]["value"] == pytest.approx(expected)
 
 
 def test_uncertainty_bounds_hold_the_cards_value_and_repeat() -> None:
@@ -111,6 +125,14 @@ def test_a_new_card_is_commented_and_flies(tmp_path: Path) -> None:
         (("trim", "raptor51"), "neither a vehicle's name nor a file"),
         (("derivatives", "coax"), "needs a single-rotor card"),
         (("derivatives", "raptor50", "--uncertainty", "--speed", "0-5"), "takes one speed"),
+        (("derivatives", "raptor50", "--uncertainty", "--primed"), "has no bounds"),
+        (("trim", "raptor50", "--option", "engine_lag=true"), "needs a rotor speed that the engine can change"),
+        (("trim", "raptor50", "--set", "rotor_chord=0"), "lies outside"),
+        (("trim", "raptor50", "--set", "inertia_xx=-0.1"), "lies outside"),
+        (("trim", "raptor50", "--wind", "3,4"), "is not 3 numbers"),
+        (("trim", "raptor50", "--set", "mass=nan"), "is not a number"),
+        (("trim", "raptor50", "--mass", "60"), "lies outside"),
+        (("trim", "raptor50", "--turn", "20", "--wind", "3,0,0"), "a turn in wind is no steady flight"),
         (("trim", "raptor50", "--speed", "3", "--plot", "x.html"), "needs a range of speeds"),
         (("vehicles", "new", "x.toml", "--mass=-1", "--radius", "1"), "expected both above 0"),
     ],

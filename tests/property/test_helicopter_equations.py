@@ -20,6 +20,8 @@ from swashplate.vehicles.vehicle import Vehicle
 
 FLOATS = FloatBackend()
 EVERYTHING = {
+    "delay": True,
+    "engine_lag": True,
     "bar": True,
     "inflow": "pitt-peters",
     "rotor_speed": "throttle",
@@ -34,7 +36,7 @@ FORMS = [
     {"inflow": "uniform", "rotor_speed": "governed"},
     EVERYTHING,
 ]
-MIRRORED = ("y", "v", "phi", "psi", "p", "r", "b1", "d", "lam_s", "r_gyro", "A1_servo", "A1")
+MIRRORED = ("y", "v", "phi", "psi", "p", "r", "b1", "d", "lam_s", "r_gyro", "A1_servo", "A1", "A1_late", "A1_late_rate")
 
 
 def random_case(vehicle: Vehicle, seed: int) -> tuple[np.ndarray, np.ndarray, Environment, Vehicle]:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from swashplate.control.state_hold import state_hold
-from swashplate.errors import TrimError
+from swashplate.errors import CardError, TrimError
 from swashplate.flights.flight import Flight
+from swashplate.physics import actuators
 from swashplate.physics.atmosphere import air_density
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
@@ -144,3 +145,35 @@ def test_autorotation() -> None:
     glide = simulate(flying, without, start=gliding, rate=500.0)
     np.testing.assert_allclose(glide.values("omega"), gliding.states()["omega"], rtol=1e-3)
     assert gliding.commands()["theta0"] < 0.0 < start.commands()["theta0"]
+
+
+def test_a_pure_delay_is_one_up_to_its_own_frequency() -> None:
+    """From its two states' rates: exp(-j omega T) within 0.5 deg and 1.5 % up to 1/T; a step stays where it went."""
+    T = 0.02
+    columns = [actuators.delay_rates(*unit, delay=T) for unit in np.eye(3)]
+    A, B = np.array(columns[:2]).T, np.array(columns[2])
+    C = np.array([actuators.delayed(*unit, delay=T) for unit in np.eye(2)])
+    omega = np.array([0.0, *np.geomspace(1.0, 1.0 / T, 10)])
+    answer = np.array([C @ np.linalg.solve(1j * w * np.eye(2) - A, B) for w in omega])
+    ratio = answer / np.exp(-1j * omega * T)
+    assert answer[0] == pytest.approx(1.0)
+    assert np.max(np.abs(np.degrees(np.angle(ratio)))) < 0.5
+    assert np.max(np.abs(np.abs(ratio) - 1.0)) < 0.015
+
+
+def test_delay_and_engine_lag_change_no_steady_flight_and_show_among_the_states() -> None:
+    late = vehicle("raptor50", rotor_speed="governed", delay=True, engine_lag=True, servos=True)
+    assert late.state_names[-9:] == (
+        *(f"{name}_late" for name in late.input_names), *(f"{name}_late_rate" for name in late.input_names), "share",
+    )  # fmt: skip
+    at = trim(late)
+    plain = trim(RAPTOR)
+    np.testing.assert_allclose(at.inputs, plain.inputs, atol=1e-9)
+    known = at.states()
+    assert known["theta0_late"] == pytest.approx(known["theta0_servo"]) == pytest.approx(at.commands()["theta0"])
+    assert known["share"] == pytest.approx(known["governor"])
+
+
+def test_an_engine_that_lags_needs_a_rotor_that_turns_freely() -> None:
+    with pytest.raises(CardError, match="engine_lag: needs a rotor speed that the engine can change"):
+        vehicle("raptor50", engine_lag=True)

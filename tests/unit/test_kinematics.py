@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +14,7 @@ from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.records import POSE, Record
 from swashplate.identification.start_states import hover, slopes, start_state
 from swashplate.identification.stochastic import Nuisance
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.trim import trim
 from swashplate.vehicles.catalogue import vehicle
@@ -138,3 +141,28 @@ def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
     value, rate = slopes(straight, np.array([0, 200, 400]))
     np.testing.assert_allclose(value, line[[0, 200, 400]], atol=1e-12)
     np.testing.assert_allclose(rate, np.tile([1.0, -2.0, 0.5, 0.1, 0.2, 3.0], (3, 1)), atol=1e-12)
+
+
+def test_a_helicopters_hover_and_inner_states_are_those_of_its_trim_and_differentiable() -> None:
+    """The traced Newton steps end where `trim` does, and their derivative is that of trims at other masses."""
+    raptor = vehicle("raptor50")
+    level = trim(raptor)
+
+    def at(mass: float) -> tuple[jax.Array, jax.Array]:
+        return hover(raptor, raptor.values()._replace(mass=mass), jnp.asarray(12.0))
+
+    mass = raptor.card.values()["mass"]
+    once = partial(jax.jit, compiler_options=QUICK_TO_COMPILE)
+    (x, u), (dx, du) = once(lambda m: jax.jvp(at, (m,), (jnp.ones(()),)))(jnp.asarray(mass))
+    np.testing.assert_allclose(x, level.state, atol=1e-12)
+    np.testing.assert_allclose(u, level.inputs, atol=1e-12)
+    heavy, light = (trim(raptor.with_values({"mass": mass + step})) for step in (1e-4, -1e-4))
+    np.testing.assert_allclose(dx, (heavy.state - light.state) / 2e-4, atol=1e-8)
+    np.testing.assert_allclose(du, (heavy.inputs - light.inputs) / 2e-4, atol=1e-8)
+    seen = {name: level.state[raptor.index(name)] for name in POSE}
+
+    def guess(value: jax.Array) -> jax.Array:
+        rest = {"rate": jnp.zeros(6), "inputs": jnp.asarray(level.inputs), "voltage": jnp.asarray(12.0)}
+        return jnp.asarray(start_state(raptor, POSE, raptor.values(), Nuisance(), value=value, **rest))
+
+    np.testing.assert_allclose(once(guess)(jnp.array(list(seen.values()))), level.state, atol=1e-12)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -38,10 +42,16 @@ Switch = Annotated[
 ]
 
 
+Page = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
+]
+
+
 @dataclass(frozen=True)
 class Conditions:
-    """A vehicle and what it flies: speeds [m/s] and the rest of the course, in an environment."""
+    """A vehicle, as it was called, and what it flies: speeds [m/s] and the rest of the course, in an environment."""
 
+    name: str
     vehicle: Vehicle
     speeds: tuple[float, ...]
     climb: float
@@ -61,6 +71,19 @@ class Conditions:
             turn=self.turn,
             environment=self.environment,
         )
+
+    def doubts(self, trims: Sequence[Trim]) -> tuple[str, ...]:
+        """Where the vehicle's equations do not hold; said on standard error."""
+        from swashplate.vehicles.helicopter_limits import doubts
+
+        found = tuple(
+            f"At {at.speed:g} m/s {words}."
+            for at in trims
+            for words in doubts(self.vehicle, at.state, at.inputs, at.environment)
+        )
+        for words in found:
+            typer.echo(f"Careful: {words}", err=True)
+        return found
 
 
 def speeds(text: str) -> tuple[float, ...]:
@@ -96,24 +119,24 @@ def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None,
 
 
 def conditions(
-    name: str,
+    vehicle: Name,
     *,
-    speed: str,
-    climb: float = 0.0,
-    lateral: float = 0.0,
-    turn: float = 0.0,
-    wind: str = "0,0,0",
-    altitude: float = 0.0,
-    mass: float | None = None,
-    changed: list[str] | None = None,
-    switched: list[str] | None = None,
+    speed: Speed = "0",
+    climb: Climb = 0.0,
+    lateral: Lateral = 0.0,
+    turn: Turn = 0.0,
+    wind: Wind = "0,0,0",
+    altitude: Altitude = 0.0,
+    mass: Mass = None,
+    changed: Set = None,
+    switched: Switch = None,
 ) -> Conditions:
     """The conditions that the options describe; JAX is set up by this."""
     from swashplate.physics.atmosphere import air_density
     from swashplate.physics.environment import Environment
     from swashplate.simulation.compilation import enable_compilation_cache
 
-    made = vehicle_of(name, changed, switched, mass)
+    made = vehicle_of(vehicle, changed, switched, mass)
     enable_compilation_cache()
     if not -500.0 <= altitude <= 11_000.0:
         raise SwashError(f"is {altitude:g} m, expected -500 to 11000.", channel="--altitude")
@@ -121,4 +144,20 @@ def conditions(
     around = Environment(north, east, down, air_density(altitude))
     if "voltage_nominal" in made.parameter_names:
         around = around._replace(voltage=made.card.values()["voltage_nominal"])
-    return Conditions(made, speeds(speed), climb, lateral, math.radians(turn), around)
+    return Conditions(vehicle, made, speeds(speed), climb, lateral, math.radians(turn), around)
+
+
+def flown(verb: Callable[..., None]) -> Callable[..., None]:
+    """A verb about `Conditions` as a command: its first argument becomes the options that describe them."""
+    shared = inspect.signature(conditions, eval_str=True).parameters
+    own = list(inspect.signature(verb, eval_str=True).parameters.values())[1:]
+
+    @functools.wraps(verb)
+    def command(**given: Any) -> None:
+        asked = conditions(**{name: given.pop(name) for name in shared})
+        verb(asked, **given)
+
+    parameters = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in (*shared.values(), *own)]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {entry.name: entry.annotation for entry in parameters}
+    return command

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,26 +14,20 @@ if TYPE_CHECKING:
     from swashplate.vehicles.derivatives import DerivativeTable
 
 
+@given.flown
 def derivatives(
-    vehicle: given.Name,
-    speed: given.Speed = "0",
-    climb: given.Climb = 0.0,
-    lateral: given.Lateral = 0.0,
-    turn: given.Turn = 0.0,
-    wind: given.Wind = "0,0,0",
-    altitude: given.Altitude = 0.0,
-    mass: given.Mass = None,
-    changed: given.Set = None,
-    switched: given.Switch = None,
+    asked: given.Conditions,
     imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as Bhandari et al. have them.")] = False,
+    primed: Annotated[
+        bool,
+        typer.Option("--primed", help="Roll and yaw rows mixed by the product of inertia, as most published tables."),
+    ] = False,
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
     ] = False,
     draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
-    ] = None,
+    plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Stability and control derivatives: force per mass and moment per inertia, split by what contributes to them."""
@@ -43,27 +36,21 @@ def derivatives(
     from swashplate.simulation.uncertainty import spread
     from swashplate.vehicles.derivatives import factor_to_feet, split_name, unit
 
-    asked = given.conditions(
-        vehicle,
-        speed=speed,
-        climb=climb,
-        lateral=lateral,
-        turn=turn,
-        wind=wind,
-        altitude=altitude,
-        mass=mass,
-        changed=changed,
-        switched=switched,
-    )
     if uncertainty and len(asked.speeds) > 1:
         raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
+    if uncertainty and primed:
+        raise SwashError("has no bounds.", channel="--primed", hint="Leave out --uncertainty or --primed.")
     found = asked.trims()
+    remarks = asked.doubts(found)
     tables = [derivative_table(asked.vehicle, at) for at in found]
+    if primed:
+        card = asked.vehicle.card.values()
+        tables = [t.primed(**{name: card[name] for name in ("inertia_xx", "inertia_zz", "inertia_xz")}) for t in tables]
     wide = spread(asked.vehicle, found[0], draws=draws, seed=seed) if uncertainty else None
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot, tables=tables)
+        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks)
     factors = {name: factor_to_feet(*split_name(name)) if imperial else 1.0 for name in tables[0].names()}
     if json:
         document = [
@@ -82,7 +69,7 @@ def derivatives(
             }
             for at, table in zip(found, tables, strict=True)
         ]
-        typer.echo(as_json({"vehicle": vehicle, "tables": document}))
+        typer.echo(as_json({"vehicle": asked.name, "tables": document}))
         return
     for at, table in zip(found, tables, strict=True):
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -15,54 +14,25 @@ if TYPE_CHECKING:
     from swashplate.simulation.linearize import LinearModel
     from swashplate.simulation.trim import Trim
 
-Page = Annotated[
-    Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
-]
 
-
+@given.flown
 def trim(
-    vehicle: given.Name,
-    speed: given.Speed = "0",
-    climb: given.Climb = 0.0,
-    lateral: given.Lateral = 0.0,
-    turn: given.Turn = 0.0,
-    wind: given.Wind = "0,0,0",
-    altitude: given.Altitude = 0.0,
-    mass: given.Mass = None,
-    changed: given.Set = None,
-    switched: given.Switch = None,
-    plot: Page = None,
+    asked: given.Conditions,
+    plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Find the steady flight of a vehicle: attitude and controls, at one speed or over a range."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.vehicles.helicopter_limits import doubts
 
-    asked = given.conditions(
-        vehicle,
-        speed=speed,
-        climb=climb,
-        lateral=lateral,
-        turn=turn,
-        wind=wind,
-        altitude=altitude,
-        mass=mass,
-        changed=changed,
-        switched=switched,
-    )
     found = asked.trims()
-    remarks = [
-        f"At {at.speed:g} m/s {words}."
-        for at in found
-        for words in doubts(asked.vehicle, at.state, at.inputs, at.environment)
-    ]
+    remarks = asked.doubts(found)
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
         speed_page(asked.vehicle, found, path=plot, remarks=remarks)
     if json:
-        typer.echo(as_json({"vehicle": vehicle, "trims": [_document(at) for at in found], "remarks": remarks}))
+        typer.echo(as_json({"vehicle": asked.name, "trims": [_document(at) for at in found], "remarks": remarks}))
         return
     if len(found) == 1:
         typer.echo(repr(found[0]))
@@ -76,8 +46,6 @@ def trim(
             for at in found
         ]
         console().print(table(head, rows, left=0))
-    for remark in remarks:
-        typer.echo(f"Careful: {remark}", err=True)
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
@@ -103,44 +71,25 @@ def _document(at: Trim) -> dict[str, Any]:
     }
 
 
+@given.flown
 def linearize(
-    vehicle: given.Name,
-    speed: given.Speed = "0",
-    climb: given.Climb = 0.0,
-    lateral: given.Lateral = 0.0,
-    turn: given.Turn = 0.0,
-    wind: given.Wind = "0,0,0",
-    altitude: given.Altitude = 0.0,
-    mass: given.Mass = None,
-    changed: given.Set = None,
-    switched: given.Switch = None,
-    plot: Page = None,
+    asked: given.Conditions,
+    plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
     from swashplate.cli.console import as_json
     from swashplate.simulation.linearize import linearize as about
 
-    asked = given.conditions(
-        vehicle,
-        speed=speed,
-        climb=climb,
-        lateral=lateral,
-        turn=turn,
-        wind=wind,
-        altitude=altitude,
-        mass=mass,
-        changed=changed,
-        switched=switched,
-    )
     found = asked.trims()
+    remarks = asked.doubts(found)
     models = [about(asked.vehicle, at) for at in found]
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot)
+        speed_page(asked.vehicle, found, path=plot, remarks=remarks)
     if json:
-        typer.echo(as_json({"vehicle": vehicle, "models": [_matrices(model) for model in models]}))
+        typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(model) for model in models]}))
         return
     for at, model in zip(found, models, strict=True):
         typer.echo(f"At {at.speed:g} m/s\n{model!r}\n")

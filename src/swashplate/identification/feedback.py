@@ -50,8 +50,12 @@ AXES = (
     _Axis("pitch", {"servo_pitch": 1.0}, ("theta", "q", "forward", "u"), "q", ()),
     _Axis("yaw", {"motor_upper": 1.0, "motor_lower": -1.0}, ("psi", "r"), "r", ("damping_r", "inertia_zz")),
     _Axis("heave", {"motor_upper": 0.5, "motor_lower": 0.5}, ("z", "w"), "w", ("damping_w",)),
+    _Axis("roll", {"A1": 1.0}, ("phi", "p", "lateral", "v"), "p", ()),
+    _Axis("pitch", {"B1": 1.0}, ("theta", "q", "forward", "u"), "q", ()),
+    _Axis("yaw", {"theta0T": 1.0}, ("psi", "r"), "r", ("tail_lift_slope", "gyro_gain", "gyro_time")),
+    _Axis("heave", {"theta0": 1.0}, ("z", "w"), "w", ("fuselage_area_z",)),
 )
-"""The axes of a coaxial helicopter, what drives them, and the parameters that only they can tell."""
+"""The axes of a coaxial and of a single-rotor helicopter, what drives them, and the parameters that only they tell."""
 
 
 def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExcitation, ...]:

@@ -11,100 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swashplate.errors import CardError, IdentificationError
+from swashplate.identification.choices import CHOICES as CHOICES
+from swashplate.identification.choices import Free as Free
+from swashplate.identification.choices import choices_for
 from swashplate.identification.expressions import Expression, parse_tie
 from swashplate.vehicles.card import Card
 from swashplate.vehicles.vehicle import Vehicle
 
-
-@dataclass(frozen=True)
-class Free:
-    """One parameter that an identification may move.
-
-    Attributes:
-        name: its name on the card.
-        scale: a change of the order that matters, in the parameter's unit.
-        mean, sigma: prior (None: the data alone decides), in the parameter's unit.
-        start: first guess (None: the card's value).
-        source: where the prior comes from.
-    """
-
-    name: str
-    scale: float
-    mean: float | None = None
-    sigma: float | None = None
-    start: float | None = None
-    source: str = ""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A ready set of free parameters and ties.
-
-    Attributes:
-        name: what the user calls it.
-        description: what it is for.
-        free: the parameters to move.
-        ties: "name = expression" each.
-        fixed: values that the choice sets for the equations' switches.
-    """
-
-    name: str
-    description: str
-    free: tuple[Free, ...]
-    ties: tuple[str, ...] = ()
-    fixed: tuple[tuple[str, float], ...] = ()
-
-
 FROM_CARD = "card: "
 """How the source of a prior that a card gave begins."""
-
-_PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
-_LINEAR_TIES = (
-    "a_beta_u_linear = a_alpha_v_linear",
-    "a_beta_v_linear = a_alpha_u_linear",
-    "a_beta_q_linear = a_alpha_p_linear",
-)
-_CARD = "the published card, half its value"
-_LAG = "the published card, 0.3 rad"
-
-CHOICES: dict[str, Choice] = {
-    "flight": Choice(
-        "flight",
-        "the six parameters that the paper identifies in flight (Fankhauser et al., sec. IV-B)",
-        (
-            Free("a_alpha_v", 0.0125),
-            Free("a_alpha_u", 0.0125),
-            Free("a_alpha_p", 0.012),
-            Free("tau_f_upper", 1.0),
-            Free("o_zeta_upper", 0.1),
-            Free("o_zeta_lower", 0.1),
-        ),
-        _PAPER_TIES,
-    ),
-    "full": Choice(
-        "full",
-        "what a slow flight can tell: servo and bar effectiveness, lags, linear flap-back, rotor and heave damping",
-        (
-            Free("linkage_lower", 0.0678, 0.1355, 0.0678, source=_CARD),
-            Free("tau_f_lower", 0.04, 0.08, 0.04, source=_CARD),
-            Free("o_zeta_lower", 0.3, -0.0094, 0.3, source=_LAG),
-            Free("o_zeta_upper", 0.3, -0.1789, 0.3, source=_LAG),
-            Free("tau_f_upper", 0.8, 1.6, 0.8, source=_CARD),
-            Free("hub_stiffness_upper", 0.0542, 0.1084, 0.0542, source=_CARD),
-            Free("a_alpha_p_linear", 0.02, 0.021, 0.021, 0.021, "16 / (gamma Omega), gamma about 3.2"),
-            Free("a_alpha_v_linear", 0.02, 0.021, 0.021, 0.021, "flap-back of both rotors, 2 x 0.0103 rad s/m"),
-            Free("a_alpha_u_linear", 0.02, 0.0, 0.021, source="at most the flap-back"),
-            Free("gyroscopic", 0.5, 0.5, 0.5, 0.5, "between none and that of rigid rotors"),
-            Free("damping_r", 8.8e-4, 8.8e-4, 8.8e-4, 8.8e-4, "2 (k_Q Omega) of both rotors"),
-            Free("damping_w", 0.3, 0.3, 0.3, 0.3, "momentum theory in hover"),
-            Free("inertia_zz", 1.4e-4, 2.7786e-4, 1.4e-4, source=_CARD),
-            Free("tau_drive_upper", 0.09, 0.185, 0.09, source=_CARD),
-            Free("tau_drive_lower", 0.06, 0.115, 0.06, source=_CARD),
-        ),
-        (*_PAPER_TIES, *_LINEAR_TIES),
-        (("bar_heading_transport", 1.0),),
-    ),
-}
 
 
 @dataclass(frozen=True)
@@ -214,7 +129,8 @@ def parameterize(
 
     Args:
         vehicle: whose parameters they are.
-        free: a ready choice ("flight": the paper's six; "full") or parameter names.
+        free: a ready choice of the vehicle (see `choices_for`; CoaX: "flight", "full"; single rotor: "rotor", "full")
+            or parameter names.
         ties: "name = expression" each, beside those of the choice; one here replaces the choice's for the same name.
         fixed: values held for parameters that are not to move, whatever the choice says of them.
         priors: mean and standard deviation by name; a prior here replaces the choice's.
@@ -228,14 +144,15 @@ def parameterize(
         ExpressionError: for a tie that does not parse.
     """
     held = dict(fixed or {})
-    if isinstance(free, str) and free in CHOICES:
-        choice = CHOICES[free]
-        if not {item.name for item in choice.free} <= set(vehicle.parameter_names):
-            raise IdentificationError(
-                f"the ready choice '{free}' is for another kind of vehicle.",
-                where=vehicle.name,
-                hint="Name the free parameters, e.g. --free hub_stiffness,blade_inertia,wake_distortion.",
-            )
+    ready = choices_for(vehicle)
+    if isinstance(free, str) and free in CHOICES and free not in ready:
+        raise IdentificationError(
+            f"the ready choice '{free}' is for another kind of vehicle.",
+            where=vehicle.name,
+            hint=f"Ready here: {', '.join(ready) or 'none'}; or name the free parameters.",
+        )
+    if isinstance(free, str) and free in ready:
+        choice = ready[free]
         given = {parse_tie(text)[0] for text in ties} | held.keys()
         wanted = list(choice.free)
         texts = [*(text for text in choice.ties if parse_tie(text)[0] not in given), *ties]
@@ -258,7 +175,7 @@ def parameterize(
         _known(vehicle, [name, *expression.names])
     _once([f.name for f in wanted], [name for name, _ in tied], held)
     if not wanted:
-        raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(CHOICES)}.")
+        raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(ready) or 'none'}.")
     table = Parameterization(vehicle, tuple(wanted), _in_order(dict(tied)), taken, prior_card)
     _check_ties(table)
     return table
@@ -358,7 +275,7 @@ def _possible(vehicle: Vehicle, name: str, value: float, how: str) -> None:
 def _as_free(vehicle: Vehicle, item: str | Free) -> Free:
     if isinstance(item, Free):
         return item
-    known = {free.name: free for choice in CHOICES.values() for free in choice.free}
+    known = {free.name: free for choice in choices_for(vehicle).values() for free in choice.free}
     if item in known:
         return replace(known[item], mean=None, sigma=None)
     _known(vehicle, [item])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -11,9 +12,12 @@ from swashplate.flights.flight import Array
 from swashplate.identification.records import Record
 from swashplate.identification.stochastic import Nuisance
 from swashplate.physics.drive_train import steady_speed
-from swashplate.physics.environment import LABORATORY_GRAVITY
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
-from swashplate.simulation.dynamics import jax_backend
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.dynamics import CONSTANTS, equations_of, jax_backend, rates_function
+from swashplate.simulation.trim import assemble, unrest
+from swashplate.vehicles.structure import leaves
 from swashplate.vehicles.vehicle import Vehicle
 
 _SPAN = 0.15
@@ -21,10 +25,47 @@ _SPAN = 0.15
 
 
 def hover(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
-    """Flat state and inputs of the coaxial helicopter's hover, in closed form.
+    """Flat state and inputs of a vehicle's hover in calm air, traceable and differentiable in the parameters."""
+    if "motor_upper" in vehicle.input_names:
+        return _coaxial_hover(vehicle, parameters, voltage)
+    return _hover_by_newton(vehicle, parameters, voltage)
 
-    Both torques balance and both thrusts carry the weight; linearising here needs no iteration.
+
+def _hover_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
+    """Hover by a fixed count of Newton steps, none of which moves an angle by more than `_STRIDE`.
+
+    The steps are not differentiated: one more from where they end, with a constant slope, has the exact derivative
+    (the implicit function theorem).
     """
+    equations = equations_of(vehicle)
+    calm = Environment()
+    row = jnp.stack([jnp.asarray(0.0)] * 3 + [jnp.asarray(voltage, dtype=float)])
+    constants = [getattr(calm, name) for name in CONSTANTS]
+    p = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
+    course = jnp.zeros(6)
+    held = dict(vehicle.trim_held)
+    limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
+    middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
+    start = jnp.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[len(RigidBody._fields) :]])
+    frozen, still = jax.lax.stop_gradient(p), jax.lax.stop_gradient(row)
+
+    def newton(_: Any, reached: tuple[Any, Any]) -> tuple[Any, Any]:
+        value, slope = unrest(equations, reached[0], course, still, frozen)
+        step = jnp.linalg.solve(slope, value)
+        return reached[0] - step * jnp.minimum(1.0, _STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
+
+    found = jax.lax.fori_loop(0, _STEPS, newton, (start, jnp.eye(start.shape[0])))
+    z, slope = jax.lax.stop_gradient(found)
+    z = z - jnp.linalg.solve(slope, unrest(equations, z, course, row, p)[0])
+    return assemble(equations, z, course)
+
+
+_STEPS, _STRIDE = 40, 0.1
+"""Newton steps to hover, and how far each may go [rad]."""
+
+
+def _coaxial_hover(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
+    """Hover of the coaxial helicopter in closed form: both torques balance and both thrusts carry the weight."""
     p = parameters
     ratio = p.k_torque_lower / p.k_torque_upper
     omega_lower = jnp.sqrt(p.mass * LABORATORY_GRAVITY / (p.k_thrust_lower + p.k_thrust_upper * ratio))
@@ -67,7 +108,9 @@ def start_state(
     inputs: Any,
     voltage: Any,
 ) -> Any:
-    """A flat state: pose and its rates from the measurement, rotor speeds steady, bar aligned with the fuselage.
+    """A flat state: pose and its rates from the measurement, inner states where they would rest.
+
+    On the coaxial helicopter rotor speeds are steady and the bar is aligned with the fuselage.
 
     Args:
         value, rate: measured channels and their time derivatives at the start.
@@ -116,4 +159,38 @@ def start_state(
             k_voltage=parameters.k_drive_voltage,
             nominal=parameters.voltage_nominal,
         )
-    return jnp.stack([jnp.asarray(known.get(name, 0.0)) for name in vehicle.state_names])
+    row = jnp.stack([jnp.asarray(known.get(name, 0.0)) for name in vehicle.state_names])
+    if "motor_upper" in vehicle.input_names:
+        return row
+    return _at_rest_inside(vehicle, row, inputs, parameters, voltage)
+
+
+def _at_rest_inside(vehicle: Vehicle, row: Any, inputs: Any, parameters: Any, voltage: Any) -> Any:
+    """The row with disc tilt, bar, inflow, rotor speed and servos where this motion and these inputs hold them.
+
+    Differentiated as `_hover_by_newton` is.
+    """
+    body, rates = len(RigidBody._fields), rates_function(vehicle)
+    still = jax.lax.stop_gradient((row[:body], inputs, parameters, voltage))
+
+    def unrest_inside(inner: Any, body_row: Any, inputs: Any, parameters: Any, voltage: Any) -> Any:
+        surroundings = Environment(voltage=voltage)
+        return rates(jnp.concatenate([body_row, inner]), inputs, parameters, surroundings)[body:]
+
+    def slope(inner: Any) -> Any:
+        found = jax.jacfwd(unrest_inside)(inner, *still)
+        # A governor at its stop does not move: without this the slope could not be inverted.
+        return found - _NUDGE * jnp.eye(inner.shape[0])
+
+    def newton(_: Any, reached: tuple[Any, Any]) -> tuple[Any, Any]:
+        here = slope(reached[0])
+        return reached[0] - jnp.linalg.solve(here, unrest_inside(reached[0], *still)), here
+
+    template = jnp.array(list(leaves(vehicle.state))[body:])
+    found = jax.lax.fori_loop(0, _INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
+    inner, last = jax.lax.stop_gradient(found)
+    inner = inner - jnp.linalg.solve(last, unrest_inside(inner, row[:body], inputs, parameters, voltage))
+    return jnp.concatenate([row[:body], inner])
+
+
+_INNER_STEPS, _NUDGE = 5, 1e-9

@@ -17,25 +17,43 @@ from swashplate.simulation.linearize import LinearModel
 
 _FAST = 1e-9
 
+_CALLED = {
+    "lateral": "A1",
+    "longitudinal": "B1",
+    "pedal": "theta0T",
+    "collective": "theta0",
+    "a": "a1",
+    "b": "b1",
+    "r_fb": "r_gyro",
+}
+"""What the ready structures call otherwise than a single-rotor helicopter does: its inputs, disc tilt, yaw gyro."""
+
 
 def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpaceModel:
     """The model with start values read off a linearised vehicle (`swashplate.linearize`).
 
     An entry that is one parameter (or minus one) takes the linearisation's number at the same states and inputs, scaled
     by the left side. States of the vehicle that the model does not have are residualised: they follow at once, as a
-    quasi-steady derivative supposes (Tischler and Remple 2012, ch. 13). What the vehicle lacks keeps its value.
+    quasi-steady derivative supposes (Tischler and Remple 2012, ch. 13). What the vehicle lacks keeps its value. A time
+    constant that stands on the left side before a rate whose right side has minus the state is read off its decay.
 
     Raises:
         IdentificationError: where vehicle and model share no state or no input.
     """
-    states = [name for name in model.states if name in linear.states]
-    inputs = [name for name in model.inputs if name in linear.inputs]
+
+    def in_vehicle(name: str, known: Sequence[str]) -> str:
+        return name if name in known else _CALLED.get(name, name)
+
+    called = {name: in_vehicle(name, (*linear.states, *linear.inputs)) for name in (*model.states, *model.inputs)}
+    states = [name for name in model.states if called[name] in linear.states]
+    inputs = [name for name in model.inputs if called[name] in linear.inputs]
     if not states or not inputs:
         raise IdentificationError(
             f"'{model.name}' shares no state or no input with the vehicle, which has states {', '.join(linear.states)} "
             f"and inputs {', '.join(linear.inputs)}."
         )
-    a, b = _residualised(linear, states)
+    a, b = _residualised(linear, [called[name] for name in states])
+    model = model.with_values(_time_constants(model, states, a))
     values = model.numbers()
     left = {
         (e.row, e.column): float(e.expression(values)) for e in model.elements if e.matrix == "M" and e.row == e.column
@@ -56,11 +74,25 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
         ):
             continue
         row = states.index(model.states[e.row])
-        number = a[row, states.index(column)] if e.matrix == "F" else b[row, linear.inputs.index(column)]
+        number = a[row, states.index(column)] if e.matrix == "F" else b[row, linear.inputs.index(called[column])]
         parameter = model.parameters[name]
         value = sign * float(number) * left.get((e.row, e.row), 1.0)
         found[name] = float(np.clip(value, parameter.lower, parameter.upper))
     return model.with_values(found)
+
+
+def _time_constants(model: StateSpaceModel, states: Sequence[str], a: Array) -> dict[str, float]:
+    """Parameters that alone multiply a state's rate where the right side has minus that state."""
+    diagonal = [e for e in model.elements if e.row == e.column and model.states[e.row] in states]
+    decays = {e.row for e in diagonal if e.matrix == "F" and e.expression.text.replace(" ", "") == "-1"}
+    found = {}
+    for e in diagonal:
+        name = e.expression.text.strip()
+        if e.matrix == "M" and e.row in decays and name in model.parameters and name not in found:
+            place, parameter = states.index(model.states[e.row]), model.parameters[name]
+            if a[place, place] < 0.0 and parameter.tie is None:
+                found[name] = float(np.clip(-1.0 / a[place, place], parameter.lower, parameter.upper))
+    return found
 
 
 def _residualised(linear: LinearModel, states: Sequence[str]) -> tuple[Array, Array]:

@@ -14,22 +14,28 @@ class RotorSpeed(NamedTuple):
     governor: Scalar
 
 
-def engine_torque(
-    state: RotorSpeed, throttle: Scalar, *, wanted: Scalar, power: Scalar, gain: Scalar, xp: Backend
-) -> Scalar:
-    """Torque on the main shaft [N m]: throttle times the governor's share of the power, never negative.
+class EngineLag(NamedTuple):
+    """The share of its power that an engine gives, which comes later than the governor asks for it."""
+
+    share: Scalar
+
+
+def wanted_share(state: RotorSpeed, *, wanted: Scalar, gain: Scalar, xp: Backend) -> Scalar:
+    """The share of the engine's power that the governor asks for, 0 to 1.
 
     Args:
         state: speed and integral.
-        throttle: 1 lets the governor have the whole engine, 0 is autorotation.
         wanted: governed speed [rad/s].
-        power: largest power at the shaft [W].
         gain: share of the power per relative speed error.
     """
     share = state.governor + gain * (1.0 - state.omega / wanted)
-    share = xp.minimum(1.0, xp.maximum(0.0, share))
+    return xp.minimum(1.0, xp.maximum(0.0, share))
+
+
+def engine_torque(state: RotorSpeed, share: Scalar, *, wanted: Scalar, power: Scalar, xp: Backend) -> Scalar:
+    """Torque on the main shaft [N m] of a share of the largest power [W], never negative."""
     # An engine gives its torque, not its power, to a rotor that stands still.
-    return throttle * share * power / xp.maximum(state.omega, 0.3 * wanted)
+    return share * power / xp.maximum(state.omega, 0.3 * wanted)
 
 
 def rotor_speed_rates(

@@ -168,7 +168,7 @@ def _derivatives(trims: Sequence[Trim], tables: Sequence[DerivativeTable]) -> Fi
                 )
     keys = (Key("total", BLACK), *(Key(part.replace("_", " "), _PART_COLORS[part], "dash") for part in parts))
     return Figure(
-        "derivatives",
+        "derivatives-over-speed",
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Derivatives (force per mass, moment per inertia) and what contributes to them.",

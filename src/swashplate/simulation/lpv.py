@@ -80,6 +80,7 @@ def simulate_lpv(
     start: Trim,
     scheme: Scheme,
     over: Schedule | None = None,
+    initial: Mapping[str, float] | None = None,
     rate: float = 1000.0,
 ) -> Flight:
     """Fly given controls with an LPV model.
@@ -90,13 +91,15 @@ def simulate_lpv(
         start: the trim that it begins at (and that "as-printed" counts from).
         scheme: "as-printed", "trim-term" or "stitched".
         over: the table of the latter two.
+        initial: those of `PAPER_STATES` that do not begin at `start`, e.g. as measured in a flight.
         rate: steps per second [Hz]; Runge-Kutta of order 4, matrices held over a step.
 
     Returns:
         A flight with the eight states and the inputs.
 
     Raises:
-        FlightError: where an input is missing. SwashError: for another vehicle, scheme, or without the table it needs.
+        FlightError: where an input is missing.
+        SwashError: for another vehicle, scheme or initial state, or without the table it needs.
     """
     enable_double_precision()
     names = ("a1", "b1")
@@ -108,20 +111,25 @@ def simulate_lpv(
     if missing:
         raise FlightError("is missing.", channel=missing[0])
     u = np.column_stack([np.asarray(inputs[name], dtype=np.float64) for name in PAPER_INPUTS])
+    unknown = sorted(set(initial or {}) - set(PAPER_STATES))
+    if unknown:
+        raise SwashError(f"is not one of {', '.join(PAPER_STATES)}.", channel=unknown[0])
     x0 = np.array([start.states()[name] for name in PAPER_STATES])
+    began = np.array([(initial or {}).get(name, x0[i]) for i, name in enumerate(PAPER_STATES)], dtype=np.float64)
     u0 = np.array([start.commands()[name] for name in PAPER_INPUTS])
     surroundings = start.environment
     if scheme == "as-printed":
         disc = np.array([start.states()[name] for name in names])
         row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
         p = parameter_row(vehicle, surroundings)
-        states = _printed(equations_of(vehicle), x0, u0, disc, u, row, p, 1.0 / rate)
+        padded = np.concatenate([u, np.repeat(u[-1:], -len(u) % _CHUNK, axis=0)])
+        states = _printed(equations_of(vehicle), (x0, u0), (began, disc), padded, row, p, 1.0 / rate)[: len(u)]
     elif scheme in ("trim-term", "stitched"):
         if over is None:
             raise SwashError(f"scheme '{scheme}' needs a schedule.", hint="Pass over=schedule(vehicle, speeds).")
         tables = tuple(map(jnp.asarray, (over.speeds, over.x, over.u, over.A, over.B)))
         g = float(surroundings.gravity)
-        states = _scheduled(tables, x0, u, 1.0 / rate, g, stitched=scheme == "stitched")
+        states = _scheduled(tables, began, u, 1.0 / rate, g, stitched=scheme == "stitched")
     else:
         raise SwashError(f"scheme is '{scheme}', expected 'as-printed', 'trim-term' or 'stitched'.")
     time = np.arange(len(u)) / rate
@@ -131,19 +139,29 @@ def simulate_lpv(
     return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate_lpv", scheme=scheme, rate=rate)
 
 
+_CHUNK = 50
+"""Steps per inner loop: XLA makes one function of a loop that touches little (`compile_small_loops_whole`)."""
+
+
+def _product(A: Any, x: Any) -> Any:
+    """A @ x for a small matrix and a vector or matrix: a loop with a matrix product in it would not be one function."""
+    return jnp.sum(A[:, :, None] * x[None], axis=1) if x.ndim == 2 else jnp.sum(A * x, axis=1)
+
+
 def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
     """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
-    k = A @ x + c
+    k = _product(A, x) + c
     total, term = x + dt * k, k
     for order in (2.0, 3.0, 4.0):
-        term = dt * (A @ term) / order
+        term = dt * _product(A, term) / order
         total = total + dt * term
     return total
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _printed(equations: Equations, x0: Any, u0: Any, disc0: Any, u: Any, row: Any, p: Any, dt: Any) -> Any:
+def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p: Any, dt: Any) -> Any:
     vehicle = equations.vehicle
+    x0, u0 = trimmed
     rates = row_rates(equations, padded=False)
     names = vehicle.state_names
     ten = (*PAPER_STATES, "a1", "b1")
@@ -160,24 +178,22 @@ def _printed(equations: Equations, x0: Any, u0: Any, disc0: Any, u: Any, row: An
     def step(carry: tuple[Any, Any], command: Any) -> tuple[Any, Any]:
         x, disc = carry
         z = jnp.concatenate([x, disc, command])
-        # Eight directions at a time in a loop that XLA makes one function of (`compile_small_loops_whole`); the zero
-        # keeps it from moving what all directions share out of that loop, into hundreds of launches (8 times slower).
-        values, slopes = jax.lax.map(
-            lambda along: jax.vmap(lambda e: jax.jvp(moving, (z + 0.0 * along[0],), (e,)))(along),
-            jnp.eye(16)[:, :14].reshape(2, 8, 14),
-        )
-        value, J = values[0, 0], slopes.reshape(16, 10)[:14].T
+        # Sixteen directions side by side fill the processor's vectors; the last two are nothing.
+        value, slopes = jax.vmap(lambda along: jax.jvp(moving, (z,), (along,)), out_axes=(None, 0))(jnp.eye(16)[:, :14])
+        J = slopes[:14].T
         # The disc's equations are linear in the disc: one Newton step is its steady tilt at this state.
         a, b, c, d = J[8, 8], J[8, 9], J[9, 8], J[9, 9]
-        inverse = jnp.array([[d, -b], [-c, a]]) / (a * d - b * c)
-        follow = -inverse @ jnp.concatenate([J[8:, :8], J[8:, 10:]], axis=1)
-        A = J[:8, :8] + J[:8, 8:10] @ follow[:, :8]
-        B = J[:8, 10:] + J[:8, 8:10] @ follow[:, 8:]
-        after = _linear_step(A, B @ (command - u0) - A @ x0, x, dt)
-        return (after, disc - inverse @ value[8:]), x
+        inverse = jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / (a * d - b * c)
+        follow = -_product(inverse, jnp.concatenate([J[8:, :8], J[8:, 10:]], axis=1))
+        A = J[:8, :8] + _product(J[:8, 8:10], follow[:, :8])
+        B = J[:8, 10:] + _product(J[:8, 8:10], follow[:, 8:])
+        after = _linear_step(A, _product(B, command - u0) - _product(A, x0), x, dt)
+        return (after, disc - _product(inverse, value[8:])), x
 
-    _, states = jax.lax.scan(step, (jnp.asarray(x0), jnp.asarray(disc0)), jnp.asarray(u))
-    return states
+    start: Any = tuple(map(jnp.asarray, begin))
+    chunks = jnp.asarray(u).reshape(-1, _CHUNK, u.shape[1])
+    _, states = jax.lax.scan(lambda carry, commands: jax.lax.scan(step, carry, commands), start, chunks)
+    return states.reshape(-1, len(PAPER_STATES))
 
 
 @partial(jax.jit, static_argnames=("stitched",))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import jax
@@ -135,12 +134,12 @@ def trim(
         raise TrimError("is not a finite number.", where=vehicle.name, channel=", ".join(strange))
 
     def residual(z: Array) -> tuple[Array, Array]:
-        value, slope = _residual(equations, z, course, row, p)
+        value, slope = _unrest(equations, z, course, row, p)
         return np.asarray(value), np.asarray(slope)
 
     z = _first_guess(vehicle, residual) if near is None else _unknowns(vehicle, near)
     z, value = _newton(z, residual)
-    state, inputs = (np.asarray(part) for part in _assemble(equations, z, course))
+    state, inputs = (np.asarray(part) for part in assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
     where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
     battery = "voltage_nominal" in vehicle.parameter_names
@@ -162,8 +161,13 @@ def trim(
     )
 
 
-def _assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
-    """State and input rows from the unknowns: roll, pitch, inputs, inner states."""
+def assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
+    """State and input rows of a steady flight from the unknowns (traceable).
+
+    Args:
+        z: roll and pitch, the inputs that are solved for, inner states.
+        course: velocity ahead, right and down, heading, rate of turn, place down.
+    """
     vehicle = equations.vehicle
     held = dict(vehicle.trim_held)
     n_inputs = len(vehicle.input_names) - len(held)
@@ -181,18 +185,25 @@ def _assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
     )
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _residual(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple[Any, Any]:
-    """What should vanish, and its derivatives by the unknowns."""
+def unrest(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple[Any, Any]:
+    """What should vanish in the steady flight that `assemble` makes, and its derivatives by the unknowns (traceable).
+
+    Args:
+        z, course: as in `assemble`.
+        row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
+    """
 
     def rest(z: Any) -> tuple[Any, Any]:
-        state, inputs = _assemble(equations, z, course)
+        state, inputs = assemble(equations, z, course)
         rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
         value = jnp.concatenate([rates[_ACCELERATIONS], rates[_ANGULAR_ACCELERATIONS], rates[_BODY:]])
         return value, value
 
     slope, value = jax.jacfwd(rest, has_aux=True)(z)
     return value, slope
+
+
+_unrest = jax.jit(unrest, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 
 
 def _residual_names(vehicle: Vehicle) -> tuple[str, ...]:
@@ -215,7 +226,7 @@ def _first_guess(vehicle: Vehicle, residual: Any) -> Array:
 
 
 def _unknowns(vehicle: Vehicle, known: Trim) -> Array:
-    """The unknowns of `_assemble` at a known trim."""
+    """The unknowns of `assemble` at a known trim."""
     held = dict(vehicle.trim_held)
     inputs = [value for name, value in known.commands().items() if name not in held]
     attitude = [known.states()["phi"], known.states()["theta"]]

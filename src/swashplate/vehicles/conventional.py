@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from swashplate.physics import actuators, bell_hiller, engine, fuselage, ground_contact, tail_rotor, tail_surfaces
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.bell_hiller import Bar
-from swashplate.physics.engine import RotorSpeed
+from swashplate.physics.engine import EngineLag, RotorSpeed
 from swashplate.physics.environment import Environment
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector, local_to_body
@@ -64,6 +64,19 @@ class Servos(NamedTuple):
     theta0T_servo: Scalar
 
 
+class Delays(NamedTuple):
+    """The delayed commands' states: place [rad] and rate [rad/s] of each (`actuators.delayed`)."""
+
+    theta0_late: Scalar
+    B1_late: Scalar
+    A1_late: Scalar
+    theta0T_late: Scalar
+    theta0_late_rate: Scalar
+    B1_late_rate: Scalar
+    A1_late_rate: Scalar
+    theta0T_late_rate: Scalar
+
+
 class HelicopterState(NamedTuple):
     """Rigid body and tip-path plane, and the optional parts: None where they are left out."""
 
@@ -74,6 +87,8 @@ class HelicopterState(NamedTuple):
     rotor: RotorSpeed | None
     gyro: YawGyro | None
     servos: Servos | None
+    delays: Delays | None
+    engine: EngineLag | None
 
 
 class Loads(NamedTuple):
@@ -91,6 +106,8 @@ class Loads(NamedTuple):
     rotor: RotorSpeed | None
     gyro: YawGyro | None
     servos: Servos | None
+    delays: Delays | None
+    engine: EngineLag | None
     induced: Scalar
     power: Scalar
 
@@ -117,9 +134,11 @@ def loads(
     u, v, w = air
     p, q, r = body.rates
 
-    # Controls: servos, yaw gyro, stabilizer bar.
+    # Controls: delay, servos, yaw gyro, stabilizer bar.
     sticks = Controls(inputs.theta0, inputs.B1, inputs.A1, inputs.theta0T)
-    servo_rates = None
+    servo_rates, late = None, None
+    if state.delays is not None:
+        late, sticks = _late(state.delays, sticks, par.servo_delay)
     if state.servos is not None:
         stops = (
             (par.collective_low, par.collective_high),
@@ -220,17 +239,14 @@ def loads(
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.
     load = fading * (rotor.torque + par.tail_gear * tail.torque)
-    rotor_rates = None
+    rotor_rates, lag = None, None
     if state.rotor is not None:
         throttle = inputs.throttle if options.throttle else 1.0
-        torque = engine.engine_torque(
-            state.rotor,
-            throttle,
-            wanted=par.rotor_speed,
-            power=par.engine_power,
-            gain=par.governor_gain,
-            xp=xp,
-        )
+        share = throttle * engine.wanted_share(state.rotor, wanted=par.rotor_speed, gain=par.governor_gain, xp=xp)
+        if state.engine is not None:
+            lag = EngineLag((share - state.engine.share) / par.engine_time)
+            share = state.engine.share
+        torque = engine.engine_torque(state.rotor, share, wanted=par.rotor_speed, power=par.engine_power, xp=xp)
         rotor_rates = engine.rotor_speed_rates(
             state.rotor,
             torque,
@@ -263,9 +279,19 @@ def loads(
         rotor_rates,
         gyro_rates,
         servo_rates,
+        late,
+        lag,
         rotor.induced,
         load * turning,
     )
+
+
+def _late(states: Delays, sticks: Controls, delay: Scalar) -> tuple[Delays, Controls]:
+    """Rates of the delays' states, and what comes out of them."""
+    places, moving = states[:4], states[4:]
+    rates = [actuators.delay_rates(*each, delay=delay) for each in zip(places, moving, sticks, strict=True)]
+    out = Controls(*(actuators.delayed(*each, delay=delay) for each in zip(places, moving, strict=True)))
+    return Delays(*(rate for rate, _ in rates), *(change for _, change in rates)), out
 
 
 def _sum(acting: Loads) -> Contribution:
@@ -291,6 +317,8 @@ def derivatives(
         acting.rotor,
         acting.gyro,
         acting.servos,
+        acting.delays,
+        acting.engine,
     )
 
 
@@ -322,6 +350,8 @@ def conventional(card: Card) -> Vehicle:
         RotorSpeed(speed, 0.3) if options.rotor_speed != "fixed" else None,
         YawGyro(0.0) if options.gyro else None,
         Servos(0.1, 0.0, 0.0, 0.1) if options.servos else None,
+        Delays(0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0) if options.delay else None,
+        EngineLag(0.3) if options.engine_lag else None,
     )
     names, units = list(RigidBody._fields), list(_BODY_UNITS)
     for part, inner in (
@@ -331,6 +361,8 @@ def conventional(card: Card) -> Vehicle:
         (nothing.rotor, ("rad/s", "1")),
         (nothing.gyro, ("rad/s",)),
         (nothing.servos, ("rad",) * 4),
+        (nothing.delays, ("rad",) * 4 + ("rad/s",) * 4),
+        (nothing.engine, ("1",)),
     ):
         if part is not None:
             names += part._fields

@@ -20,6 +20,8 @@ class HelicopterOptions(NamedTuple):
         rotor_speed: "fixed", "governed" (a state under the governor) or "throttle" (the same with a fifth input).
         gyro: yaw gyro.
         servos: servo lags, speed limits and stops.
+        delay: commands come late by the card's pure delay.
+        engine_lag: the engine's power follows the governor with a lag; it needs a rotor speed that is not fixed.
         ground: skids touch ground at z = 0.
         phase_lag: use the card's aerodynamic phase lag.
         in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
@@ -32,6 +34,8 @@ class HelicopterOptions(NamedTuple):
     rotor_speed: str = "fixed"
     gyro: bool = False
     servos: bool = False
+    delay: bool = False
+    engine_lag: bool = False
     ground: bool = False
     phase_lag: bool = False
     in_plane: str = "blade-element"
@@ -51,7 +55,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
     "rotor_speed": ("fixed", "governed", "throttle"),
     "in_plane": ("blade-element", "thrust-tilt"),
-    **dict.fromkeys(("coning", "bar", "gyro", "servos", "ground", "phase_lag"), (True, False)),
+    **dict.fromkeys(("coning", "bar", "gyro", "servos", "delay", "engine_lag", "ground", "phase_lag"), (True, False)),
 }
 
 
@@ -69,4 +73,12 @@ def helicopter_options(card: Card) -> HelicopterOptions:
         if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
             expected = ", ".join(map(repr, _CHOICES[name]))
             raise CardError(f"is {value!r}, expected one of {expected}.", where=where, channel=name)
-    return HelicopterOptions(**dict(card.options))
+    chosen = HelicopterOptions(**dict(card.options))
+    if chosen.engine_lag and chosen.rotor_speed == "fixed":
+        raise CardError(
+            "needs a rotor speed that the engine can change.",
+            where=where,
+            channel="engine_lag",
+            hint='Add rotor_speed = "governed", or "throttle".',
+        )
+    return chosen

@@ -1,0 +1,38 @@
+"""What `swash trim --plot` and `swash derivatives --plot` write, in a real browser: drawn, without an error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from chromium import Visit, running_browser
+from swashplate.cli.app import app
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    yield from running_browser()
+
+
+@pytest.mark.parametrize("verb", ["trim", "derivatives"])
+@pytest.mark.parametrize("size", [(1200, 900), (390, 844)])
+def test_the_page_is_drawn_says_nothing_and_fetches_nothing(
+    browser: Any, tmp_path: Path, verb: str, size: tuple[int, int]
+) -> None:
+    page = tmp_path / f"{verb}.html"
+    outcome = CliRunner().invoke(app, [verb, "raptor50", "--speed", "0-8/4", "--plot", str(page)])
+    assert outcome.exit_code == 0, outcome.output
+    seen = Visit(browser, page, size)
+    assert seen.said == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in seen.asked)
+    marks = seen.page.evaluate(
+        "Array.from(document.querySelectorAll('.canvas'), c => c.querySelectorAll('.trace, .point').length)"
+    )
+    assert len(marks) >= (3 if verb == "derivatives" else 2)
+    assert all(count > 0 for count in marks)
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    seen.page.close()
