@@ -55,8 +55,15 @@ class Punctual:
     def met(self) -> bool:
         return self.late <= self.target
 
+    @property
+    def note(self) -> str:
+        return (
+            f"{self.seconds:.0f} s, {self.updates:.1f} updates/s, {self.processor:.1f} % of a core for the server, "
+            f"{self.latency:.0f} ms from stick to page, load {self.load:.1f} before"
+        )
+
     def as_json(self) -> dict[str, object]:
-        return {**asdict(self), "met": self.met}
+        return {**asdict(self), "met": self.met, "note": self.note}
 
 
 def measure(*, short: bool) -> list[Punctual]:

@@ -68,6 +68,21 @@ def _processor() -> str:
     return names[0] if names else platform.processor()
 
 
+def verdict(target: float | None, met: bool) -> str:
+    """Whether a promise was kept, where one was made."""
+    return "" if target is None else ("met" if met else "MISSED")
+
+
+def show(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    """One table on the screen, its numbers to the right."""
+    table = Table(title=title)
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if place in (1, 2) else "left")
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true", help="fewer steps and repeats")
@@ -75,14 +90,14 @@ def main() -> None:
     options = parser.parse_args()
     enable_compilation_cache()
     where, results = machine(), measure(short=options.short)
-    table = Table(title=f"Steps per second, best of several ({where['processor']}, {where['cores']} cores)")
-    for heading in ("what", "rate", "promised", "", "note"):
-        table.add_column(heading, justify="right" if heading in ("rate", "promised") else "left")
-    for result in results:
-        promised = "" if result.target is None else f"{result.target:,.0f}"
-        verdict = "" if result.target is None else ("met" if result.met else "MISSED")
-        table.add_row(result.name, f"{result.rate:,.0f}", promised, verdict, result.note)
-    Console().print(table)
+    show(
+        f"Steps per second, best of several ({where['processor']}, {where['cores']} cores)",
+        ("what", "rate", "promised", "", "note"),
+        [
+            (r.name, f"{r.rate:,.0f}", "" if r.target is None else f"{r.target:,.0f}", verdict(r.target, r.met), r.note)
+            for r in results
+        ],
+    )
     repeats = 2 if options.short else 5
     spans = [
         closed_loops.flights(count=256 if options.short else 1000),
@@ -90,33 +105,17 @@ def main() -> None:
         frequency.responses(repeats=repeats),
         frequency.fit(repeats=1),
     ]
-    table = Table(title="Seconds of an identification")
-    for heading in ("what", "seconds", "promised", "", "note"):
-        table.add_column(heading, justify="right" if heading in ("seconds", "promised") else "left")
-    for span in spans:
-        table.add_row(
-            span.name, f"{span.seconds:.2f}", f"{span.target:.2f}", "met" if span.met else "MISSED", span.note
-        )
-    Console().print(table)
+    show(
+        "Seconds",
+        ("what", "seconds", "promised", "", "note"),
+        [(s.name, f"{s.seconds:.2f}", f"{s.target:.2f}", verdict(s.target, s.met), s.note) for s in spans],
+    )
     flown = live.measure(short=options.short)
-    table = Table(title="Live: 500 Hz physics and 100 Hz controller in real time")
-    for heading in (
-        "page",
-        "late %",
-        "promised",
-        "",
-        "server's core %",
-        "updates/s",
-        "stick ms",
-        "for s",
-        "load before",
-    ):
-        table.add_column(heading, justify="left" if heading == "page" else "right")
-    for run in flown:
-        numbers = [f"{run.processor:.1f}", f"{run.updates:.1f}", f"{run.latency:.0f}", f"{run.seconds:.0f}"]
-        verdict = "met" if run.met else "MISSED"
-        table.add_row(run.name, f"{run.late:.3f}", f"{run.target:g}", verdict, *numbers, f"{run.load:.1f}")
-    Console().print(table)
+    show(
+        "Live: 500 Hz physics and 100 Hz controller in real time",
+        ("page", "late %", "promised", "", "note"),
+        [(run.name, f"{run.late:.3f}", f"{run.target:g}", verdict(run.target, run.met), run.note) for run in flown],
+    )
     if options.out is not None:
         document = {
             "machine": where,
