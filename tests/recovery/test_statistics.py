@@ -69,7 +69,7 @@ def _judge(
     """Leave the table of the estimates' scatter, then hold it against what is promised."""
     share = inside(recoveries)
     error, distance = np.array([r.error for r in recoveries]), np.array([r.distance for r in recoveries])
-    predicted = np.median([r.sigma for r in recoveries], axis=0)
+    sigma = np.array([r.sigma for r in recoveries])
     # Each error in its own seed's sigma: gaps fall elsewhere in every seed, and with them what can be known.
     ratio = distance.std(axis=0, ddof=1)
     within = np.mean(np.abs(distance) < 2.0, axis=0)
@@ -79,14 +79,23 @@ def _judge(
         {
             "title": title,
             "text": f"{how} Pooled over the parameters {100.0 * share:.1f} % lie within two corrected sigmas.",
-            "columns": ["parameter", "mean error", "scatter", "median sigma", "scatter in sigmas", "within 2 sigmas"],
+            "columns": [
+                "parameter",
+                "mean error",
+                "scatter",
+                "median sigma",
+                "root mean square of sigma",
+                "scatter in own sigmas",
+                "within 2 sigmas",
+            ],
             "rows": [
                 [name, *(float(x) for x in row)]
                 for name, *row in zip(
                     recoveries[0].names,
                     error.mean(axis=0),
                     error.std(axis=0, ddof=1),
-                    predicted,
+                    np.median(sigma, axis=0),
+                    np.sqrt(np.mean(sigma**2, axis=0)),
                     ratio,
                     within,
                     strict=True,
