@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import re
 import shutil
@@ -57,8 +58,9 @@ class Punctual:
 
     @property
     def note(self) -> str:
+        updates = "" if math.isnan(self.updates) else f"{self.updates:.1f} updates/s, "
         return (
-            f"{self.seconds:.0f} s, {self.updates:.1f} updates/s, {self.processor:.1f} % of a core for the server, "
+            f"{self.seconds:.0f} s, {updates}{self.processor:.1f} % of a core for the server, "
             f"{self.latency:.0f} ms from stick to page, load {self.load:.1f} before"
         )
 

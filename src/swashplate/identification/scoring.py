@@ -106,28 +106,36 @@ def minimise(
     small = 0
     kinked = row_of.column("kinked") > 0.0
     reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
+    noise = np.array([entry.group == "noise" for entry in row_of.entries])
     for iteration in range(iterations):
         found = None
-        while damping < _HOPELESS:
-            weights = np.where(kinked, max(damping, caution), damping)
-            step = _step(row, gradient, information[1], weights, low, high)
-            step = _within(reach, step, gradient, information[1])
-            trial = np.clip(row + step, low, high)
-            trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
-            if np.isfinite(trial_cost) and trial_cost < cost:
-                found = trial, trial_cost
+        options = [(damping, caution)]
+        while found is None and damping < _HOPELESS:
+            tried = []
+            for each, careful in options:
+                weights = np.where(kinked, max(each, careful), each)
+                step = _step(row, gradient, information[1], weights, low, high)
+                step = _within(reach, step, gradient, information[1], noise)
+                trial = np.clip(row + step, low, high)
+                trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
+                if np.isfinite(trial_cost) and trial_cost < cost:
+                    tried.append((trial_cost, trial, each, careful))
+            if tried:
+                found = min(tried, key=lambda one: one[0])
                 break
-            # A rejected step is blamed on the kinked entries first, which then stand still while the others go on.
+            # Either all went too far, or a kinked entry did, which then stands still while the others go on.
+            if len(options) > 1:
+                damping, caution = 10.0 * damping, min(100.0 * caution, _STILL)
+            options = [(10.0 * damping, caution)]
             if kinked.any() and caution < _STILL:
-                caution *= 100.0
+                options.append((damping, min(100.0 * caution, _STILL)))
             else:
                 damping *= 10.0
         if found is None:
             converged = True  # no direction goes down any more
             break
-        gained = cost - found[1]
-        row = found[0]
-        damping, caution = max(damping / 10.0, 1e-12), max(caution / 10.0, 1e-12)
+        gained, row = cost - found[0], found[1]
+        damping, caution = max(found[2] / 10.0, 1e-12), max(found[3] / 10.0, 1e-12)
         likelihood.refresh(row)
         cost, gradient, information = _posterior(likelihood, row)
         history.append(cost)
@@ -143,15 +151,16 @@ def minimise(
     return Optimum(row, cost, tuple(history), information[0], converged, at_bound)
 
 
-def _within(reach: Array, step: Array, gradient: Array, hessian: Array) -> Array:
-    """The step with no entry beyond its reach: cut entry by entry or shortened as a whole, whichever promises more.
+def _within(reach: Array, step: Array, gradient: Array, hessian: Array, noise: Array) -> Array:
+    """The step with no entry beyond its reach: shortened as a whole, so that it stays in a narrow valley.
 
-    Cutting lets the others go on where one entry runs away, as the logarithm of a noise that is not there; along a
-    narrow valley it leads out of the valley.
+    The logarithm of a noise that is not there runs far away without changing anything. Where there are such entries,
+    the step may be cut entry by entry instead, so that the others go on: whichever promises more.
     """
     cut = np.clip(step, -reach, reach)
     shortened = step / max(1.0, float(np.max(np.abs(step) / reach)))
-    return min(cut, shortened, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
+    ways = (cut, shortened) if noise.any() else (shortened,)
+    return min(ways, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
 
 
 def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
