@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -55,12 +54,8 @@ def test_a_link_in_a_process_of_its_own(tmp_path: Path) -> None:
     """Only this machine is listened to, packets are answered, an interrupt ends it well and the flight is kept."""
     record = tmp_path / "flown.nc"
     command = [sys.executable, "-m", "swashplate", "link", "ardupilot", "--vehicle", "coax", "--port", "0"]
-    # In a shell's background interrupts are ignored, and children inherit that.
-    heeding = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with (
-        subprocess.Popen(
-            [*command, "--record", str(record)], stderr=subprocess.PIPE, text=True, preexec_fn=heeding
-        ) as link,
+        subprocess.Popen([*command, "--record", str(record)], stderr=subprocess.PIPE, text=True) as link,
         ExitStack() as clean,
     ):
         clean.callback(link.kill)

@@ -172,8 +172,11 @@ def _mapping(name: str, servos: str | None, suffix: str, vehicle: Vehicle) -> Se
 
 
 def _own_process() -> None:
+    import signal
+
     from swashplate.simulation.compilation import dispatch_in_line
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # started in a shell's background it would be ignored
     dispatch_in_line()
 
 

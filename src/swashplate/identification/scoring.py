@@ -106,7 +106,6 @@ def minimise(
     small = 0
     kinked = row_of.column("kinked") > 0.0
     reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
-    noise = np.array([entry.group == "noise" for entry in row_of.entries])
     for iteration in range(iterations):
         found = None
         options = [(damping, caution)]
@@ -115,7 +114,7 @@ def minimise(
             for each, careful in options:
                 weights = np.where(kinked, max(each, careful), each)
                 step = _step(row, gradient, information[1], weights, low, high)
-                step = _within(reach, step, gradient, information[1], noise)
+                step = _within(reach, step, gradient, information[1])
                 trial = np.clip(row + step, low, high)
                 trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
                 if np.isfinite(trial_cost) and trial_cost < cost:
@@ -151,16 +150,15 @@ def minimise(
     return Optimum(row, cost, tuple(history), information[0], converged, at_bound)
 
 
-def _within(reach: Array, step: Array, gradient: Array, hessian: Array, noise: Array) -> Array:
-    """The step with no entry beyond its reach: shortened as a whole, so that it stays in a narrow valley.
+def _within(reach: Array, step: Array, gradient: Array, hessian: Array) -> Array:
+    """The step with no entry beyond its reach: cut entry by entry or shortened as a whole, whichever promises more.
 
-    The logarithm of a noise that is not there runs far away without changing anything. Where there are such entries,
-    the step may be cut entry by entry instead, so that the others go on: whichever promises more.
+    Cutting lets the others go on where one entry runs away, as the logarithm of a noise that is not there; along a
+    narrow valley it leads out of the valley.
     """
     cut = np.clip(step, -reach, reach)
     shortened = step / max(1.0, float(np.max(np.abs(step) / reach)))
-    ways = (cut, shortened) if noise.any() else (shortened,)
-    return min(ways, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
+    return min(cut, shortened, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
 
 
 def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:
