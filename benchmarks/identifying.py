@@ -109,9 +109,9 @@ def nelder_mead(logged: sp.Flight) -> Span:
     likelihood = OutputError(parameterize(_start(), "full"), records(logged, sp.vehicle("coax")))
     likelihood.refresh(likelihood.row.starts())
     only = _ParametersOnly(likelihood)
-    minimise(only, iterations=2)
+    minimise(only, iterations=2, together=True)
     begin = time.perf_counter()
-    best = minimise(only)
+    best = minimise(only, together=True)
     ours = time.perf_counter() - begin
     lowest = [np.inf]
 

@@ -105,7 +105,8 @@ def identify(
         assert isinstance(likelihood, OutputError)
         optimum = nelder_mead.minimise_squares(likelihood, progress=progress)
     else:
-        optimum = minimise(likelihood, iterations=iterations, progress=progress)
+        shots = method == "output-error"
+        optimum = minimise(likelihood, iterations=iterations, together=shots, progress=progress)
     found = _found(table, likelihood, optimum)
     parameters, problems = _estimates(found, vehicle)
     notes += [
