@@ -167,7 +167,9 @@ def resample(
             f"the longest piece without a gap above {max_gap} s lasts {longest_found:.3f} s, expected at least "
             f"{needed:.3f} s.",
             where=where,
-            hint="Allow longer gaps with max_gap=..., or record a longer flight.",
+            hint="Record a longer flight."
+            if len(pieces) < 2
+            else "Record a longer flight with fewer gaps, or bridge longer ones (in Python condition(max_gap=...)).",
         )
     start = flight.start
     times: list[Array] = []

@@ -82,6 +82,7 @@ def read(
     options = Options(
         units=units or {},
         mapping=load_mapping(mapping),
+        mapping_file="" if mapping is None or isinstance(mapping, Mapping) else str(mapping),
         body=body,
         rotation=rotation,
         body_axes=body_axes,
