@@ -277,6 +277,21 @@ def test_a_wrong_maneuver_is_refused(maneuver: str, expected: str, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_a_simulation_cannot_fly_is_said_first(tmp_path: Path) -> None:
+    command = ("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / "a.nc")
+    for extra, expected in (
+        (("--sag", "5"), ("voltage", "falls to", "smaller sag")),
+        (("--rate", "60"), ("60 Hz", "multiple of the controller's 50 Hz", "Give 50 Hz")),
+        (("--option", "bar"), ("--option", "bar=true")),
+    ):
+        message = one_message(swash(*command, *extra))
+        for part in expected:
+            assert part in message, message
+    message = one_message(swash("trim", "raptor50", "--speed", "0-4/2", "--plot", tmp_path / "a.pdf"))
+    assert "expected .html" in message
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("out", ["a.xlsx", "nowhere/a.nc"])
 def test_a_simulation_that_cannot_be_saved_is_refused(out: str, tmp_path: Path) -> None:
     outcome = swash("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / out)

@@ -73,6 +73,11 @@ class Card:
         """Its file, or the name of its equations where it has none: what messages about it begin with."""
         return self.path or self.vehicle
 
+    @property
+    def called(self) -> str:
+        """What people call it: a packaged card's name, or its file; the name of its equations where it has none."""
+        return self.path.removesuffix(".toml") or self.vehicle
+
     def values(self) -> dict[str, float]:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
