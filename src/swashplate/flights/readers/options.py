@@ -65,7 +65,7 @@ def with_mocap_table(options: Options) -> Options:
             where=options.mapping_file or None,
             hint="Correct the key.",
         )
-    given = {key: getattr(options, key) or table.get(key) for key in _MOCAP_KEYS}
+    given: dict[str, Any] = {key: getattr(options, key) or table.get(key) for key in _MOCAP_KEYS}
     wrong = [key for key, value in given.items() if not isinstance(value, str | None)]
     if wrong:
         raise FlightError(
