@@ -292,6 +292,12 @@ def test_what_a_simulation_cannot_fly_is_said_first(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_input_that_stands_at_its_limit_is_said(tmp_path: Path) -> None:
+    flown = swash("simulate", "--vehicle", "coax", "--maneuver", "doublet:roll,1s,5", "--out", tmp_path / "a.nc", "-q")
+    assert flown.code == 0
+    assert "Careful: servo_roll stands at its limit for" in flown.err
+
+
 @pytest.mark.parametrize("out", ["a.xlsx", "nowhere/a.nc"])
 def test_a_simulation_that_cannot_be_saved_is_refused(out: str, tmp_path: Path) -> None:
     outcome = swash("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / out)

@@ -77,7 +77,7 @@ def test_a_file_without_header_is_mapped_by_number(tmp_path: Path) -> None:
 
 def test_units_as_an_argument(tmp_path: Path) -> None:
     path = _file(tmp_path, "time,phi\n0,90\n1,0\n")
-    with pytest.raises(UnitError, match=r"has no unit"):
+    with pytest.raises(UnitError, match=r"time, phi: have no unit, expected \[s\], \[rad\]"):
         read(path)
     assert read(path, units={"time": "s", "phi": "deg"}).values("phi")[0] == pytest.approx(np.pi / 2)
 

@@ -182,7 +182,9 @@ def parse_card(text: str, *, path: str = "") -> Card:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise CardError(f"is not TOML: {error}.", where=path) from None
+        raise CardError(
+            f"is not TOML: {error}.", where=path, hint="A card is a TOML file; `swash vehicles new` writes one."
+        ) from None
     if document.get("kind") != "vehicle":
         raise CardError(
             f"kind is {document.get('kind')!r}, expected 'vehicle'." if "kind" in document else "says no kind.",
@@ -284,8 +286,12 @@ def read_card(path: str | Path) -> Card:
     """A card from a file."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CardError(f"cannot be read: {error}.", where=path) from None
+    except UnicodeDecodeError:
+        raise CardError(
+            "is no text file, expected a card.", where=path, hint="`swash vehicles new` writes one; logs are --flight."
+        ) from None
+    except OSError as error:
+        raise CardError(f"cannot be read: {error.strerror}.", where=path, hint="Check the path.") from None
     return parse_card(text, path=str(path))
 
 

@@ -252,7 +252,7 @@ def coax(card: Card) -> Vehicle:
     if unknown or options["mixing"] not in ("rotation", "as_printed") or not isinstance(options["bar"], bool):
         raise CardError(
             f"options are {dict(card.options)}, expected bar = true or false and mixing = 'rotation' or 'as_printed'.",
-            where=card.path or card.vehicle,
+            where=card.where,
             channel="options",
         )
     card.checked_against(UNITS)

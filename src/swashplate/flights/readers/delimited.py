@@ -137,17 +137,34 @@ def _from_mapping(options: Options, header: Sequence[str] | None, source: Source
     return columns
 
 
+def _expected(name: str) -> str:
+    """The unit inside; "" where anything goes."""
+    return "s" if name == "time" else channel(name).unit
+
+
+def _check_units(columns: Mapping[str, _Column], options: Options, source: Source) -> None:
+    """That every channel of the schema has a unit: what is missing is said in one go."""
+    lacking = [
+        name
+        for name, place in columns.items()
+        if options.units.get(name, place.unit) is None and _expected(name) not in ("", "1")
+    ]
+    if lacking:
+        name, unit = lacking[0], _expected(lacking[0])
+        raise UnitError(
+            f"{'has' if len(lacking) == 1 else 'have'} no unit, expected [{'], ['.join(map(_expected, lacking))}] "
+            "or what can be converted to it.",
+            where=source.name,
+            channel=", ".join(lacking),
+            hint=f"Write it in the header, as '{name} [{unit}]', or give --unit {name}={unit} "
+            f"(in Python units={{'{name}': '{unit}'}}).",
+        )
+
+
 def _inside(values: Array, name: str, unit: str | None, source: Source) -> tuple[Array, str]:
     """Values and their unit inside; the schema's channels need a unit that fits, others keep a unit nobody knows."""
-    expected = "s" if name == "time" else channel(name).unit
+    expected = _expected(name)
     if unit is None:
-        if expected not in ("", "1"):
-            raise UnitError(
-                f"has no unit, expected one of [{expected}].",
-                where=source.name,
-                channel=name,
-                hint=f"Write it in the header, as '{name} [{expected}]', or give units={{'{name}': '{expected}'}}.",
-            )
         return values, expected
     if not expected and not units.is_known(unit):
         return values, unit
@@ -212,6 +229,7 @@ def read(source: Source, options: Options) -> Flight:
             channel=", ".join(sorted(unknown)),
             hint="Correct the name that the unit is given for.",
         )
+    _check_units(columns, options, source)
     width = max(column.index for column in columns.values()) + 1
     for i, row in enumerate(rows):
         if len(row) < width:
