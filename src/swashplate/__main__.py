@@ -1,7 +1,20 @@
-"""`python -m swashplate` is `swash`."""
+"""`swash`, also as `python -m swashplate`: an interrupt ends in words even while the verbs are still being loaded."""
 
 from __future__ import annotations
 
-from swashplate.cli.app import main
+import sys
+from typing import NoReturn
 
-main()
+
+def main() -> NoReturn:
+    """The console script."""
+    try:
+        from swashplate.cli.app import main as run
+    except KeyboardInterrupt:
+        print("Stopped. Nothing was left half-written.", file=sys.stderr)
+        sys.exit(130)
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -24,10 +24,13 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     suffix of `path`, by which some writers choose their format.
 
     Raises:
-        OSError: where the folder is missing or cannot be written to.
+        OSError: where the folder is missing or cannot be written to, naming `path`.
     """
     target = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
+    except OSError as error:  # it names the temporary file, which the caller never asked for
+        raise OSError(error.errno, error.strerror, str(path)) from None
     os.close(handle)
     temporary = Path(name)
     try:

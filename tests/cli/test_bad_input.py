@@ -77,6 +77,7 @@ BAD: dict[str, tuple[Callable[[Path], Path], str, tuple[str, ...]]] = {
     "empty file": (lambda p: _text(p, ""), "a.mat", ("empty",)),
     "not a .mat": (lambda p: _text(p, "hello"), "a.mat", ("is not a MATLAB .mat file",)),
     "wrong struct": (lambda p: _mat(p, Bench=np.ones(3)), "a.mat", ("Bench", "struct 'Data'")),
+    "no struct": (lambda p: _mat(p, Data=np.arange(3.0)), "a.mat", ("struct 'Data'",)),
     "missing channel": (lambda p: write_coax(p, orientation=None), "a.mat", ("orientation",)),
     "one NaN": (_with("position", _one_nan), "a.mat", ("position", "1 of 600 samples", "sample 100")),
     "wrong units": (_with("position", lambda x: 1000.0 * x + 1e6), "a.mat", ("position",)),
@@ -189,6 +190,14 @@ CARDS: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
         ("masss", "not a parameter"),
     ),
     "wrong unit": (lambda t: t.replace('unit = "kg"\n', 'unit = "g"\n', 1), ("mass", "'g'", "'kg'")),
+    "no unit": (lambda t: t.replace('unit = "kg"\n', "", 1), ("mass", "lacks unit")),
+    "negative sigma": (
+        lambda t: t.replace("value = 0.302\n", "value = 0.302\nsigma = -0.1\n", 1),
+        ("mass", "sigma is -0.1"),
+    ),
+    "beyond its bounds": (lambda t: t.replace("value = 0.302", "value = -0.3", 1), ("mass", "-0.3 kg", "0.05 to 2 kg")),
+    "misspelt table": (lambda t: t.replace("[options]", "[optoins]", 1), ("optoins", "no part of a card")),
+    "strange schema": (lambda t: t.replace("schema = 1", 'schema = "x"', 1), ("schema", "'x'")),
     "not a number": (lambda t: t.replace("value = 0.302", 'value = "0.302"', 1), ("mass", "number")),
     "not TOML": (lambda t: t.replace("[parameters.mass]", "[parameters.mass", 1), ("TOML",)),
     "another kind": (lambda t: t.replace('kind = "vehicle"', 'kind = "toaster"', 1), ("toaster",)),
@@ -269,6 +278,27 @@ def test_a_wrong_maneuver_is_refused(maneuver: str, expected: str, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_a_simulation_cannot_fly_is_said_first(tmp_path: Path) -> None:
+    command = ("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / "a.nc")
+    for extra, expected in (
+        (("--sag", "5"), ("voltage", "falls to", "smaller sag")),
+        (("--rate", "60"), ("60 Hz", "multiple of the controller's 50 Hz", "Give 50 Hz")),
+        (("--option", "bar"), ("--option", "bar=true")),
+    ):
+        message = one_message(swash(*command, *extra))
+        for part in expected:
+            assert part in message, message
+    message = one_message(swash("trim", "raptor50", "--speed", "0-4/2", "--plot", tmp_path / "a.pdf"))
+    assert "expected .html" in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_input_that_stands_at_its_limit_is_said(tmp_path: Path) -> None:
+    flown = swash("simulate", "--vehicle", "coax", "--maneuver", "doublet:roll,1s,5", "--out", tmp_path / "a.nc", "-q")
+    assert flown.code == 0
+    assert "Careful: servo_roll stands at its limit for" in flown.err
+
+
 @pytest.mark.parametrize("out", ["a.xlsx", "nowhere/a.nc"])
 def test_a_simulation_that_cannot_be_saved_is_refused(out: str, tmp_path: Path) -> None:
     outcome = swash("simulate", "--vehicle", "coax", "--maneuver", "step:roll,1s", "--out", tmp_path / out)
@@ -285,6 +315,16 @@ def test_a_hold_out_that_the_fit_has_seen_is_refused(simulated: Path, tmp_path: 
 
 def test_a_window_outside_the_flight_is_refused(simulated: Path) -> None:
     assert "window 50-60 s" in one_message(swash("inspect", f"{simulated}@50-60"))
+
+
+def test_a_place_that_cannot_be_written_to_is_named_as_given(simulated: Path, tmp_path: Path) -> None:
+    """Not by the temporary file that was to be renamed."""
+    assert "nowhere/n.toml: " in one_message(
+        swash("vehicles", "new", tmp_path / "nowhere" / "n.toml", "--mass", "4", "--radius", "0.6")
+    )
+    inside = _text(tmp_path / "fit", "mine") / "deeper"
+    message = one_message(swash("identify", "--vehicle", "coax", "--flight", simulated, "--out", inside))
+    assert message.startswith(f"Error: {inside}: ")
 
 
 def test_an_output_folder_that_is_a_file_is_refused(simulated: Path, tmp_path: Path) -> None:

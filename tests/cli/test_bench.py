@@ -18,7 +18,6 @@ from swashplate.flights.bench_record import BenchRecord, write_record
 from swashplate.identification.bench.evaluate import MEASURED, evaluate
 from swashplate.identification.bench.plan import plan, planned
 from swashplate.reporting.bench import compose_bench
-from swashplate.reporting.html import figures_of
 from swashplate.reporting.structure import Table
 from swashplate.simulation.bench import virtual_bench
 from swashplate.vehicles.card import read_card
@@ -90,8 +89,8 @@ def test_the_report_shows_every_procedure_with_its_figures() -> None:
     assert len(titles) == 14  # the card, the twelve procedures of the plan, what it was made with
     assert report.picture is not None
     assert [key.words for key in report.picture.keys] == ["total", "flapping", "tilt of the thrust"]
-    assert len(figures_of(report)) > 18
-    identifiers = [figure.identifier for figure in figures_of(report)]
+    assert len(report.figures) > 18
+    identifiers = [figure.identifier for figure in report.figures]
     assert len(set(identifiers)) == len(identifiers)
     (table,) = report.sections[0].blocks
     assert isinstance(table, Table)

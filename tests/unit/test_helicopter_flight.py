@@ -50,7 +50,7 @@ def test_climb_turn_wind_weight_and_altitude() -> None:
 
 
 def test_a_trim_that_does_not_exist_says_what_stops_it() -> None:
-    with pytest.raises(TrimError, match=r"theta0: 50 m/s ahead.* needs theta0 = .*, but its limit is 0.2618"):
+    with pytest.raises(TrimError, match=r"raptor50\.toml: theta0: 50 m/s.* theta0 = .* deg, but its limit is 15.0 deg"):
         trim(RAPTOR, speed=50.0)
     with pytest.raises(TrimError, match="limit is"):
         trim(RAPTOR.with_values({"mass": 20.0}))

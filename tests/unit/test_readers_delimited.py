@@ -77,7 +77,7 @@ def test_a_file_without_header_is_mapped_by_number(tmp_path: Path) -> None:
 
 def test_units_as_an_argument(tmp_path: Path) -> None:
     path = _file(tmp_path, "time,phi\n0,90\n1,0\n")
-    with pytest.raises(UnitError, match=r"has no unit"):
+    with pytest.raises(UnitError, match=r"time, phi: have no unit, expected \[s\], \[rad\]"):
         read(path)
     assert read(path, units={"time": "s", "phi": "deg"}).values("phi")[0] == pytest.approx(np.pi / 2)
 
@@ -101,12 +101,13 @@ BAD_TABLES = {
     "NaN": ("time [s],x [m]\n0,nan\n1,1\n", "x: 1 of 2 samples"),
     "text": ("time [s],x [m]\n0,1\n1,abc\n", "x: 'abc' in line 3 is not a number"),
     "underscore": ("time [s],x [m]\n0,1_0\n1,1\n", "'1_0' in line 2"),
-    "cut off": ("time [s],x [m]\n0,1\n1\n", "line 3 has 1 cells, expected 2"),
+    "cut off": ("time [s],x [m]\n0,1\n1\n", "line 3 has 1 cell, expected 2"),
     "backwards": ("time [s],x [m]\n0,1\n2,1\n1,1\n", "time: time goes backwards at sample 2"),
     "duplicated": ("time [s],x [m]\n0,1\n0,1\n", "time: time repeats the stamp before it at sample 1"),
     "doubled name": ("time [s],x [m],x [m]\n0,1,1\n1,1,1\n", "x: the name stands twice"),
     "nameless": ("time [s],,x [m]\n0,1,1\n1,1,1\n", "column 2 has no name"),
     "prose": ("Dear reader, this is no log.", "there is no time column"),
+    "decimal commas": ("time [s];phi [deg]\n0,0;1,5\n0,01;1,6\n", "time: '0,0' in line 2 .* with a point"),
     "only comments": ("# a, b\n", "holds no table"),
 }
 
@@ -134,6 +135,23 @@ def test_a_bad_table_is_named(tmp_path: Path, text: str, message: str) -> None:
 def test_a_bad_mapping_is_named(tmp_path: Path, mapping: dict[str, Any], message: str) -> None:
     with pytest.raises(FlightError, match=message):
         read(_file(tmp_path, "t,a\n0,1\n1,2\n"), mapping=mapping)
+
+
+def test_what_is_wrong_with_a_mapping_file_is_said_of_that_file(tmp_path: Path) -> None:
+    path = _file(tmp_path, "t,a\n0,1\n1,2\n")
+    for text in ("[chanels]\n", "[channels]\ntime = {colum = 't'}\n", "[channels]\ntime = {column = 't', unit = 3}\n"):
+        with pytest.raises(FlightError, match=r"mapping\.toml: .*mapping"):
+            read(path, mapping=_file(tmp_path, text, "mapping.toml"))
+
+
+def test_a_spreadsheets_unicode_text_is_read(tmp_path: Path) -> None:
+    (tmp_path / "log.txt").write_bytes("time [s]\tphi [deg]\n0\t90\n0.01\t0\n".encode("utf-16"))
+    assert read(tmp_path / "log.txt").values("phi")[0] == pytest.approx(np.pi / 2)
+
+
+def test_units_for_a_column_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(UnitError, match=r"phy: .*the file lacks; it has time, phi"):
+        read(_file(tmp_path, "time [s],phi\n0,1\n1,2\n"), units={"phy": "deg"})
 
 
 def test_a_mapping_file_that_is_no_toml(tmp_path: Path) -> None:

@@ -16,12 +16,11 @@ from swashplate.errors import SwashError
 from swashplate.flights.flight import Step
 from swashplate.reporting.compose import compose, hover_modes
 from swashplate.reporting.downsample import joined, kept
-from swashplate.reporting.figures_fit import autocorrelation
+from swashplate.reporting.figures_fit import autocorrelation, cost_history
 from swashplate.reporting.figures_time import Series, time_figures
-from swashplate.reporting.html import figures_of
 from swashplate.reporting.sections_validation import apart
-from swashplate.reporting.structure import Cell, Table
-from swashplate.reporting.theme import packed
+from swashplate.reporting.structure import Cell, Report, Section, Table
+from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import plain_words, sigma_words, span_words, step_words, value_words
 
@@ -188,9 +187,9 @@ def test_every_part_is_there() -> None:
         "meanings",
         "versions",
     ]
-    identifiers = [figure.identifier for figure in figures_of(report)]
+    identifiers = [figure.identifier for figure in report.figures]
     assert len(identifiers) == len(set(identifiers))
-    for figure in figures_of(report):
+    for figure in report.figures:
         assert figure.alt
         assert figure.caption
         json.dumps(figure.spec, allow_nan=False)
@@ -250,3 +249,28 @@ def test_a_vehicle_without_hover_says_why() -> None:
     found, problems = hover_modes(heavy, None)
     assert set(found) == {"published"}
     assert "identified vehicle has no eigenvalues" in problems[0]
+
+
+def test_no_plot_may_be_drawn_over_a_section_of_its_name() -> None:
+    section = Section("cost", "Cost", (cost_history([2.0, 1.0]),))
+    with pytest.raises(ValueError, match="called cost"):
+        Report(title="", banners=(), summary=(), picture=None, sections=(section,), made="")
+
+
+def test_theils_best_is_bold_by_itself_and_residuals_are_in_units_that_can_be_read() -> None:
+    report = compose(fit(), validation(), modes=modes())
+    tables = [block for section in report.sections for block in section.blocks if isinstance(block, Table)]
+    for table in (t for t in tables if t.caption.startswith("Prediction")):
+        count = table.groups[-1][1]
+        for row in table.rows:
+            theil = {float(c.words): c.strong for c in row[-count:] if c.words != "–"}
+            assert theil[min(theil)]
+    residuals = next(figure for figure in report.figures if figure.identifier == "residual-time")
+    told = [value["title"]["text"] for key, value in residuals.spec["layout"].items() if key.startswith("yaxis")]
+    assert told[0] in ("x [m]", "x [mm]")
+    assert "phi [deg]" in told
+
+
+def test_phase_axes_have_marks_at_multiples_of_45_degrees() -> None:
+    assert [phase_ticks([0.0, -span])["dtick"] for span in (90.0, 400.0, 700.0, 3000.0)] == [45, 90, 180, 360]
+    assert phase_ticks([np.nan])["dtick"] == 45

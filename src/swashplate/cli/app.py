@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from typing import Annotated, NoReturn
@@ -93,6 +94,7 @@ app.command("demo", short_help="Run the main job on real or simulated flights.")
 
 def main() -> NoReturn:
     """The console script. A polite kill ends as an interrupt does: temporary files are removed."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # the compiler's remarks to its own developers
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     app(prog_name="swash")  # also as `python -m swashplate`: completion and help speak of swash
     raise AssertionError("typer ends the process itself")

@@ -42,8 +42,15 @@ Switch = Annotated[
 ]
 
 
+def _page(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() not in (".html", ".htm"):
+        raise SwashError(f"ends in '{path.suffix}', expected .html.", where=path, channel="--plot")
+    return path
+
+
 Page = Annotated[
-    Path | None, typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.")
+    Path | None,
+    typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.", callback=_page),
 ]
 
 

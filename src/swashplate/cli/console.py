@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _PIPED_WIDTH = 400  # columns: wide enough for every line, so that a file or a pipe gets whole ones
+_NARROWEST = 80  # columns: below this a table would cut its numbers off, so that the terminal wraps whole lines instead
 _AFTER = 1.0  # s: what is done sooner needs no progress bar
 
 
@@ -21,7 +22,8 @@ def console() -> Console:
     """Standard output; as wide as the terminal, or wide enough for every table where there is none."""
     from rich.console import Console
 
-    return Console() if sys.stdout.isatty() else Console(width=_PIPED_WIDTH)
+    screen = Console(highlight=False)
+    return Console(highlight=False, width=max(screen.width, _NARROWEST) if sys.stdout.isatty() else _PIPED_WIDTH)
 
 
 def plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.guard import Exit
+from swashplate.cli.guard import Exit, complain
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -133,6 +133,5 @@ def seen_before(verification: Verification, sources: Sequence[str]) -> Verificat
 def end_with(problems: Sequence[str]) -> None:
     """Exit code 2 with one line where something could not be computed; the rest has been written and marked."""
     if problems:
-        typer.secho("Error: ", fg="red", bold=True, err=True, nl=False)
-        typer.echo(" ".join(" ".join(problems).split()), err=True)
+        complain(" ".join(problems))
         raise typer.Exit(Exit.INPUT)

@@ -29,10 +29,18 @@ class Exit(IntEnum):
 def _end(message: str, code: Exit, *, debug: bool) -> NoReturn:
     if debug:
         traceback.print_exc()
-    if code is not Exit.STOPPED:
-        typer.secho("Error: ", fg="red", bold=True, err=True, nl=False)
-    typer.echo(" ".join(message.split()), err=True)
+    if code is Exit.STOPPED:
+        typer.echo(message, err=True)
+    else:
+        complain(message)
     raise typer.Exit(code)
+
+
+def complain(message: str) -> None:
+    """One line of error on standard error; red where there is a terminal and nobody asked for no colour."""
+    colour = False if os.environ.get("NO_COLOR") else None  # no-color.org: set and not empty
+    typer.secho("Error: ", fg="red", bold=True, err=True, nl=False, color=colour)
+    typer.echo(" ".join(message.split()), err=True)
 
 
 def _file_trouble(error: OSError) -> str:

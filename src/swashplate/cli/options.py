@@ -68,11 +68,15 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON ins
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no tables: files and exit code only.")]
 
 
+_EXAMPLES = {"--unit": "phi=deg", "--option": "bar=true", "--vary": "mass=5%", "--prior": "tau_f_upper=1.6,0.3"}
+
+
 def split_assignment(text: str, *, option: str) -> tuple[str, str]:
     """`name=value` as its two sides."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
-        raise SwashError(f"'{text}' is not NAME=VALUE.", channel=option, hint=f"Example: {option} mass=0.333")
+        example = _EXAMPLES.get(option, "mass=0.333")
+        raise SwashError(f"'{text}' is not NAME=VALUE.", channel=option, hint=f"Example: {option} {example}")
     return name, value
 
 
@@ -83,7 +87,8 @@ def numbers(text: str, *, option: str, count: int | None = None) -> list[float]:
     except ValueError:
         found = []
     if not found or not all(map(math.isfinite, found)) or (count is not None and len(found) != count):
-        expected = f"{count} numbers separated by commas" if count and count > 1 else "a number"
+        several = "numbers" if count is None else f"{count} numbers"
+        expected = "a number" if count == 1 else f"{several} separated by commas"
         raise SwashError(f"'{text}' is not {expected}.", channel=option)
     return found
 

@@ -41,7 +41,10 @@ def folder_when_complete(target: Path | None, *, ours: Collection[str]) -> Itera
         raise SwashError("is a file, expected a folder.", where=target, hint="Choose another --out.")
     # Renames are atomic within one file system only, hence a neighbour.
     base = place if place.exists() else _nearest_folder(place)
-    temporary = Path(tempfile.mkdtemp(prefix=".swash.", dir=base))
+    try:
+        temporary = Path(tempfile.mkdtemp(prefix=".swash.", dir=base))
+    except OSError as error:  # it names the temporary folder, which the user never asked for
+        raise OSError(error.errno, error.strerror, str(target)) from None
     try:
         yield temporary
         place.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from swashplate.simulation.trim import Trim
     from swashplate.vehicles.vehicle import Vehicle
 
+_HELD = 0.02  # share of a flight that an input may stand at a limit before that is said
 _WIND = ("wind_north", "wind_east", "wind_down")
 
 
@@ -163,6 +164,8 @@ def simulate(
             chosen = QUIET if sensors is SensorSet.CLEAN else Sensors()
             flight = sp.observe(flight, aircraft, sensors=chosen, seed=seed)
         paths = _save(flight, out)
+    for words in _at_limits(aircraft, flight):
+        typer.echo(f"Careful: {words}", err=True)
     if not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
@@ -189,6 +192,19 @@ def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Control
         return saved.starting_at(trim, seed=seed) if isinstance(saved, Lqg | ObservedAutopilot) else saved
 
     return make
+
+
+def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:
+    """Inputs that stood at a limit: what they were told beyond it was not flown."""
+    found = []
+    for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True):
+        if name in dict(vehicle.trim_held) or name not in flight:
+            continue
+        values = flight.values(name)
+        share = float(((values <= low) | (values >= high)).mean())
+        if share > _HELD:
+            found.append(f"{name} stands at its limit for {100.0 * share:.0f} % of the time; fly a smaller amplitude.")
+    return found
 
 
 def _save(flight: Flight, out: Path) -> tuple[Path, ...]:

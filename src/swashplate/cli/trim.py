@@ -13,6 +13,7 @@ from swashplate.cli import options
 if TYPE_CHECKING:
     from swashplate.simulation.linearize import LinearModel
     from swashplate.simulation.trim import Trim
+    from swashplate.vehicles.vehicle import Vehicle
 
 
 @given.flown
@@ -50,11 +51,12 @@ def trim(
         typer.echo(f"Written: {plot}")
 
 
-def _unit(vehicle: Any, name: str) -> str:
-    return "1" if (name in vehicle.input_names and vehicle.name == "coax") or name == "throttle" else "deg"
+def _unit(vehicle: Vehicle, name: str) -> str:
+    units = dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
+    return "1" if units.get(name) == "1" else "deg"
 
 
-def _shown(vehicle: Any, name: str, at: Trim) -> float:
+def _shown(vehicle: Vehicle, name: str, at: Trim) -> float:
     value = {**at.states(), **at.commands()}[name]
     return math.degrees(value) if _unit(vehicle, name) == "deg" else value
 

@@ -40,8 +40,15 @@ def form_of(variables: Mapping[str, Any]) -> str:
     if isinstance(value, dict):
         return "table" if _SPEEDS.keys() <= value.keys() else ""
     numbers = mat.numbers(value)
-    flat = numbers is not None and numbers.size >= 3 and numbers.size % 3 == 0 and numbers.size == max(numbers.shape)
-    return "normals" if flat else ""
+    if numbers is None or numbers.size < 3 or numbers.size % 3 or numbers.size != max(numbers.shape):
+        return ""
+    # Any other row of numbers is no bench record; single bad directions are refused when it is read.
+    return "normals" if abs(np.median(_lengths(numbers)) - 1.0) < 0.1 else ""
+
+
+def _lengths(numbers: Array) -> Array:
+    """Lengths of the directions in a row of x, y, z, x, y, z, ..."""
+    return np.asarray(np.linalg.norm(np.ravel(numbers).reshape(-1, 3), axis=1))
 
 
 def read_table(path: str | Path) -> BenchRecord:
@@ -106,10 +113,13 @@ def read_normals(path: str | Path) -> BenchRecord:
         raise BenchError("does not hold one row of directions.", where=where)
     numbers = mat.numbers(next(iter(variables.values())))
     assert numbers is not None
-    normals = np.ravel(numbers).reshape(-1, 3)
-    length = np.linalg.norm(normals, axis=1)
-    if np.abs(length - 1.0).max() > 1e-3:
-        raise BenchError(f"has directions of length {length.min():.3g} to {length.max():.3g}.", where=where)
+    normals, length = np.ravel(numbers).reshape(-1, 3), _lengths(numbers)
+    if not np.abs(length - 1.0).max() <= 1e-3:
+        raise BenchError(
+            f"has directions of length {length.min():.3g} to {length.max():.3g}, expected unit vectors.",
+            where=where,
+            hint="Leave out the samples in which the bar was not tracked.",
+        )
     channels = {f"normal_{axis}": normals[:, i].copy() for i, axis in enumerate("xyz")}
     return BenchRecord(where, ("bar_orientation",), channels)
 

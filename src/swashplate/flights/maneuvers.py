@@ -157,6 +157,7 @@ _BAND = re.compile(rf"{_NUMBER}-{_NUMBER}\s*Hz", re.IGNORECASE)
 _TONE = re.compile(rf"{_NUMBER}\s*Hz", re.IGNORECASE)
 _SECONDS = re.compile(rf"{_NUMBER}\s*s", re.IGNORECASE)
 _AMPLITUDE = re.compile(_NUMBER)
+_ITEMS = (("band", _BAND), ("band", _TONE), ("time", _SECONDS), ("amplitude", _AMPLITUDE))
 _EXAMPLE = 'Examples: "sweep:pitch,0.5-8Hz,60s", "doublet:roll,0.5s,0.2", "multisine:roll+pitch,0.2-8Hz,30s,0.15".'
 
 
@@ -178,24 +179,22 @@ def parse(text: str) -> Maneuver:
     axes = tuple("heave" if axis.strip() == "collective" else axis.strip() for axis in axes_text.split("+"))
     if not all(re.fullmatch(r"[a-z][a-z0-9_]*", axis) for axis in axes):
         raise ManeuverError(f"'{axes_text}' is no axis; expected {', '.join(AXES)} or an input's name.", hint=_EXAMPLE)
-    if len(set(axes)) != len(axes) or (len(axes) > 1 and kind != "multisine"):
+    if len(set(axes)) != len(axes):
+        raise ManeuverError(f"'{axes_text}' names an axis twice.", hint="Name each once.")
+    if len(axes) > 1 and kind != "multisine":
         raise ManeuverError(f"a {kind} moves one axis, found '{axes_text}'.", hint="Only a multisine moves several.")
-    band: tuple[float, float] | None = None
-    seconds = amplitude = None
+    said: dict[str, tuple[float, ...]] = {}
     for item in items:
-        if found := _BAND.fullmatch(item):
-            band = (float(found[1]), float(found[2]))
-        elif found := _TONE.fullmatch(item):
-            band = (float(found[1]), float(found[1]))
-        elif found := _SECONDS.fullmatch(item):
-            seconds = float(found[1])
-        elif found := _AMPLITUDE.fullmatch(item):
-            amplitude = float(found[1])
-        else:
+        what, found = next(((what, m) for what, form in _ITEMS if (m := form.fullmatch(item))), ("", None))
+        if found is None:
             raise ManeuverError(f"'{item}' in '{text}' is no band, time or amplitude.", hint=_EXAMPLE)
-    if amplitude is None:
-        amplitude = min(DEFAULT_AMPLITUDE.get(axis, 0.1) for axis in axes)
-    return _checked(text, kind, axes, band, seconds, amplitude)
+        if what in said:
+            raise ManeuverError(f"'{text}' says its {what} twice.", hint=f"Leave out '{item}' or the other.")
+        said[what] = tuple(map(float, found.groups()))
+    band = said.get("band")
+    (seconds,) = said.get("time", (None,))
+    (amplitude,) = said.get("amplitude", (min(DEFAULT_AMPLITUDE.get(axis, 0.1) for axis in axes),))
+    return _checked(text, kind, axes, None if band is None else (band[0], band[-1]), seconds, amplitude)
 
 
 def _checked(
@@ -208,7 +207,9 @@ def _checked(
 ) -> Maneuver:
     """The maneuver, if it keeps the rules of its kind."""
     if not seconds:
-        raise ManeuverError(f"'{text}' says no time.", hint="Add it, e.g. 60s.")
+        raise ManeuverError(
+            f"'{text}' says no time." if seconds is None else f"'{text}' lasts no time.", hint="Say it, e.g. 60s."
+        )
     if not amplitude > 0.0:
         raise ManeuverError(f"'{text}' has an amplitude of {amplitude:g}.", hint="Give a positive one or none.")
     banded = kind in ("sweep", "multisine", "sine")

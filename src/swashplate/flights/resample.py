@@ -110,6 +110,24 @@ def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
     return common(found, list(flight.segments)) if flight.segments else found
 
 
+def _check(flight: Flight, *, rate: float, max_gap: float, method: str) -> None:
+    where = flight.provenance.source or None
+    if not (rate > 0 and max_gap > 0) or method not in ("linear", "pchip"):
+        raise FlightError(
+            f"cannot resample with rate={rate}, max_gap={max_gap}, method='{method}'; expected positive numbers and "
+            "'linear' or 'pchip'.",
+            where=where,
+        )
+    for name, data in flight.streams.items():
+        if data.sizes["time"] < 2:
+            raise FlightError(
+                f"stream '{name}' has {data.sizes['time']} sample(s), expected at least 2.",
+                where=where,
+                channel=str(next(iter(data.data_vars), name)),
+                hint="Check the log: a flight needs seconds of data.",
+            )
+
+
 def resample(
     flight: Flight,
     *,
@@ -136,21 +154,7 @@ def resample(
     Raises:
         FlightError: no piece is long enough, a channel holds NaN, or the rate makes no sense.
     """
-    where = flight.provenance.source or None
-    if not (rate > 0 and max_gap > 0) or method not in ("linear", "pchip"):
-        raise FlightError(
-            f"cannot resample with rate={rate}, max_gap={max_gap}, method='{method}'; expected positive numbers and "
-            "'linear' or 'pchip'.",
-            where=where,
-        )
-    for name, data in flight.streams.items():
-        if data.sizes["time"] < 2:
-            raise FlightError(
-                f"stream '{name}' has {data.sizes['time']} sample(s), expected at least 2.",
-                where=where,
-                channel=str(next(iter(data.data_vars), name)),
-                hint="Check the log: a flight needs seconds of data.",
-            )
+    _check(flight, rate=rate, max_gap=max_gap, method=method)
     if straighten:
         flight = flight.with_streams(
             {n: d.assign_coords(time=straightened(np.asarray(d["time"].values))) for n, d in flight.streams.items()}
@@ -166,8 +170,10 @@ def resample(
         raise FlightError(
             f"the longest piece without a gap above {max_gap} s lasts {longest_found:.3f} s, expected at least "
             f"{needed:.3f} s.",
-            where=where,
-            hint="Allow longer gaps with max_gap=..., or record a longer flight.",
+            where=flight.provenance.source or None,
+            hint="Record a longer flight."
+            if len(pieces) < 2
+            else "Record a longer flight with fewer gaps, or bridge longer ones (in Python condition(max_gap=...)).",
         )
     start = flight.start
     times: list[Array] = []

@@ -194,7 +194,7 @@ def _from_card(
     if not any(entry.sigma for entry in known.values()):
         raise CardError(
             "has no parameter with status measured or identified and a sigma.",
-            where=card.path or card.vehicle,
+            where=card.where,
             hint="Make one with 'swash bench' or 'swash identify', or give --prior NAME=MEAN,SIGMA.",
         )
     _known(vehicle, known)

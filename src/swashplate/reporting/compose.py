@@ -100,4 +100,4 @@ def _title(fit: Fit | None, validation: Validation | None) -> str:
     assert source is not None
     names = list(dict.fromkeys(f.provenance.source for f in source.flights if f.provenance.source))
     verb = "identified from" if fit else "predicting"
-    return f"{source.vehicle.name} {verb} {', '.join(names[:2]) or 'a flight'}"
+    return f"{source.vehicle.card.called} {verb} {', '.join(names[:2]) or 'a flight'}"

@@ -49,6 +49,7 @@ def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any
 def loops_figure(check: ControlCheck) -> Figure:
     """Every loop opened at its input, the others closed: gain and phase."""
     layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout["yaxis2"] |= {"tick0": 0, "dtick": 90}
     traces, keys = [], []
     m = len(check.vehicle.input_names)
     inverse = np.linalg.inv(np.eye(m) + check.opened)
@@ -107,6 +108,7 @@ def rejection_figure(check: ControlCheck) -> Figure:
 def attitude_figure(check: ControlCheck) -> Figure:
     """Responses of the attitudes to the pilot's commands, with the bandwidths."""
     layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout["yaxis2"] |= {"tick0": 0, "dtick": 90}
     traces, keys = [], []
     for i, a in enumerate(check.attitudes):
         color, dash = style(i)

@@ -19,12 +19,10 @@ from swashplate.reporting.theme import (
     PUBLISHED,
     VERMILION,
     axis,
-    axis_title,
     base_layout,
     grid,
     line,
     numbers,
-    shown,
     stacked,
     unit_words,
 )
@@ -50,6 +48,19 @@ def autocorrelation(pieces: Sequence[Array], *, lags: int = LAGS) -> tuple[Array
     return sums / max(sums[0], np.finfo(float).tiny), 1.96 / float(np.sqrt(total))
 
 
+def _finely(name: str, sigma: float) -> tuple[float, str]:
+    """Factor and unit in which residuals of this standard deviation are read easily: millimetres, where m are many."""
+    known = channel(name)
+    fine = known.shown_unit in ("m", "m/s") and sigma < 0.01
+    return (1e3, f"m{known.shown_unit}") if fine else (known.shown_factor, unit_words(known.shown_unit))
+
+
+def _round(value: float) -> float:
+    """The nearest 1, 2 or 5 times a power of ten below a positive number."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))
+
+
 def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Mapping[str, float]) -> Figure:
     """Residuals against time with the +-2 sigma that the model promises.
 
@@ -59,11 +70,13 @@ def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Ma
     """
     names = list(pieces)
     traces: list[dict[str, Any]] = []
+    finely = {name: _finely(name, sigma[name]) for name in names}
     for i, name in enumerate(names):
         number = "" if i == 0 else str(i + 1)
-        time, values = joined([(t, shown(name, r)) for t, r in pieces[name]])
+        factor = finely[name][0]
+        time, values = joined([(t, factor * r) for t, r in pieces[name]])
         places = kept(values)
-        bound = 2.0 * sigma[name] * channel(name).shown_factor
+        bound = 2.0 * sigma[name] * factor
         ends = [time[0], time[-1], time[-1], time[0]]
         traces.append(
             {
@@ -75,7 +88,7 @@ def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Ma
             }
         )
         traces.append(line(time[places], values[places], name=name, color=BLACK, width=0.9, axis=number))
-    layout = stacked([axis_title(name) for name in names], height=96)
+    layout = stacked([f"{name} [{finely[name][1]}]" for name in names], height=96)
     return Figure(
         identifier="residual-time",
         spec={"data": traces, "layout": layout},
@@ -127,11 +140,9 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
         identifier="residual-correlation",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
-        caption="Autocorrelation of the residuals. White noise stays inside the band at 95 % of the lags; the "
-        "worst here "
-        f"is {worst}, with {100.0 * outside[worst]:.0f} % of its lags outside. Coloured residuals make plain "
-        f"bounds too "
-        "small, which is why the corrected bound is the one to use.",
+        caption="Autocorrelation of the residuals. White noise stays inside the band at 95 % of the lags; the worst "
+        f"here is {worst}, with {100.0 * outside[worst]:.0f} % of its lags outside. Coloured residuals make plain "
+        "bounds too small, which is why the corrected bound is the one to use.",
         alt="Autocorrelation of the residuals per channel: "
         + ", ".join(f"{name} {100.0 * share:.0f} % of lags outside the bound" for name, share in outside.items()),
         keys=(Key("autocorrelation", MODEL, "bar"), Key("95 % bound of white noise", BAND, "band")),
@@ -141,14 +152,13 @@ def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Fi
 def residual_histogram(pieces: Mapping[str, Sequence[Array]], sigma: Mapping[str, float]) -> Figure:
     """Distribution of the residuals beside the normal distribution that the model promises."""
     names = list(pieces)
-    layout = grid(
-        [f"{name} [{unit_words(channel(name).shown_unit)}]" for name in names], columns=2, height=140, x_title=""
-    )
+    finely = {name: _finely(name, sigma[name]) for name in names}
+    layout = grid([f"{name} [{finely[name][1]}]" for name in names], columns=2, height=140, x_title="")
     traces: list[dict[str, Any]] = []
     for i, name in enumerate(names):
         number = "" if i == 0 else str(i + 1)
-        rows = shown(name, np.concatenate(pieces[name]))
-        promised = sigma[name] * channel(name).shown_factor
+        rows = finely[name][0] * np.concatenate(pieces[name])
+        promised = sigma[name] * finely[name][0]
         reach = 4.0 * max(float(np.std(rows)), promised, np.finfo(float).tiny)
         counts, edges = np.histogram(np.clip(rows, -reach, reach), bins=41, range=(-reach, reach), density=True)
         smooth = np.linspace(-reach, reach, 121)
@@ -174,6 +184,8 @@ def residual_histogram(pieces: Mapping[str, Sequence[Array]], sigma: Mapping[str
             }
         )
         layout[f"yaxis{number}"]["showticklabels"] = False
+        tick = _round(0.6 * reach)
+        layout[f"xaxis{number}"] |= {"tickmode": "array", "tickvals": [-tick, 0.0, tick]}
     layout["bargap"] = 0.0
     return Figure(
         identifier="residual-histogram",

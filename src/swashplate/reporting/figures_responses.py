@@ -30,6 +30,7 @@ from swashplate.reporting.theme import (
     VERMILION,
     axis_title,
     line,
+    phase_ticks,
     shown,
     stacked,
 )
@@ -62,6 +63,7 @@ def bode(
     gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h)
     spread = np.minimum(error, 3.0)
     layout = _log_x(stacked([f"{output}/{input} [dB]", "phase [deg]", "coherence"], height=140), 3)
+    layout["yaxis2"] |= phase_ticks(phase)
     layout["yaxis3"]["range"] = [0, 1.02]
     known = np.isfinite(gain)
     both = np.concatenate([hertz[known], hertz[known][::-1]])
@@ -137,7 +139,7 @@ def excitation(responses: FrequencyResponse) -> Figure:
             keys.append(Key(words, color, style))
             number += 1
     return Figure(
-        identifier="excitation",
+        identifier="input-spectra",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
         caption="What was excited (unit²/Hz in dB), and the coherence between inputs: above 0.5 the pilot or a loop "
@@ -155,6 +157,7 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
     bound = envelopes(omega)
     layout = _log_x(stacked(["model/flight [dB]", "model/flight [deg]"], height=170), 2)
     layout["yaxis"]["range"], layout["yaxis2"]["range"] = [-15, 15], [-120, 120]
+    layout["yaxis2"] |= phase_ticks([-90.0, 90.0])
     both = np.concatenate([omega, omega[::-1]]) / TWO_PI
     traces, keys = [], [Key("not noticed by a pilot", BAND, "band")]
     for number, kind in (("", "gain"), ("2", "phase")):

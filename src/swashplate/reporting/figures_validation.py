@@ -86,8 +86,7 @@ def key_picture(validation: Validation) -> Figure:
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
         height=height,
-        caption=f"Prediction of {_sources(validation)}, {horizon:g} s ahead. 100 % is perfect, 0 % is "
-        f"as good as "
+        caption=f"Prediction of {_sources(validation)}, {horizon:g} s ahead. 100 % is perfect, 0 % is as good as "
         f"holding the last value; triangles on the left edge lie below {_FLOOR:g} %. The model is best in "
         f"{len(best)} of {len(names)} channels{': ' + ', '.join(best) if best else ''}.",
         alt=f"Fit in percent at {horizon:g} s per channel: "
@@ -135,11 +134,10 @@ def fit_over_horizon(validation: Validation) -> Figure:
         identifier="fit-over-horizon",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
-        caption=f"Fit [%] against how far ahead the prediction looks. Lines that leave a panel below {_FLOOR:g} "
-        f"% are worse "
-        "than useless there.",
+        caption=f"Fit [%] against how far ahead the prediction looks. Lines that leave a panel below {_FLOOR:g} % "
+        "are worse than useless there.",
         alt=f"Fit in percent against horizon for {', '.join(names)} and each predictor; the tables below have "
-        f"the numbers.",
+        "the numbers.",
         keys=tuple(Key(PREDICTOR_WORDS[p], PREDICTOR_STYLE[p][0], PREDICTOR_STYLE[p][1]) for p in PREDICTORS),
     )
 

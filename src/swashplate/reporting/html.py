@@ -18,17 +18,11 @@ def render(report: Report) -> str:
     template = _environment().from_string(_read("template.html.j2"))
     return template.render(
         report=report,
-        figures=[(figure.identifier, _safe_json(figure)) for figure in figures_of(report)],
+        figures=[(figure.identifier, _safe_json(figure)) for figure in report.figures],
         style=Markup(_read("page.css")),
         script=Markup(_read("page.js")),
         plotly=Markup(_plotly()),
     )
-
-
-def figures_of(report: Report) -> list[Figure]:
-    """Every figure of a report in the order of the page."""
-    found = [report.picture] if report.picture else []
-    return found + [block for section in report.sections for block in section.blocks if isinstance(block, Figure)]
 
 
 @cache

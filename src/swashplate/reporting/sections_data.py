@@ -21,7 +21,7 @@ def asked(fit: Fit | None, validation: Validation | None) -> Section:
     if fit:
         blocks.append(
             Text(
-                f"Identify {counted(len(fit.names), 'parameter')} of the vehicle '{fit.vehicle.name}' "
+                f"Identify {counted(len(fit.names), 'parameter')} of the vehicle '{fit.vehicle.card.called}' "
                 f"(choice: {fit.choice}) from {listed(_sources(fit.flights))} by {method_words(fit.method)}."
             )
         )
@@ -31,18 +31,23 @@ def asked(fit: Fit | None, validation: Validation | None) -> Section:
                 f"Predict {listed(_sources(validation.flights))} with the model "
                 f"{', '.join(f'{h:g}' for h in sorted({s.horizon for s in validation.scores}))} s ahead from "
                 "many start points, and compare with the published card (same observer, trims from the same seconds), "
-                "with holding the last value "
-                "and with constant rates."
+                "with holding the last value and with constant rates."
             )
         )
     if vehicle is not None:
         blocks.append(Text(f"The vehicle: {vehicle.card.title}. Where its card may be trusted: {vehicle.card.trust}"))
     rows = [("fit", fit.settings)] if fit else []
     rows += [("validation", validation.settings)] if validation else []
-    cells = tuple((Cell(f"{k}"), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
+    cells = tuple((Cell(_setting(k)), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
     if cells:
         blocks.append(Table("Settings", ("setting", "of", "value"), cells))
     return Section("asked", "What was asked", tuple(blocks))
+
+
+def _setting(name: str) -> str:
+    """A setting's name with its unit."""
+    unit = {"rate": "Hz", "horizons": "s", "every": "s", "calibration": "s"}.get(name)
+    return f"{name} [{unit}]" if unit else name
 
 
 def method_words(method: str) -> str:
@@ -148,9 +153,8 @@ def made_with(fit: Fit | None, validation: Validation | None) -> Section:
                 "SHA-256",
                 ("of", "hash"),
                 tuple((Cell(name), Cell(value, tone="quiet")) for name, value in hashes),
-                note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to "
-                "six digits, "
-                "wall time left out. None depends on the machine or on where files lie.",
+                note="Flights: of the file's bytes. Cards: of their text. Numbers: of all results rounded to six "
+                "digits, wall time left out. None depends on the machine or on where files lie.",
             ),
         ),
         folded=True,

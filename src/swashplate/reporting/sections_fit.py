@@ -130,11 +130,9 @@ def comparison(fit: Fit) -> Section:
     one_step = fit.method == "prediction-error"
     words = "one-step prediction" if one_step else "simulation on the recorded inputs"
     intro = (
-        "Each model sample was predicted one sample ahead from everything measured before it, so the lines "
-        "should lie on "
-        "top of each other and only the residuals below tell how good they are. How the model does seconds "
-        "ahead stands "
-        "under Prediction. Velocities and rates are the filter's estimates beside the slopes of the "
+        "Each model sample was predicted one sample ahead from everything measured before it, so the lines should "
+        "lie on top of each other and only the residuals below tell how good they are. How the model does seconds "
+        "ahead stands under Prediction. Velocities and rates are the filter's estimates beside the slopes of the "
         "measured pose."
         if one_step
         else "The model ran on the recorded inputs alone. Velocities and rates are its states beside the slopes of the "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from swashplate.identification.fit import Fit
+from swashplate.identification.fit import AxisExcitation, Fit
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.words import value_words
@@ -16,47 +16,7 @@ _SLOW = 1e-6
 
 def sight(fit: Fit) -> Section:
     """What the data can and cannot tell."""
-    blocks: list[Block] = []
-    if fit.excitation:
-        blocks.append(
-            Table(
-                "Excitation and feedback per axis",
-                (
-                    "axis",
-                    "verdict",
-                    "finding",
-                    "command",
-                    "explained",
-                    "coherence",
-                    "phase",
-                    "power",
-                    "record",
-                ),
-                tuple(
-                    (
-                        Cell(a.axis),
-                        Cell(
-                            "independent excitation" if a.identifiable else "not identifiable",
-                            tone="good" if a.identifiable else "bad",
-                        ),
-                        Cell(a.words),
-                        Cell(a.command),
-                        Cell(_share(a.explained), number=True),
-                        Cell(value_words(round(a.coherence, 2)), number=True),
-                        Cell(f"{math.degrees(a.phase):.0f}°" if math.isfinite(a.phase) else "–", number=True),
-                        Cell(value_words(float(f"{a.power:.2g}")), number=True),
-                        Cell(a.record),
-                    )
-                    for a in fit.excitation
-                ),
-                note="Explained: share of the command that past motion explains. A command that past motion "
-                "explains almost wholly is a controller's answer: the record "
-                "then shows "
-                "the controller, not the aircraft. Coherence and phase: largest between command and motion in "
-                "the band. "
-                "Power: standard deviation of the command.",
-            )
-        )
+    blocks: list[Block] = [_excitation(fit.excitation)] if fit.excitation else []
     if fit.directions:
         blocks.append(
             Points(
@@ -70,6 +30,37 @@ def sight(fit: Fit) -> Section:
     if len(fit.names) > 1:
         blocks.append(correlation_matrix(fit.names, fit.correlation))
     return Section("sight", "What the flights can tell", tuple(blocks))
+
+
+def _excitation(axes: Sequence[AxisExcitation]) -> Table:
+    """What moved each axis; records are named where there are several."""
+    records = {a.record for a in axes}
+    columns = ("axis", "verdict", "finding", "command", "explained", "coherence", "phase", "power")
+    rows = tuple(
+        (
+            Cell(a.axis),
+            Cell(
+                "independent excitation" if a.identifiable else "not identifiable",
+                tone="good" if a.identifiable else "bad",
+            ),
+            Cell(a.words),
+            Cell(a.command),
+            Cell(_share(a.explained), number=True),
+            Cell(value_words(round(a.coherence, 2)), number=True),
+            Cell(f"{math.degrees(a.phase):.0f}°" if math.isfinite(a.phase) else "–", number=True),
+            Cell(value_words(float(f"{a.power:.2g}")), number=True),
+            *((Cell(a.record),) if len(records) > 1 else ()),
+        )
+        for a in axes
+    )
+    return Table(
+        "Excitation and feedback per axis",
+        (*columns, "record") if len(records) > 1 else columns,
+        rows,
+        note="Explained: share of the command that past motion explains. A command that past motion explains almost "
+        "wholly is a controller's answer: the record then shows the controller, not the aircraft. Coherence and "
+        "phase: largest between command and motion in the band. Power: standard deviation of the command.",
+    )
 
 
 def _share(value: float) -> str:

@@ -50,9 +50,8 @@ def prediction(validation: Validation) -> Section:
     names = {flight_name(record.name) for record in validation.records}
     blocks: list[Block] = [
         Text(
-            "At each start point a causal observer knew the flight up to there and nothing after it; from there "
-            "on the model "
-            "ran on the recorded inputs. The shaded band is ±2σ of what the model promises."
+            "At each start point a causal observer knew the flight up to there and nothing after it; from there on "
+            "the model ran on the recorded inputs. The shaded band is ±2σ of what the model promises."
         )
     ]
     for i, source in enumerate(sorted(names)):
@@ -106,6 +105,7 @@ def _table(validation: Validation, horizon: float) -> Table:
     for name in names:
         present = {p: scores[name, p] for p in shown if (name, p) in scores}
         best = max(present, key=lambda p: present[p].fit)
+        nearest = min((s.theil for s in present.values() if math.isfinite(s.theil)), default=math.nan)
         unit = channel(name)
         rows.append(
             (
@@ -117,7 +117,7 @@ def _table(validation: Validation, horizon: float) -> Table:
                     for s in _row(present, shown)
                 ),
                 *(
-                    _cell(f"{s.theil:.2f}" if math.isfinite(s.theil) else "–", s is present[best])
+                    _cell(f"{s.theil:.2f}" if math.isfinite(s.theil) else "–", s.theil == nearest)
                     for s in _row(present, shown)
                 ),
             )
@@ -135,9 +135,8 @@ def _table(validation: Validation, horizon: float) -> Table:
             ("Theil's coefficient", len(shown)),
         ),
         note="Model: the identified one. Card: the published one. Hold: the last value stays. Rates: constant rates. "
-        "Bold: the best of the row. Fit: 100 (1 − rms error / rms change since the start). "
-        "Theil: 0 perfect, 1 "
-        "no better than the opposite.",
+        "Bold: the best of the row by each measure. Fit: 100 (1 − rms error / rms change since the start). "
+        "Theil: 0 perfect, 1 no better than the opposite; holding the last value always has 1.",
     )
 
 

@@ -118,7 +118,7 @@ def _controls(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
 
 def _locus(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
     layout = base_layout(420)
-    layout["xaxis"], layout["yaxis"] = axis("real part [1/s]"), axis("imaginary part [1/s]")
+    layout["xaxis"], layout["yaxis"] = axis("real part [1/s]"), axis("imaginary part [rad/s]")
     layout["shapes"] = [{"type": "line", "x0": 0, "x1": 0, "yref": "paper", "y0": 0, "y1": 1, "line": {"color": BLACK}}]
     real, imag, color = [], [], []
     for at in trims:

@@ -140,3 +140,15 @@ class Report:
     picture: Figure | None
     sections: tuple[Section, ...]
     made: str
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """Every figure in the order of the page."""
+        found = (self.picture,) if self.picture else ()
+        return found + tuple(b for section in self.sections for b in section.blocks if isinstance(b, Figure))
+
+    def __post_init__(self) -> None:
+        names = [section.identifier for section in self.sections] + [figure.identifier for figure in self.figures]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:  # a plot would be drawn over the section of its name
+            raise ValueError(f"two parts of the report are called {', '.join(twice)}")

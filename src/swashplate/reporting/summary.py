@@ -64,7 +64,7 @@ def _what(fit: Fit | None, validation: Validation | None) -> Line:
     if fit:
         used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.comparisons)
         source = f"{used:.1f} s of {_names(fit.flights)}" if used else _names(fit.flights)
-        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.vehicle.name}' identified from {source}")
+        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.vehicle.card.called}' identified from {source}")
     if validation:
         words.append(
             f"tested on {_names(validation.flights)}"

@@ -144,6 +144,14 @@ def axis(title: str = "", **more: Any) -> dict[str, Any]:
     return {**plain, **more}
 
 
+def phase_ticks(values: Any) -> dict[str, Any]:
+    """What a phase axis [deg] has beside its title: marks at multiples of 45 degrees, few enough to be read."""
+    finite = np.asarray(values, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    span = float(np.ptp(finite)) if finite.size else 0.0
+    return {"tick0": 0, "dtick": next((step for step in (45, 90, 180) if span <= 5 * step), 360)}
+
+
 def bands(count: int, *, gap: float) -> list[tuple[float, float]]:
     """Domains from top to bottom that share the unit interval, `gap` apart."""
     size = (1.0 - gap * (count - 1)) / count

@@ -94,7 +94,11 @@ def simulate_closed_loop(
     enable_double_precision()
     every = rate / controller.rate
     if every < 1.0 or abs(every - round(every)) > 1e-9:
-        raise SwashError(f"the controller runs at {controller.rate:g} Hz, expected a whole part of {rate:g} Hz.")
+        raise SwashError(
+            f"the simulation runs at {rate:g} Hz, expected a multiple of the controller's {controller.rate:g} Hz.",
+            channel="rate",
+            hint=f"Give {max(round(every), 1) * controller.rate:g} Hz.",
+        )
     n = round(duration * rate) + 1
     if n < 2:
         raise SwashError(f"duration is {duration} s, expected at least one step of {1.0 / rate:g} s.")
@@ -222,6 +226,13 @@ def simulate_maneuver(
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
     start = trim(vehicle, speed=speed, voltage=voltage, environment=environment)
+    level = float(start.environment.voltage) - sag * time
+    if not level.min() > 0.0:
+        raise SwashError(
+            f"starts at {level[0]:g} V and falls to {level.min():.3g} V within {duration:g} s, expected more than 0.",
+            channel="voltage",
+            hint="Give a smaller sag or a shorter maneuver.",
+        )
     commanded = [axis for axis in excitation.axes if pilot and axis in REFERENCES]
     signals = excitation.signals(time - lead)
     return simulate_closed_loop(
@@ -230,7 +241,7 @@ def simulate_maneuver(
         duration=duration,
         reference={axis: signals[axis] for axis in commanded},
         excitation=excitation.offsets(time - lead, inputs=vehicle.input_names, without=commanded),
-        voltage=float(start.environment.voltage) - sag * time,
+        voltage=level,
         wind=wind,
         start=start,
         rate=rate,

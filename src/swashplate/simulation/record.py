@@ -27,7 +27,8 @@ def simulated_flight(
     """A flight with the one stream "uniform": states (n, n_states), then inputs and surroundings (n, n_inputs + 4)."""
     names = (*vehicle.state_names, *vehicle.input_names, *SURROUNDINGS)
     columns = dict(zip(names, np.concatenate([states, rows], axis=1).T, strict=True))
-    units = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
+    names_of = (*vehicle.state_names, *vehicle.input_names)
+    units = dict(zip(names_of, (*vehicle.state_units, *vehicle.input_units), strict=True))
     units = {name: unit for name, unit in units.items() if name not in CHANNELS}
     provenance = Provenance(
         source=f"simulated {vehicle.name}",

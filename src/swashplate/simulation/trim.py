@@ -122,7 +122,9 @@ def trim(
     equations = equations_of(vehicle)
     if turn and (surroundings.wind_north or surroundings.wind_east):
         raise TrimError(
-            "a turn in wind is no steady flight.", where=vehicle.name, hint="Ask for the turn in calm air, or no turn."
+            "a turn in wind is no steady flight.",
+            where=vehicle.card.where,
+            hint="Ask for the turn in calm air, or no turn.",
         )
     course = np.array([speed, lateral, -climb, heading, turn, -height])
     row = np.array([getattr(surroundings, name) for name in SURROUNDINGS], dtype=np.float64)
@@ -131,7 +133,7 @@ def trim(
     around = dict(zip(SURROUNDINGS, row.tolist(), strict=True))
     strange = [name for name, value in (asked | around).items() if not np.isfinite(value)]
     if strange:
-        raise TrimError("is not a finite number.", where=vehicle.name, channel=", ".join(strange))
+        raise TrimError("is not a finite number.", where=vehicle.card.where, channel=", ".join(strange))
 
     def residual(z: Array) -> tuple[Array, Array]:
         value, slope = _unrest(equations, z, course, row, p)
@@ -151,7 +153,7 @@ def trim(
         worst = _residual_names(vehicle)[int(np.argmax(np.nan_to_num(np.abs(value), nan=np.inf)))]
         raise TrimError(
             f"no equilibrium was found for {where}: {worst} keeps changing at {largest:.2g} per second.",
-            where=vehicle.name,
+            where=vehicle.card.where,
             channel=worst,
             hint="Ask for a slower flight, or check the card.",
         )
@@ -252,12 +254,14 @@ def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
 
 def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
     battery = "voltage_nominal" in vehicle.parameter_names
-    for name, value, (low, high) in zip(vehicle.input_names, inputs, vehicle.input_limits, strict=True):
+    kinds = zip(vehicle.input_names, vehicle.input_units, inputs, vehicle.input_limits, strict=True)
+    for name, unit, value, (low, high) in kinds:
         if not low <= value <= high:
             limit = high if value > high else low
+            told = [f"{v:.3g}" if unit == "1" else f"{np.degrees(v):.1f} deg" for v in (value, limit)]
             raise TrimError(
-                f"{where} needs {name} = {value:.3f}, but its limit is {limit:g}.",
-                where=vehicle.name,
+                f"{where} needs {name} = {told[0]}, but its limit is {told[1]}.",
+                where=vehicle.card.where,
                 channel=name,
                 hint="Ask for a slower flight, less payload or a fuller battery."
                 if battery
@@ -273,13 +277,13 @@ def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, enviro
     """
     if isinstance(start, Trim):
         if start.state_names != vehicle.state_names:
-            raise TrimError("the start is a trim of another vehicle.", where=vehicle.name)
+            raise TrimError("the start is a trim of another vehicle.", where=vehicle.card.where)
         return np.array(start.state)
     named = dict(start or {})
     for name in named:
         if name not in vehicle.state_names:
             raise TrimError(
-                f"is not a state; expected {', '.join(vehicle.state_names)}.", where=vehicle.name, channel=name
+                f"is not a state; expected {', '.join(vehicle.state_names)}.", where=vehicle.card.where, channel=name
             )
     if set(named) == set(vehicle.state_names):
         return np.array([named[name] for name in vehicle.state_names], dtype=np.float64)

@@ -56,7 +56,7 @@ def spread(
     card = vehicle.card
     uncertain = {name: p for name, p in card.parameters.items() if p.sigma}
     if not uncertain:
-        raise SwashError("no parameter of the card has a sigma.", where=card.path or card.vehicle)
+        raise SwashError("no parameter of the card has a sigma.", where=card.where)
     around = environment or at.environment
     rng = np.random.default_rng(seed)
     nominal = linearize(vehicle, at)
@@ -93,7 +93,7 @@ def spread(
         tables.append(derivative_table(other, there).total.ravel())
         modes.append(_matched(np.linalg.eigvals(linearize(other, there).A).astype(complex), values))
     if not tables:
-        raise SwashError("none of the samples could be trimmed.", where=card.path or card.vehicle)
+        raise SwashError("none of the samples could be trimmed.", where=card.where)
     low, high = np.quantile(np.array(tables), [0.05, 0.95], axis=0)
     centre = derivative_table(vehicle, at).total.ravel()
     found = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}

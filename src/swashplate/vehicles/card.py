@@ -16,6 +16,7 @@ from swashplate.errors import CardError
 
 CARD_SCHEMA = 1
 STATUSES = ("measured", "published", "identified", "derived", "assumed")
+_TABLES = {"kind", "schema", "vehicle", "title", "trust", "options", "parameters", "observer", "correlations"}
 _FIELDS = {"value", "unit", "source", "status", "sigma", "lower", "upper", "note"}
 
 
@@ -67,6 +68,16 @@ class Card:
     correlations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     path: str = ""
 
+    @property
+    def where(self) -> str:
+        """Its file, or the name of its equations where it has none: what messages about it begin with."""
+        return self.path or self.vehicle
+
+    @property
+    def called(self) -> str:
+        """What people call it: a packaged card's name, or its file; the name of its equations where it has none."""
+        return self.path.removesuffix(".toml") or self.vehicle
+
     def values(self) -> dict[str, float]:
         return {name: parameter.value for name, parameter in self.parameters.items()}
 
@@ -77,7 +88,7 @@ class Card:
         """
         unknown = sorted(set(values) - set(self.parameters))
         if unknown:
-            raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.path or self.vehicle)
+            raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.where)
         changed = {
             name: replace(self.parameters[name], value=float(value), **changes) for name, value in values.items()
         }
@@ -109,7 +120,7 @@ class Card:
         Raises:
             CardError: naming the first parameter that is missing, unknown, in another unit or impossible.
         """
-        where = self.path or self.vehicle
+        where = self.where
         for name in units:
             if name not in self.parameters:
                 raise CardError("is missing.", where=where, channel=name, hint=f"Add [parameters.{name}].")
@@ -119,10 +130,21 @@ class Card:
                     f"is not a parameter of '{self.vehicle}'.", where=where, channel=name, hint="Is it misspelt?"
                 )
             if parameter.unit != units[name]:
-                raise CardError(f"unit is '{parameter.unit}', expected '{units[name]}'.", where=where, channel=name)
+                raise CardError(
+                    f"unit is '{parameter.unit}', expected '{units[name]}'.",
+                    where=where,
+                    channel=name,
+                    hint="Convert the value, and its sigma and bounds with it.",
+                )
             low, high = parameter.lower, parameter.upper
             if (low is not None and parameter.value < low) or (high is not None and parameter.value > high):
-                raise CardError(f"{parameter.value} lies outside [{low}, {high}].", where=where, channel=name)
+                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                raise CardError(
+                    f"{parameter.value:g}{unit} lies outside the card's bounds for it, {_span(low, high, unit)}.",
+                    where=where,
+                    channel=name,
+                    hint="Correct the value, or its lower and upper.",
+                )
         return self
 
     def to_toml(self) -> str:
@@ -160,16 +182,34 @@ def parse_card(text: str, *, path: str = "") -> Card:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise CardError(f"is not TOML: {error}.", where=path) from None
-    if document.get("kind") != "vehicle":
-        raise CardError(f"kind is {document.get('kind')!r}, expected 'vehicle'.", where=path)
-    if document.get("schema", 0) > CARD_SCHEMA:
         raise CardError(
-            f"schema {document['schema']} is newer than {CARD_SCHEMA}.", where=path, hint="Update swashplate."
+            f"is not TOML: {error}.", where=path, hint="A card is a TOML file; `swash vehicles new` writes one."
+        ) from None
+    if document.get("kind") != "vehicle":
+        raise CardError(
+            f"kind is {document.get('kind')!r}, expected 'vehicle'." if "kind" in document else "says no kind.",
+            where=path,
+            hint="A card begins with the line kind = 'vehicle'; `swash vehicles new` writes one.",
         )
+    schema = document.get("schema", 0)
+    if not isinstance(schema, int) or schema > CARD_SCHEMA:
+        raise CardError(
+            f"schema is {schema!r}, expected a whole number up to {CARD_SCHEMA}.", where=path, hint="Update swashplate."
+        )
+    for table in ("options", "observer"):
+        if not isinstance(document.get(table, {}), dict):
+            raise CardError("is not a table.", where=path, channel=table)
     missing = sorted({"vehicle", "title", "parameters"} - document.keys())
     if missing or not isinstance(document["parameters"], dict):
         raise CardError(f"lacks {', '.join(missing) or 'a table of parameters'}.", where=path)
+    unknown = sorted(document.keys() - _TABLES)
+    if unknown:
+        raise CardError(
+            f"is no part of a card; there are {', '.join(sorted(_TABLES))}.",
+            where=path,
+            channel=", ".join(unknown),
+            hint="Is it misspelt?",
+        )
     parameters = {name: _parameter(name, entry, path) for name, entry in document["parameters"].items()}
     return Card(
         vehicle=str(document["vehicle"]),
@@ -189,14 +229,30 @@ def _parameter(name: str, entry: Any, path: str) -> Parameter:
     missing = sorted({"value", "unit", "source", "status"} - entry.keys())
     unknown = sorted(entry.keys() - _FIELDS)
     if missing or unknown:
-        raise CardError(f"lacks {missing} and has unknown {unknown}.", where=path, channel=name)
+        faults = [f"lacks {', '.join(missing)}"] * bool(missing) + [f"has unknown {', '.join(unknown)}"] * bool(unknown)
+        raise CardError(
+            f"{' and '.join(faults)}.",
+            where=path,
+            channel=name,
+            hint="It needs value, unit, source and status, and may have sigma, lower, upper and note.",
+        )
     for key in ("value", "sigma", "lower", "upper"):
         if key in entry and (isinstance(entry[key], bool) or not isinstance(entry[key], int | float)):
             raise CardError(f"{key} is {entry[key]!r}, expected a number.", where=path, channel=name)
     if not float("-inf") < float(entry["value"]) < float("inf"):
         raise CardError(f"value is {entry['value']}, expected a finite number.", where=path, channel=name)
+    if "sigma" in entry and not 0.0 <= float(entry["sigma"]) < float("inf"):
+        raise CardError(f"sigma is {entry['sigma']}, expected 0 or more, and finite.", where=path, channel=name)
+    if not float(entry.get("lower", "-inf")) <= float(entry.get("upper", "inf")):
+        raise CardError(
+            f"lower {entry.get('lower')} and upper {entry.get('upper')} leave nothing between them.",
+            where=path,
+            channel=name,
+        )
     if entry["status"] not in STATUSES:
-        raise CardError(f"status is {entry['status']!r}, expected one of {STATUSES}.", where=path, channel=name)
+        raise CardError(
+            f"status is {entry['status']!r}, expected one of {', '.join(STATUSES)}.", where=path, channel=name
+        )
     numbers = {key: float(entry[key]) for key in ("value", "sigma", "lower", "upper") if key in entry}
     texts = {key: str(entry[key]) for key in ("unit", "source", "status", "note") if key in entry}
     return Parameter(**numbers, **texts)  # type: ignore[arg-type]
@@ -219,12 +275,23 @@ def _correlations(entry: Any, parameters: Mapping[str, Parameter], path: str) ->
     return {first: {second: float(value) for second, value in row.items()} for first, row in entry.items()}
 
 
+def _span(low: float | None, high: float | None, unit: str) -> str:
+    """Bounds as people write them, of which one may be missing."""
+    if low is None or high is None:
+        return f"at most {high:g}{unit}" if low is None else f"at least {low:g}{unit}"
+    return f"{low:g} to {high:g}{unit}"
+
+
 def read_card(path: str | Path) -> Card:
     """A card from a file."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CardError(f"cannot be read: {error}.", where=path) from None
+    except UnicodeDecodeError:
+        raise CardError(
+            "is no text file, expected a card.", where=path, hint="`swash vehicles new` writes one; logs are --flight."
+        ) from None
+    except OSError as error:
+        raise CardError(f"cannot be read: {error.strerror}.", where=path, hint="Check the path.") from None
     return parse_card(text, path=str(path))
 
 

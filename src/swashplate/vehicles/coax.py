@@ -252,7 +252,7 @@ def coax(card: Card) -> Vehicle:
     if unknown or options["mixing"] not in ("rotation", "as_printed") or not isinstance(options["bar"], bool):
         raise CardError(
             f"options are {dict(card.options)}, expected bar = true or false and mixing = 'rotation' or 'as_printed'.",
-            where=card.path or card.vehicle,
+            where=card.where,
             channel="options",
         )
     card.checked_against(UNITS)
@@ -266,6 +266,7 @@ def coax(card: Card) -> Vehicle:
         state_names=(*RigidBody._fields, "alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper"),
         state_units=(*_BODY_UNITS, *("rad",) * (2 + len(bar_names)), "rad/s", "rad/s"),
         input_names=CoaxInputs._fields,
+        input_units=("1",) * 4,
         input_limits=((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)),
         derivatives=partial(derivatives, mixing=options["mixing"]),
         specific_force=partial(specific_force, mixing=options["mixing"]),

@@ -386,6 +386,7 @@ def conventional(card: Card) -> Vehicle:
         state_names=tuple(names),
         state_units=tuple(units),
         input_names=inputs._fields,
+        input_units=("rad", "rad", "rad", "rad", "1")[: len(limits)],
         input_limits=tuple(limits),
         derivatives=partial(derivatives, options=options),
         specific_force=partial(specific_force, options=options),

@@ -13,7 +13,7 @@ def check_numbers(card: Card) -> None:
     Raises:
         CardError: naming the parameter, what it is and what physics asks for.
     """
-    where, value = card.path or card.vehicle, card.values()
+    where, value = card.where, card.values()
 
     def refuse(name: str, problem: str, hint: str | None = None) -> None:
         raise CardError(problem, where=where, channel=name, hint=hint)

@@ -65,7 +65,7 @@ def helicopter_options(card: Card) -> HelicopterOptions:
     Raises:
         CardError: naming the option that is not known or has no such value.
     """
-    where = card.path or card.vehicle
+    where = card.where
     for name, value in card.options.items():
         if name not in _CHOICES:
             known = ", ".join(_CHOICES)

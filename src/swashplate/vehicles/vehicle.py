@@ -26,7 +26,7 @@ class Vehicle:
         inputs: a named tuple type of the inputs.
         parameters: a named tuple type of the parameters.
         state_names, state_units: the flat states.
-        input_names, input_limits: the inputs and their (lower, upper).
+        input_names, input_units, input_limits: the inputs, their units and their (lower, upper).
         derivatives: `derivatives(state, inputs, parameters, environment, xp)` in nested form.
         specific_force: what accelerometers at the CG read [m/s^2], same arguments, returns three scalars.
         trim_held: inputs that a trim does not solve for, with their values (a throttle that a governor stands behind).
@@ -39,6 +39,7 @@ class Vehicle:
     state_names: tuple[str, ...]
     state_units: tuple[str, ...]
     input_names: tuple[str, ...]
+    input_units: tuple[str, ...]
     input_limits: tuple[tuple[float, float], ...]
     derivatives: Derivatives
     specific_force: Derivatives

@@ -82,6 +82,7 @@ def read(
     options = Options(
         units=units or {},
         mapping=load_mapping(mapping),
+        mapping_file="" if mapping is None or isinstance(mapping, Mapping) else str(mapping),
         body=body,
         rotation=rotation,
         body_axes=body_axes,
@@ -97,7 +98,7 @@ def read(
         f"is no flight log that is known; it starts with {source.content[:8]!r}.",
         where=source.path,
         hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), ROS bags, CoaX-56 .mat, swashplate netCDF (.nc), "
-        "CSV, and the CSV exports of Vicon and OptiTrack.",
+        "CSV (columns parted by comma, semicolon or tab), and the CSV exports of Vicon and OptiTrack.",
     )
 
 

@@ -63,7 +63,7 @@ def usable(time: Array, *, where: str, bad_stamps: str, channel: str = "time") -
             f"{wrong.size} of {time.size} samples do not increase.",
             where=where,
             channel=channel,
-            hint="Repair the log, or read it with bad_stamps='drop' to leave these samples out.",
+            hint="Repair the log, or leave these samples out: --drop-bad-stamps (in Python bad_stamps='drop').",
         )
     if keep.sum() < 2:
         raise FlightError("less than two samples have increasing times.", where=where, channel=channel)

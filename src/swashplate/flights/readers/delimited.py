@@ -84,19 +84,21 @@ def _from_header(header: Sequence[str], source: Source) -> dict[str, _Column]:
     return columns
 
 
-def _number_of(entry: Mapping[str, Any], key: str, default: float, *, name: str, source: Source) -> float:
+def _number_of(entry: Mapping[str, Any], key: str, default: float, *, name: str, where: str) -> float:
     value = entry.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FlightError(f"{key} = {value!r} in the mapping is not a number.", where=source.name, channel=name)
+        raise FlightError(f"{key} = {value!r} in the mapping is not a number.", where=where, channel=name)
     return float(value)
 
 
-def _from_mapping(mapping: Mapping[str, Any], header: Sequence[str] | None, source: Source) -> dict[str, _Column]:
+def _from_mapping(options: Options, header: Sequence[str] | None, source: Source) -> dict[str, _Column]:
+    mapping, where = options.mapping, options.mapping_file or source.name
     wanted = mapping.get("channels")
     if not isinstance(wanted, Mapping) or not wanted or set(mapping) - _MAPPING_KEYS:
         raise FlightError(
-            f"the mapping must have a table [channels], and beside it only {', '.join(sorted(_MAPPING_KEYS))}.",
-            where=source.name,
+            f"the mapping must have a table [channels], and beside it only {', '.join(sorted(_MAPPING_KEYS))}; "
+            f"found {', '.join(mapping) or 'nothing'}.",
+            where=where,
             hint="For example: [channels] time = {column = 't', unit = 'ms'}.",
         )
     places: dict[str, int] = {}
@@ -108,8 +110,9 @@ def _from_mapping(mapping: Mapping[str, Any], header: Sequence[str] | None, sour
         if not isinstance(entry, Mapping) or set(entry) - _COLUMN_KEYS or "column" not in entry:
             raise FlightError(
                 f"the mapping says {entry!r}, expected column, unit and if needed factor and offset.",
-                where=source.name,
+                where=where,
                 channel=name,
+                hint=f"For example: {name} = {{column = 'Roll', unit = 'deg'}}.",
             )
         place = entry["column"]
         index = place - 1 if isinstance(place, int) else places.get(place, -1) if isinstance(place, str) else -1
@@ -124,27 +127,44 @@ def _from_mapping(mapping: Mapping[str, Any], header: Sequence[str] | None, sour
         if unit is None and header is not None and index < len(header):
             unit = _split(header[index])[1]
         if unit is not None and not isinstance(unit, str):
-            raise UnitError(f"unit = {unit!r} in the mapping is not text.", where=source.name, channel=name)
+            raise UnitError(f"unit = {unit!r} in the mapping is not text.", where=where, channel=name)
         columns[name] = _Column(
             index,
             unit,
-            _number_of(entry, "factor", 1.0, name=name, source=source),
-            _number_of(entry, "offset", 0.0, name=name, source=source),
+            _number_of(entry, "factor", 1.0, name=name, where=where),
+            _number_of(entry, "offset", 0.0, name=name, where=where),
         )
     return columns
 
 
+def _expected(name: str) -> str:
+    """The unit inside; "" where anything goes."""
+    return "s" if name == "time" else channel(name).unit
+
+
+def _check_units(columns: Mapping[str, _Column], options: Options, source: Source) -> None:
+    """That every channel of the schema has a unit: what is missing is said in one go."""
+    lacking = [
+        name
+        for name, place in columns.items()
+        if options.units.get(name, place.unit) is None and _expected(name) not in ("", "1")
+    ]
+    if lacking:
+        name, unit = lacking[0], _expected(lacking[0])
+        raise UnitError(
+            f"{'has' if len(lacking) == 1 else 'have'} no unit, expected [{'], ['.join(map(_expected, lacking))}] "
+            "or what can be converted to it.",
+            where=source.name,
+            channel=", ".join(lacking),
+            hint=f"Write it in the header, as '{name} [{unit}]', or give --unit {name}={unit} "
+            f"(in Python units={{'{name}': '{unit}'}}).",
+        )
+
+
 def _inside(values: Array, name: str, unit: str | None, source: Source) -> tuple[Array, str]:
     """Values and their unit inside; the schema's channels need a unit that fits, others keep a unit nobody knows."""
-    expected = "s" if name == "time" else channel(name).unit
+    expected = _expected(name)
     if unit is None:
-        if expected not in ("", "1"):
-            raise UnitError(
-                f"has no unit, expected one of [{expected}].",
-                where=source.name,
-                channel=name,
-                hint=f"Write it in the header, as '{name} [{expected}]', or give units={{'{name}': '{expected}'}}.",
-            )
         return values, expected
     if not expected and not units.is_known(unit):
         return values, unit
@@ -190,7 +210,7 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Add a header such as 'time [s],phi [deg]', or use a mapping file with header = false.",
         )
-    columns = _from_mapping(options.mapping, header, source) if options.mapping else _from_header(header or [], source)
+    columns = _from_mapping(options, header, source) if options.mapping else _from_header(header or [], source)
     rate = options.mapping.get("rate")
     if rate is not None and (isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf):
         raise FlightError(f"rate = {rate!r} in the mapping is not a positive number.", where=source.name)
@@ -204,13 +224,17 @@ def read(source: Source, options: Options) -> Flight:
     unknown = set(options.units) - set(columns)
     if unknown:
         raise UnitError(
-            "units are given for a column that the file lacks.", where=source.name, channel=", ".join(sorted(unknown))
+            f"units are given for a column that the file lacks; it has {', '.join(columns)}.",
+            where=source.name,
+            channel=", ".join(sorted(unknown)),
+            hint="Correct the name that the unit is given for.",
         )
+    _check_units(columns, options, source)
     width = max(column.index for column in columns.values()) + 1
     for i, row in enumerate(rows):
         if len(row) < width:
             raise FlightError(
-                f"line {first_line + i} has {len(row)} cells, expected {width}.",
+                f"line {first_line + i} has {len(row)} cell{'s' * (len(row) != 1)}, expected {width}.",
                 where=source.name,
                 hint="The line is cut off: remove or complete it.",
             )

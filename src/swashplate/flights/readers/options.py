@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ class Options:
     Attributes:
         units: units by column or field name, where the file has none or wrong ones.
         mapping: the parsed mapping file (see `readers/delimited.py`).
+        mapping_file: its name, for messages about it; "" where it was given as a dictionary.
         body: the tracked body, where a motion capture file has several.
         rotation: "helical", "euler_xyz" or "quaternion", where the file does not say.
         body_axes: where the logged body axes x, y, z point, for example "forward-left-up".
@@ -29,6 +30,7 @@ class Options:
 
     units: Mapping[str, str] = field(default_factory=dict)
     mapping: Mapping[str, Any] = field(default_factory=dict)
+    mapping_file: str = ""
     body: str | None = None
     rotation: str | None = None
     body_axes: str | None = None
@@ -47,7 +49,11 @@ def load_mapping(mapping: str | Path | Mapping[str, Any] | None) -> Mapping[str,
     except FileNotFoundError:
         raise FlightError("there is no such mapping file.", where=mapping, hint="Check the path.") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FlightError(f"the mapping file does not read as TOML: {error}.", where=mapping) from None
+        raise FlightError(
+            f"the mapping file does not read as TOML: {error}.",
+            where=mapping,
+            hint="Correct it there; `docs/howto/your-own-csv.md` has one to copy.",
+        ) from None
 
 
 def with_mocap_table(options: Options) -> Options:
@@ -55,10 +61,16 @@ def with_mocap_table(options: Options) -> Options:
     table = options.mapping.get("mocap", {})
     if not isinstance(table, Mapping) or set(table) - set(_MOCAP_KEYS):
         raise FlightError(
-            f"the mapping's table [mocap] may hold {', '.join(_MOCAP_KEYS)}; found {table!r}.", hint="Correct the key."
+            f"the mapping's table [mocap] may hold {', '.join(_MOCAP_KEYS)}; found {table!r}.",
+            where=options.mapping_file or None,
+            hint="Correct the key.",
         )
-    given = {key: getattr(options, key) or table.get(key) for key in _MOCAP_KEYS}
+    given: dict[str, Any] = {key: getattr(options, key) or table.get(key) for key in _MOCAP_KEYS}
     wrong = [key for key, value in given.items() if not isinstance(value, str | None)]
     if wrong:
-        raise FlightError(f"'{wrong[0]}' in the mapping's table [mocap] must be text.", channel=wrong[0])
-    return Options(units=options.units, mapping=options.mapping, bad_stamps=options.bad_stamps, **given)
+        raise FlightError(
+            f"'{wrong[0]}' in the mapping's table [mocap] must be text.",
+            where=options.mapping_file or None,
+            channel=wrong[0],
+        )
+    return replace(options, **given)

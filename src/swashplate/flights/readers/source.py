@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -48,6 +49,11 @@ class Source:
     @cached_property
     def text(self) -> str | None:
         """The content as text, None where it is binary."""
+        if self.content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):  # a spreadsheet's "Unicode text"
+            try:
+                return self.content.decode("utf-16")
+            except UnicodeDecodeError:
+                return None
         if b"\0" in self.content:
             return None
         try:

@@ -14,9 +14,16 @@ from swashplate.errors import FlightError
 Array = NDArray[np.float64]
 
 
-def separator(line: str) -> str:
-    """The separator of a line: the one of comma, semicolon and tab that it has most of."""
-    return max(",;\t", key=line.count)
+def separator(text: str) -> str:
+    """The separator of some lines: of comma, semicolon and tab the one of which every line has as many.
+
+    Where none is so regular it is the one that the lines have most of. Decimals written with a comma are thereby told
+    from commas that separate.
+    """
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    counts = {mark: {line.count(mark) for line in lines} for mark in ",;\t"}
+    regular = [mark for mark, found in counts.items() if len(found) == 1 and found != {0}]
+    return max(regular or ",;\t", key=text.count)
 
 
 def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list[str]]:
