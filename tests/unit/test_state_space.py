@@ -104,6 +104,7 @@ def test_accelerometer_away_from_the_centre_of_gravity() -> None:
         ('w = "Zw"', 'w = "Zww"', r"equations.w.w: uses 'Zww', which is no parameter of this model. Did you mean 'Zw'"),
         ('w = "Zw"', 'w = "Zw.__class__"', "is not an expression"),
         ('w = "Zw"', 'ww = "Zw"', r"'ww' is no state or input of this model. Did you mean 'w'"),
+        ('w = "Zw"', 'w = "Zw / (Zcol - Zcol)"', "divides by zero"),
         ('specific_force = "z"', 'specific_force = "down"', "expected 'x', 'y' or 'z'"),
         ('mixer_collective = "tau_collective"', 'stick = "tau_collective"', "is no input"),
         ("kind", "knid", "kind is None"),

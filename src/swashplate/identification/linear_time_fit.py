@@ -128,7 +128,13 @@ def fit_in_time(
     numbers = optimum.row * likelihood.row.scale
     spread = np.sqrt(np.diag(np.linalg.pinv(optimum.information, hermitian=True))) * likelihood.row.scale
     logarithmic = likelihood.row.column("logarithmic") > 0.0
-    named = dict(zip(likelihood.row.names, np.where(logarithmic, np.exp(numbers), numbers), strict=True))
+    named = dict(
+        zip(
+            likelihood.row.names,
+            np.where(logarithmic, np.exp(np.where(logarithmic, numbers, 0.0)), numbers),
+            strict=True,
+        )
+    )
     found = model.with_values({n: float(named[n]) for n in model.free})
     k = len(model.free)
     parameters = tuple(

@@ -142,6 +142,11 @@ def respond(
     made = _composed(matrices, omega, question, guess=guess, rest=rest)
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
+    if band and band[1] > highest:
+        notes.append(
+            f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
+        )
+    made = replace(made, sources=tuple(piece.name for piece in pieces))
     warnings, problems = [*chosen.warnings, *notes], response_warnings.damaged(flights)
     problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
@@ -152,7 +157,7 @@ def respond(
     warnings += blur_words(blurred, made, longest=min(piece.duration for piece in pieces))
     warnings += response_warnings.mixing_words(made)
     warnings += response_warnings.lead_words(made)
-    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
+    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
     if others and not references:
         warnings += response_warnings.bystander_words(
@@ -162,7 +167,6 @@ def respond(
         made,
         input_units=tuple(_unit(flights[0], name) for name in inputs),
         output_units=tuple(_unit(flights[0], name) for name in outputs),
-        sources=tuple(piece.name for piece in pieces),
         warnings=tuple(warnings),
         problems=tuple(problems),
         settings={

@@ -74,6 +74,8 @@ def fit_state_space(
         IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
     """
     began = time.perf_counter()
+    if not model.free:
+        raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
     targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
     others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
     return fit_targets(
@@ -111,6 +113,8 @@ def _targets(
         raise IdentificationError(
             f"the model has inputs {', '.join(model.inputs)} and outputs {', '.join(model.outputs)}; the responses "
             f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
+            where=f"model '{model.name}'"
+            + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
             hint="Name the model's channels as the flight's.",
         )
     found, ceilings, missing = [], [], []

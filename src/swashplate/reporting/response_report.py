@@ -11,6 +11,7 @@ from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import render
 from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Report
 from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import listed
@@ -38,7 +39,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
     if not (m.responses or m.transfer_functions or m.fit or m.verification or m.time_fit):
         raise SwashError("there is nothing to report.")
     parts = [
-        sections_responses.verification_section(m.verification, m.rival) if m.verification else None,
+        verification_section(m.verification, m.rival) if m.verification else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
         sections_responses.time_fit_section(m.time_fit) if m.time_fit else None,
         sections_responses.fit_costs_section(m.fit) if m.fit else None,
