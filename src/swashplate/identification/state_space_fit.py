@@ -39,6 +39,9 @@ SPREAD = 0.3
 
 SCREENED, STARTED = 48, 4
 
+_ENOUGH = 1e-4
+"""Share of the cost that an iteration has to gain for it to go on."""
+
 _VERY_WRONG = 3e4
 """J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
 
@@ -330,7 +333,9 @@ def _best(
             f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
         )
     best = min(ends, key=lambda end: end.cost)
-    final = minimise(cost, start=best.row, tolerance=1e-4, iterations=iterations, progress=progress)
+    final = minimise(
+        cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
+    )
     return replace(final, history=(*best.history, *final.history[1:])), cost
 
 
