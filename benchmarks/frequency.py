@@ -66,8 +66,8 @@ def responses(*, repeats: int) -> Span:
 def x8(*, repeats: int) -> list[Span]:
     """Responses of a real roll sweep (106 s at 100 Hz), and those of the package AircraftIden where it is installed.
 
-    The package is on no index: install it from its repository (bnsgeyer/pyAircraftIden on GitHub) and run again. Nothing
-    is measured where the record is missing.
+    The package is on no index: install it from its repository (bnsgeyer/pyAircraftIden on GitHub) and run again.
+    Nothing is measured where the record is missing.
     """
     file = Path(os.environ.get("SWASHPLATE_DATA", ROOT.parent / "shared" / "data")) / "x8" / "x8roll.csv"
     if not file.is_file():
