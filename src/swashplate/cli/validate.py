@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
+
+if TYPE_CHECKING:
+    from swashplate.identification.state_space import StateSpaceModel
 
 FILES = ("report.html", "validation.json", "verification.json")
 
@@ -20,7 +23,8 @@ def validate(
     published: Annotated[
         str | None,
         typer.Option(
-            "--published", help="The card (or state-space model) to compare with; by default the vehicle's own."
+            "--published",
+            help="The card to compare with (by default the vehicle's own); for a state-space model also a model.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
@@ -98,6 +102,19 @@ def validate(
             typer.echo(f"\nReport: {out / 'report.html'}")
 
 
+def _other(name: str) -> StateSpaceModel:
+    """What an identified model is compared with: another model, or a vehicle linearised in hover."""
+    from swashplate.identification.state_space_file import is_state_space, structure, structure_names
+
+    if name in structure_names() or is_state_space(name):
+        return structure(name)
+    import swashplate as sp
+    from swashplate.identification.vehicle_model import model_of
+
+    aircraft = sp.vehicle(name)
+    return model_of(sp.linearize(aircraft), name=aircraft.name)
+
+
 def _verify(
     model: str,
     other: str | None,
@@ -120,7 +137,7 @@ def _verify(
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
-    identified, compared = structure(model), None if other is None else structure(other)
+    identified, compared = structure(model), None if other is None else _other(other)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("flying the model along the inputs")
         inputs, outputs = identified.inputs, identified.outputs
