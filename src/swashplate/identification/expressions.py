@@ -51,9 +51,9 @@ class Expression:
         try:
             return _walk(self._tree, values)
         except ZeroDivisionError:
-            zeros = sorted(name for name in self.names if values[name] == 0.0)
+            zeros = sorted(name for name in self.names if values.get(name) == 0.0)
             raise ExpressionError(
-                f"'{self.text}' divides by zero{f' ({chr(44).join(zeros)} = 0)' if zeros else ''}.",
+                f"'{self.text}' divides by zero{(' (' + ', '.join(zeros) + ' = 0)') if zeros else ''}.",
                 hint="Change the value or the expression.",
             ) from None
 
