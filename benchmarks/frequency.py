@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import time
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
@@ -19,6 +23,8 @@ from swashplate.identification.state_space_fit import fit_state_space
 
 SECONDS, RATE = 600.0, 100.0
 RESPOND_WITHIN, FIT_WITHIN = 2.0, 15.0
+X8_BAND, X8_WITHIN, FASTER = (0.1, 10.0), 1.0, 10.0
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def _best(run, repeats: int) -> float:  # type: ignore[no-untyped-def]
@@ -55,6 +61,35 @@ def responses(*, repeats: int) -> Span:
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - before
     note = f"{grown / 1e6:.0f} MB more at the peak, 1000 MB promised"
     return Span("responses 4 x 9, 5 windows, 600 s at 100 Hz", seconds, RESPOND_WITHIN, note)
+
+
+def x8(*, repeats: int) -> list[Span]:
+    """Responses of a real roll sweep (106 s at 100 Hz), and those of the package AircraftIden where it is installed.
+
+    The package is on no index: install it from its repository (bnsgeyer/pyAircraftIden on GitHub) and run again.
+    Nothing is measured where the record is missing.
+    """
+    file = Path(os.environ.get("SWASHPLATE_DATA", ROOT.parent / "shared" / "data")) / "x8" / "x8roll.csv"
+    if not file.is_file():
+        return []
+    time_, command, rate = np.loadtxt(file, delimiter=",").T
+    columns = {"command": command, "p": np.radians(rate)}
+    flight = Flight({"uniform": stream(np.arange(time_.size) / RATE, columns, {"command": "1"})})
+
+    def run() -> None:
+        respond(flight, inputs=["command"], outputs=["p"], band=X8_BAND, bystanders=())
+
+    run()
+    seconds = _best(run, repeats)
+    name = "responses of the X8's roll sweep, 106 s"
+    if find_spec("AircraftIden") is None:
+        return [Span(name, seconds, X8_WITHIN, "AircraftIden is not installed: not compared")]
+    package = import_module("AircraftIden")
+    low, high = (2.0 * np.pi * f for f in X8_BAND)
+    theirs = _best(lambda: package.FreqIdenSIMO(time_, low, high, command, np.radians(rate), win_num=None), 1)
+    return [
+        Span(name, seconds, theirs / FASTER, f"AircraftIden takes {theirs:.2f} s; {FASTER:g} times faster promised")
+    ]
 
 
 def _exact(model: StateSpaceModel) -> FrequencyResponse:

@@ -103,6 +103,7 @@ def main() -> None:
         closed_loops.flights(count=256 if options.short else 1000),
         *identifying.measure(short=options.short),
         frequency.responses(repeats=repeats),
+        *frequency.x8(repeats=repeats),
         frequency.fit(repeats=1),
     ]
     show(

@@ -116,7 +116,7 @@ def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
     assert "NOT A HOLD-OUT" in done.out
 
 
-@pytest.mark.parametrize(("kind", "words"), [("dead", "'mixer_pitch' never moves"), ("doubled", "cannot be told from")])
+@pytest.mark.parametrize(("kind", "words"), [("dead", "'mixer_pitch' never moves"), ("doubled", "move together")])
 def test_a_dead_or_doubled_input_is_named_and_the_rest_is_kept(folder: Path, kind: str, words: str) -> None:
     bad = log(folder / f"{kind}.csv", seed=3, **{kind: True})  # type: ignore[arg-type]
     out = folder / kind
@@ -144,6 +144,7 @@ def test_noise_is_not_a_response(folder: Path) -> None:
 def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: Path) -> None:
     ask = ("--inputs", "mixer_roll", "--outputs", "p")
     assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--windows", "500"))
+    assert "are not all positive" in one_message(swash("respond", flown, *ask, "--windows", "0"))
     assert "the flight has no such channel" in one_message(
         swash("respond", flown, "--inputs", "stick", "--outputs", "p")
     )
@@ -160,6 +161,10 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     bad.write_text(text.replace('b = "Lb"', 'b = "Lbb"'), encoding="utf-8")
     message = one_message(swash("fit-ss", bad, answered))
     assert "'Lbb'" in message
+    bad.write_text(text.replace('b = "Lb"', 'b = "Lb/0"'), encoding="utf-8")
+    assert "divides by zero" in one_message(swash("fit-ss", bad, answered))
+    fixed = [word for name in structure("rotor_body").free for word in ("--fix", f"{name}=1")]
+    assert "every parameter is fixed" in one_message(swash("fit-ss", "rotor_body", answered, *fixed))
     assert "Did you mean 'Lb'" in message
     assert "is no parameter" in one_message(swash("fit-ss", "rotor_body", answered, "--start", "Lbb=3"))
 

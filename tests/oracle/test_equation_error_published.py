@@ -55,35 +55,28 @@ def test_unstable_aircraft_by_least_squares_is_the_books(shared_data: Path, unst
     assert banded["Mq"] == pytest.approx(truth["Mq"], rel=0.02)
 
 
-def test_twin_otter_answers_are_near_those_published(shared_data: Path) -> None:
-    """SIDPAC's Twin Otter, in time and over frequencies. How they prepared the data is not told, so near only.
+def test_twin_otter_answers_are_sidpacs(shared_data: Path) -> None:
+    """SIDPAC's Twin Otter, on the record that its answers belong to: the one inside its file of results.
 
-    Measured: CZ_alpha 2.0 %, CZ_elevator 0.1 %, Cm_alpha 0.2 %, Cm_q 4.6 %, Cm_elevator 7.8 % off; CZ_q is 35 % off.
+    (236 ft/s, 401 samples at 50 Hz. The record in totter_lon_data.mat is another flight, at 153 ft/s; its lift by pitch
+    rate is 35 % lower.) In SIDPAC's columns 4 is the angle of attack, 14 the elevator [deg], 72 the pitch rate without
+    dimension, 63 and 65 the force and moment coefficients.
     """
-    log = io.loadmat(shared_data / "sidpac" / "totter_lon_data.mat")
     answers = io.loadmat(shared_data / "sidpac" / "totter_results.mat")
-    c = {name: log[name].ravel().astype(float) for name in ("alpha", "q", "de", "az", "qdot", "qbar", "v", "p", "r")}
-    k = {name: float(log[name].ravel()[0]) for name in ("mass", "ix", "iy", "iz", "ixz", "sarea", "cbar")}
-    rad = np.pi / 180.0
-    force = k["mass"] * 32.174 * c["az"] / (c["qbar"] * k["sarea"])
-    turning = k["iy"] * c["qdot"] * rad + (k["ix"] - k["iz"]) * c["p"] * c["r"] * rad**2
-    turning = turning + k["ixz"] * (c["p"] ** 2 - c["r"] ** 2) * rad**2
-    moment = turning / (c["qbar"] * k["sarea"] * k["cbar"])
-    x = np.column_stack([c["alpha"] * rad, c["q"] * rad * k["cbar"] / (2.0 * c["v"]), c["de"] * rad])
+    record = next(part for part in answers["cc"].ravel() if np.shape(part) == (401, 90)).astype(float)
+    x = np.column_stack([np.radians(record[:, 3]), record[:, 71], np.radians(record[:, 13])])
     names, pm, pz = ("alpha", "q", "de"), answers["pm"].ravel(), answers["pZ"].ravel()
-    lift = equation_error(force, x, names)
-    assert lift["alpha"] == pytest.approx(pz[0], rel=0.025)
-    assert lift["de"] == pytest.approx(pz[2], rel=0.01)
+    lift, moment = record[:, 62], record[:, 64]
+    pitching = equation_error(moment, x, names)
+    np.testing.assert_allclose([pitching[n] for n in names], pm[:3], rtol=1e-6)
+    lifting = equation_error(lift, x, names)
+    np.testing.assert_allclose([lifting[n] for n in names], pz[:3], rtol=1.5e-3)
     chosen = stepwise(moment, np.column_stack([x, x[:, 0] ** 3]), (*names, "alpha^3"))
     assert set(names) <= set(chosen.names)
-    for found in (
-        equation_error(moment, x, names),
-        equation_error(moment, x, names, dt=0.01, band=(0.1, 1.5)),
-        chosen,
-    ):
-        assert found["alpha"] == pytest.approx(pm[0], rel=0.02)
-        assert found["q"] == pytest.approx(pm[1], rel=0.05)
-        assert found["de"] == pytest.approx(pm[2], rel=0.08)
+    # Over a band of frequencies within his bounds, which allow for coloured residuals.
+    banded = equation_error(moment, x, names, dt=0.02, band=(0.1, 1.5))
+    for name, value, sigma in zip(names, pm, answers["serrm"].ravel(), strict=False):
+        assert banded[name] == pytest.approx(value, abs=3.0 * sigma), name
 
 
 def test_regressors_that_are_one_are_refused() -> None:

@@ -53,42 +53,164 @@ def test_unstable_aircraft_is_the_truth_within_a_percent(shared_data: Path) -> N
         assert banded[name].value == pytest.approx(float(table["true"][name]), rel=0.005)
 
 
-def test_aircraft_in_turbulence_within_the_scatter_of_coloured_errors(shared_data: Path) -> None:
-    """Truth from the file's own noise-free columns, where the equations hold to seven digits."""
+def test_aircraft_in_turbulence_comes_back_with_its_bounds(shared_data: Path) -> None:
+    """Jategaonkar's record with process noise, fitted to what he fits: columns 12 to 16 with inputs 17 to 19.
+
+    Truth from the record itself: its accelerations obey its equations to seven digits. (Columns 2 to 11 are the flight
+    that the simulation imitates; its answers are others, Lp 3 % off.)
+    """
     text = (shared_data / "fvsysid" / "y13aus_da1.asc").read_text(encoding="utf-8")
     rows = np.array(text.split(), dtype=float).reshape(321, -1)
-    names = ("pdot", "rdot", "ay", "p_", "r_", "aileron", "rudder", "vk", "p", "r")
-    measured, clean = dict(zip(names, rows[:, 1:11].T, strict=True)), dict(zip(names, rows[:, 11:21].T, strict=True))
+    names = ("pdot", "rdot", "ay", "p", "r", "aileron", "rudder", "vk")
+    record = dict(zip(names, rows[:, 11:19].T, strict=True))
     regressors = ("p", "r", "aileron", "rudder", "vk")
     truth = {}
-    for output, letters in (("pdot", "L"), ("rdot", "N"), ("ay", "Y")):
-        exact = equation_error(clean[output], np.column_stack([clean[n] for n in regressors]), regressors)
+    for output, letter in (("pdot", "L"), ("rdot", "N"), ("ay", "Y")):
+        exact = equation_error(record[output], np.column_stack([record[n] for n in regressors]), regressors)
         assert exact.determination > 1 - 1e-9
-        truth |= {f"{letters}{n}": exact[n] for n in regressors}
+        truth |= {f"{letter}{n}": exact[n] for n in regressors}
 
     def row(letter: str) -> str:
         return "{" + ", ".join(f'{n} = "{letter}{n}"' for n in regressors) + "}"
 
-    aircraft = model(
-        "lateral",
-        'p = "rad/s"\nr = "rad/s"',
-        'aileron = "rad"\nrudder = "rad"\nvk = "m/s"',
-        f"p = {row('L')}\nr = {row('N')}",
-        '[outputs.pdot]\nrates = {p = "1"}\n[outputs.rdot]\nrates = {r = "1"}\n'
-        f'[outputs.ay]\nof = {row("Y")}\n[outputs.p]\nof = {{p = "1"}}\n[outputs.r]\nof = {{r = "1"}}',
-        {name: 0.7 * value for name, value in truth.items()},
+    def aircraft(outputs: str, letters: str) -> StateSpaceModel:
+        return model(
+            "lateral",
+            'p = "rad/s"\nr = "rad/s"',
+            'aileron = "rad"\nrudder = "rad"\nvk = "m/s"',
+            f"p = {row('L')}\nr = {row('N')}",
+            outputs + '[outputs.p]\nof = {p = "1"}\n[outputs.r]\nof = {r = "1"}',
+            {name: 0.7 * value for name, value in truth.items() if name[0] in letters},
+        )
+
+    flight = Flight({"uniform": stream(np.arange(321) * 0.05, record)})
+    # With all his outputs the accelerations tell everything; gusts are no errors to the innovations.
+    accelerations = '[outputs.pdot]\nrates = {p = "1"}\n[outputs.rdot]\nrates = {r = "1"}\n'
+    every = aircraft(accelerations + f"[outputs.ay]\nof = {row('Y')}\n", "LNY")
+    found = fit_in_time(every, flight, biases=["ay"], method="prediction-error")
+    assert found.converged
+    for name, value in truth.items():
+        assert found[name].value == pytest.approx(value, rel=1e-3), name
+    # By the rates alone, which the gusts move: bounds hold where gusts are in the model, and nowhere else.
+    for method, rms, worst in (("filter-error", 1.3, 3.0), ("prediction-error", 1.3, 3.0)):
+        fit = fit_in_time(aircraft("", "LN"), flight, method=method)
+        off = np.array([(p.value - truth[p.name]) / p.cramer_rao for p in fit.parameters])
+        assert fit.converged
+        assert np.sqrt(np.mean(off**2)) < rms, method  # measured: 1.0 and 0.9
+        assert np.max(np.abs(off)) < worst, method
+        assert fit["Lp"].value == pytest.approx(truth["Lp"], rel=0.2)
+    naive = fit_in_time(aircraft("", "LN"), flight, iterations=25)
+    off = np.array([(p.value - truth[p.name]) / p.cramer_rao for p in naive.parameters])
+    assert np.max(np.abs(off)) > 8.0
+
+
+PUBLISHED_HFB = {
+    "CD0": 0.122688, "CDV": -0.0644969, "CDa": 0.320055, "CL0": -0.0929113, "CLV": 0.148726, "CLa": 4.32785,
+    "Cm0": 0.111905, "CmV": 0.00395154, "Cma": -0.967854, "Cmq": -34.7098, "Cmde": -1.52913,
+}  # fmt: skip
+"""HFB-320, filter error estimates: numbers of RVJategaonkar_codes_2ed/chapter07/mDefCase04.m (same source as the table
+of the unstable aircraft). Reference speed 104.67 m/s, pitch rate made dimensionless by 1.215 m over that speed."""
+
+
+@pytest.fixture
+def hfb(shared_data: Path) -> dict[str, np.ndarray]:
+    rows = np.loadtxt(shared_data / "fvsysid" / "hfb320_1_10.asc")
+    names = ("elevator", "pressure", "thrust", "V", "alpha", "theta", "q", "qdot", "ax", "az")
+    return dict(zip(names, rows[:, 1:11].T, strict=True))
+
+
+def coefficients(hfb: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Drag, lift and pitching moment from accelerations, thrust and pressure (constants: the data's columns.md)."""
+    force = 0.5 * 0.792 * hfb["V"] ** 2 * 4.028e-3
+    cx = (hfb["ax"] - hfb["thrust"] * np.cos(0.0524) / 7472.0) / force
+    cz = (hfb["az"] + hfb["thrust"] * np.sin(0.0524) / 7472.0) / force
+    s, c = np.sin(hfb["alpha"]), np.cos(hfb["alpha"])
+    moment = (hfb["qdot"] + 7.0153e-6 * hfb["thrust"]) / (0.5 * 0.792 * hfb["V"] ** 2 * 8.0027e-4)
+    return -cx * c - cz * s, cx * s - cz * c, moment
+
+
+def test_hfb_320_by_regression_is_near_the_published(hfb: dict[str, np.ndarray]) -> None:
+    """The equations as they are, no linearisation. Turbulence in the regressors: Cmq is 21 % off, Cmde 5 %."""
+    x = np.column_stack([hfb["V"] / 104.67, hfb["alpha"], hfb["q"] * 1.215 / 104.67, hfb["elevator"]])
+    drag, lift, moment = coefficients(hfb)
+    for measured, letter, count in ((drag, "CD", 2), (lift, "CL", 2), (moment, "Cm", 4)):
+        names = [f"{letter}{n}" for n in ("V", "a", "q", "de")[:count]]
+        found = equation_error(measured, x[:, :count], names)
+        banded = equation_error(measured, x[:, :count], names, dt=0.1, band=(0.03, 1.0))
+        for name in names:
+            if name not in ("CmV", "Cmq", "Cmde"):
+                miss = found[name] - PUBLISHED_HFB[name]
+                assert abs(miss) < max(3.0 * found.sigmas[names.index(name)], 0.02 * abs(PUBLISHED_HFB[name])), name
+                miss = banded[name] - PUBLISHED_HFB[name]
+                assert abs(miss) < 3.0 * banded.sigmas[names.index(name)], name
+        assert letter != "CD" or found["bias"] == pytest.approx(PUBLISHED_HFB["CD0"], rel=0.02)
+        assert letter != "Cm" or found["Cmde"] == pytest.approx(PUBLISHED_HFB["Cmde"], rel=0.06)
+
+
+def hfb_model(hfb: dict[str, np.ndarray]) -> StateSpaceModel:
+    """The equations of motion linearised about the record's means, in dimensionless derivatives."""
+    mass, sigma, rho, area, turn, g = 7472.0, 0.0524, 0.792, 4.028e-3, 8.0027e-4, 9.80665
+    V, alpha, thrust = (float(hfb[n].mean()) for n in ("V", "alpha", "thrust"))
+    climb, v0, pressure = alpha - float(hfb["theta"].mean()), 104.67, 0.5 * rho * V**2
+    cd, cl, cm = (float(c.mean()) for c in coefficients(hfb))
+    s, c, down, ahead = np.sin(alpha), np.cos(alpha), g * np.cos(climb), g * np.sin(climb)
+    t_s, t_c = thrust * np.sin(alpha + sigma) / mass, thrust * np.cos(alpha + sigma) / mass
+
+    def linear(constant: float, **by: float) -> str:
+        return " + ".join([f"({constant:.9e})", *(f"({value:.9e}) * {name}" for name, value in by.items())])
+
+    def table(**entries: str) -> str:
+        return "{" + ", ".join(f'{name} = "{text}"' for name, text in entries.items()) + "}"
+
+    k = area * pressure
+    equations = [
+        "V = " + table(
+            V=linear(-area * rho * V * cd, CDV=-k / v0), alpha=linear(down - t_s, CDa=-k), theta=linear(-down)
+        ),
+        "alpha = " + table(
+            V=linear(-0.5 * area * rho * cl + (t_s - down) / V**2, CLV=-k / V / v0),
+            alpha=linear(-(t_c + ahead) / V, CLa=-k / V), theta=linear(ahead / V), q="1",
+        ),
+        "theta = " + table(q="1"),
+        "q = " + table(
+            V=linear(turn * rho * V * cm, CmV=turn * pressure / v0), alpha=linear(0.0, Cma=turn * pressure),
+            q=linear(0.0, Cmq=turn * pressure * 1.215 / v0), elevator=linear(0.0, Cmde=turn * pressure),
+        ),
+    ]  # fmt: skip
+    cx, cz = cl * s - cd * c, -cl * c - cd * s
+    ax = table(
+        V=linear(area * rho * V * cx, CLV=k * s / v0, CDV=-k * c / v0), alpha=linear(-k * cz, CLa=k * s, CDa=-k * c)
     )
-    flight = Flight({"uniform": stream(rows[:, 0], {n: v for n, v in measured.items() if n not in ("p_", "r_")})})
-    fit = fit_in_time(aircraft, flight, biases=["ay"])
-    off = np.array([(fit[n].value - v) / fit[n].cramer_rao for n, v in truth.items()])
-    assert np.max(np.abs(off)) < 4.0
-    assert np.sqrt(np.mean(off**2)) < 2.5  # gusts colour the errors: the plain bounds are too small by about two
-    for name in ("Lp", "Lr", "Laileron", "Lvk", "Nrudder", "Nr", "Yvk", "Yrudder", "Yr"):
-        assert fit[name].value == pytest.approx(truth[name], rel=0.03), name
-    # By prediction error, gusts included; the gusts are not white, as the method supposes.
-    found = fit_in_time(aircraft, flight, biases=["ay"], method="prediction-error", iterations=40)
-    for name in ("Lp", "Lr", "Laileron", "Lvk", "Nrudder", "Nr", "Yvk", "Yrudder", "Yr"):
-        assert found[name].value == pytest.approx(truth[name], rel=0.05), name
+    az = table(
+        V=linear(area * rho * V * cz, CLV=-k * c / v0, CDV=-k * s / v0), alpha=linear(k * cx, CLa=-k * c, CDa=-k * s)
+    )
+    seen = "".join(f'[outputs.{n}]\nof = {{{n} = "1"}}\n' for n in ("V", "alpha", "theta", "q"))
+    outputs = f'{seen}[outputs.qdot]\nrates = {{q = "1"}}\n[outputs.ax]\nof = {ax}\n[outputs.az]\nof = {az}'
+    states = 'V = "m/s"\nalpha = "rad"\ntheta = "rad"\nq = "rad/s"'
+    # Start values of the same source.
+    start = {"CDV": 0.0077, "CDa": 0.674, "CLV": 0.26, "CLa": 5.376}
+    start |= {"CmV": 0.0189, "Cma": -0.4986, "Cmq": -25.84, "Cmde": -0.9907}
+    return model("hfb", states, 'elevator = "rad"', "\n".join(equations), outputs, start)
+
+
+def test_hfb_320_by_filter_error_is_the_published(hfb: dict[str, np.ndarray]) -> None:
+    """A business jet in turbulence, by his method: lift and moment within 3 bounds (0.6, 0.6, 2.7, 0.7, 3.0 and 0.8).
+
+    The linear model cannot follow his on drag, which goes with the square of lift here: 6 % and 15 % off. Output error,
+    which knows no turbulence, is 25 % off on the lift slope.
+    """
+    aircraft = hfb_model(hfb)
+    columns = {n: hfb[n] - hfb[n].mean() for n in (*aircraft.inputs, *aircraft.outputs)}
+    flight = Flight({"uniform": stream(np.arange(601) * 0.1, columns, dict.fromkeys(("V", "alpha", "qdot"), "1"))})
+    fit = fit_in_time(aircraft, flight, biases=["ax", "az"], method="filter-error")
+    assert fit.converged
+    for name in ("CLV", "CLa", "CmV", "Cma", "Cmq", "Cmde"):
+        assert abs(fit[name].value - PUBLISHED_HFB[name]) < 3.0 * fit[name].cramer_rao, name
+    assert fit["CLa"].value == pytest.approx(PUBLISHED_HFB["CLa"], rel=0.02)
+    assert fit["Cmq"].value == pytest.approx(PUBLISHED_HFB["Cmq"], rel=0.1)
+    assert fit["CDa"].value == pytest.approx(PUBLISHED_HFB["CDa"], rel=0.1)
+    naive = fit_in_time(aircraft, flight, biases=["ax", "az"], iterations=25)
+    assert abs(naive["CLa"].value / PUBLISHED_HFB["CLa"] - 1.0) > 0.2
 
 
 def test_delays_and_heave_come_back_with_their_bounds() -> None:

@@ -151,8 +151,7 @@ def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:
     flight = made({"stick1": u, "stick2": 0.5 * u, "stick3": other, "stick4": np.zeros(n), "out": y})
     found = respond(flight, inputs=["stick1", "stick2", "stick3", "stick4"], outputs=["out"], band=(0.2, 5.0))
     text = " ".join(found.problems)
-    assert "'stick1' cannot be told from 'stick2'" in text
-    assert "'stick2' cannot be told from 'stick1'" in text
+    assert text.count("'stick1' and 'stick2' move together") == 1
     assert "'stick4' never moves" in text
     assert np.isnan(found.pair("out", "stick1")[0]).all()
     h = found.pair("out", "stick3")[0]

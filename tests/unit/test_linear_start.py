@@ -105,3 +105,14 @@ def test_what_was_not_seen_cannot_be_large() -> None:
     assert cost_of(np.full(limit.omega.size, 1.25 + 0j), limit) == pytest.approx(
         20.0**3 * (1.58 * (1 - np.exp(-1))) ** 2
     )
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_hidden_rotor_comes_back_from_wrong_signs(seed: int) -> None:
+    """Seed 4 ends at J_ave 290 unless the bad end is shaken and some of its signs are turned."""
+    truth = shaken("hybrid", seed=seed)
+    fit = fit_state_space(structure("hybrid"), measured(truth, ("p", "q", "r", "ax", "ay", "az"), noise=0.02))
+    assert fit.cost < 1.0
+    modes = fit.model.eigenvalues()
+    assert all(np.min(np.abs(modes - v)) < 0.02 * abs(v) for v in truth.eigenvalues())

@@ -17,6 +17,7 @@ from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import parse, structure, structure_names, to_toml
 from swashplate.identification.state_space_fit import fit_state_space
 from swashplate.identification.transfer_function_fit import fit_transfer_function
+from swashplate.identification.vehicle_model import model_of
 from swashplate.identification.verification import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 12.0, 80)
@@ -104,6 +105,7 @@ def test_accelerometer_away_from_the_centre_of_gravity() -> None:
         ('w = "Zw"', 'w = "Zww"', r"equations.w.w: uses 'Zww', which is no parameter of this model. Did you mean 'Zw'"),
         ('w = "Zw"', 'w = "Zw.__class__"', "is not an expression"),
         ('w = "Zw"', 'ww = "Zw"', r"'ww' is no state or input of this model. Did you mean 'w'"),
+        ('w = "Zw"', 'w = "Zw / (Zcol - Zcol)"', "divides by zero"),
         ('specific_force = "z"', 'specific_force = "down"', "expected 'x', 'y' or 'z'"),
         ('mixer_collective = "tau_collective"', 'stick = "tau_collective"', "is no input"),
         ("kind", "knid", "kind is None"),
@@ -235,6 +237,11 @@ def test_start_values_from_the_coax() -> None:
     cols = [linear.inputs.index(i) for i in model.inputs]
     np.testing.assert_allclose(a, linear.A[np.ix_(keep, keep)], atol=1e-3 * np.abs(linear.A).max())
     np.testing.assert_allclose(b, linear.B[np.ix_(keep, cols)], atol=1e-9 * np.abs(linear.B).max())
+    # The vehicle as a model of its own: python-control answers alike, without place and heading.
+    whole, omega = model_of(linear, name="coax"), np.array([0.5, 5.0, 20.0])
+    theirs = linear.to_control()(1j * omega)[[linear.states.index(s) for s in whole.outputs]]
+    np.testing.assert_allclose(whole.response(omega).transpose(1, 2, 0), theirs, rtol=1e-6, atol=1e-9)
+    assert {"x", "y", "z", "psi"}.isdisjoint(whole.states)
 
 
 def test_first_order_hold_is_exact_for_a_ramp() -> None:

@@ -70,7 +70,7 @@ def fit_ss(
     from swashplate.identification.state_space_file import structure as find
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.state_space_fit import fit_state_space
-    from swashplate.identification.verification import verify
+    from swashplate.identification.verification import verify_inside
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
@@ -102,7 +102,7 @@ def fit_ss(
             line.say("flying the model along what the fit has not seen")
             channels = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
             flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
-            verification = flying.seen_before(verify(fit.model, flights), found.sources)
+            verification = flying.seen_before(verify_inside(fit.model, flights, band=limits), found.sources)
         suggested = suggest_gains(fit.model) if gains else ()
         if folder is not None:
             line.say("writing the report")

@@ -54,7 +54,7 @@ def fit_tf(
     from swashplate.errors import IdentificationError
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
-    from swashplate.identification.verification import verify
+    from swashplate.identification.verification import verify_inside
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
@@ -88,7 +88,7 @@ def fit_tf(
             line.say("flying the model along what the fit has not seen")
             channels = (*model.inputs, *model.outputs)
             flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
-            verification = flying.seen_before(verify(model, flights), found.sources)
+            verification = flying.seen_before(verify_inside(model, flights, band=limits), found.sources)
         if folder is not None:
             pairs = tuple(m.output for m in fit.models)
             material = ResponseMaterial(found.select(pairs, (input,)), (fit,), trials, verification=verification)

@@ -20,7 +20,7 @@ def fit_time(
     log: Annotated[list[str], typer.Argument(metavar="LOG...", help="Flights; FILE@5-30 takes seconds 5 to 30.")],
     out: options.OutFolder = None,
     method: Annotated[
-        str, typer.Option("--method", help="output-error, or prediction-error where gusts move the aircraft.")
+        str, typer.Option("--method", help="output-error; filter-error or prediction-error in gusts.")
     ] = "output-error",
     outputs: Annotated[
         str | None,

@@ -47,6 +47,7 @@ def respond(
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
+    from swashplate.errors import SwashError
     from swashplate.identification.respond import respond as answer
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
@@ -55,6 +56,8 @@ def respond(
     refs = flying.names(references)
     limits = flying.band(band)
     lengths = None if windows is None else options.numbers(windows, option="--windows")
+    if lengths is not None and not all(0.0 < length < float("inf") for length in lengths):
+        raise SwashError(f"'{windows}' are not all positive lengths in s.", channel="--windows")
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
+
+if TYPE_CHECKING:
+    from swashplate.identification.state_space import StateSpaceModel
 
 FILES = ("report.html", "validation.json", "verification.json")
 
@@ -20,7 +23,8 @@ def validate(
     published: Annotated[
         str | None,
         typer.Option(
-            "--published", help="The card (or state-space model) to compare with; by default the vehicle's own."
+            "--published",
+            help="The card to compare with (by default the vehicle's own); for a state-space model also a model.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
@@ -28,6 +32,7 @@ def validate(
     calibration: Annotated[
         float, typer.Option("--calibration", help="Seconds at each start that tell delays and trims.", min=1.0)
     ] = 5.0,
+    band: flying.BandOption = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -38,7 +43,8 @@ def validate(
 ) -> None:
     """Predict flights from many start points and judge the predictions, next to the card and naive predictors.
 
-    A state-space model (of `swash fit-ss` or `swash fit-tf`) is flown along each flight's inputs instead.
+    A state-space model (of `swash fit-ss` or `swash fit-tf`) is flown along each flight's inputs instead; --band adds
+    how it does within the band that it was fitted over.
     """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, console, progress
@@ -51,8 +57,13 @@ def validate(
 
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
     if is_state_space(model):
-        _verify(model, published, flight, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet)
+        limits = flying.band(band)
+        _verify(
+            model, published, flight, band=limits, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet
+        )
         return
+    if band is not None:
+        raise SwashError(f"'{model}' is a vehicle, and a band is for state-space models.", channel="--band")
     ahead = tuple(options.numbers(horizons, option="--horizons"))
     if min(ahead) <= 0.0:
         raise SwashError(f"'{horizons}' are not all positive.", channel="--horizons")
@@ -91,11 +102,25 @@ def validate(
             typer.echo(f"\nReport: {out / 'report.html'}")
 
 
+def _other(name: str) -> StateSpaceModel:
+    """What an identified model is compared with: another model, or a vehicle linearised in hover."""
+    from swashplate.identification.state_space_file import is_state_space, structure, structure_names
+
+    if name in structure_names() or is_state_space(name):
+        return structure(name)
+    import swashplate as sp
+    from swashplate.identification.vehicle_model import model_of
+
+    aircraft = sp.vehicle(name)
+    return model_of(sp.linearize(aircraft), name=aircraft.name)
+
+
 def _verify(
     model: str,
     other: str | None,
     flights: list[str],
     *,
+    band: tuple[float, float] | None,
     out: Path | None,
     rate: float,
     cutoff: float,
@@ -108,20 +133,23 @@ def _verify(
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.state_space_file import structure
-    from swashplate.identification.verification import verify
+    from swashplate.identification.verification import verify_inside
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 
-    identified, compared = structure(model), None if other is None else structure(other)
+    identified, compared = structure(model), None if other is None else _other(other)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("flying the model along the inputs")
         inputs, outputs = identified.inputs, identified.outputs
-        found = verify(identified, flying.flown(flights, inputs, rate=rate, cutoff=cutoff, how=how, also=outputs))
+        flown = flying.flown(flights, inputs, rate=rate, cutoff=cutoff, how=how, also=outputs)
+        found = verify_inside(identified, flown, band=band)
         rival = None
         if compared is not None:
             channels = (compared.inputs, compared.outputs)
-            rival = verify(
-                compared, flying.flown(flights, channels[0], rate=rate, cutoff=cutoff, how=how, also=channels[1])
+            rival = verify_inside(
+                compared,
+                flying.flown(flights, channels[0], rate=rate, cutoff=cutoff, how=how, also=channels[1]),
+                band=band,
             )
         if folder is not None:
             response_report(ResponseMaterial(verification=found, rival=rival), path=folder / "report.html")

@@ -43,8 +43,19 @@ class Expression:
         self._tree = tree
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
-        """The expression's value for the parameters' values (numbers or traced numbers)."""
-        return _walk(self._tree, values)
+        """The expression's value for the parameters' values (numbers or traced numbers).
+
+        Raises:
+            ExpressionError: where a plain number is divided by zero.
+        """
+        try:
+            return _walk(self._tree, values)
+        except ZeroDivisionError:
+            zeros = sorted(name for name in self.names if values.get(name) == 0.0)
+            raise ExpressionError(
+                f"'{self.text}' divides by zero{(' (' + ', '.join(zeros) + ' = 0)') if zeros else ''}.",
+                hint="Change the value or the expression.",
+            ) from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Expression) and self.text == other.text

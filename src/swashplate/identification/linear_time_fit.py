@@ -1,10 +1,11 @@
-"""State-space models fitted in time: maximum likelihood under measurement noise, or with gusts by prediction errors.
+"""State-space models fitted in time: maximum likelihood under measurement noise, or with gusts by innovations.
 
     dx/dt = A x + B u(t - tau) + shift (+ gusts),    y = C x + D u(t - tau) + bias + v
 
 Output error takes all noise for measurement noise (Jategaonkar 2015, ch. 4; Klein and Morelli 2006, ch. 6). Prediction
 error corrects the state by K times the last innovation and fits K too: the innovations form, which knows any stationary
-gusts and measurement noise, also where both come in by an accelerometer (Ljung 1999, sec. 7.3; Jategaonkar, ch. 5).
+gusts and measurement noise, also where both come in by an accelerometer (Ljung 1999, sec. 7.3). Filter error has K
+from a Kalman filter with white gusts on every state's rate: fewer unknowns, if gusts come in so (Jategaonkar, ch. 5).
 The covariance of the errors alternates with Fisher scoring; derivatives by complex steps are exact to rounding.
 """
 
@@ -15,26 +16,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.expressions import Expression
+from swashplate.identification.linear_filter import FilterErrors
+from swashplate.identification.linear_likelihood import OutputErrors
 from swashplate.identification.records import uniform_table
 from swashplate.identification.response_cost import ParameterAccuracy
-from swashplate.identification.rows import Entry, Row
 from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.state_space import StateSpaceModel
 
-METHODS = ("output-error", "prediction-error")
+METHODS = ("output-error", "filter-error", "prediction-error")
 
 VAGUE = 50.0
 """Percent of a value that a standard deviation may have before it is said."""
-
-_STEP = 1e-30
-_FIRST_GAIN = 0.3
-_DIVERGED = 1e9
-_EXACT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,7 @@ class LinearTimeFit:
 
     Attributes:
         model: identified. parameters: with standard deviations in `cramer_rao` (from the Fisher information).
-        covariance: of the output errors (or innovations). method: "output-error" or "prediction-error".
+        covariance: of the output errors (or innovations). method: one of `METHODS`.
         constants: start states, shifts and biases that were solved for, by name and record.
         history: cost after each iteration. converged: False where the iterations ran out.
     """
@@ -101,7 +97,8 @@ def fit_in_time(
         outputs: channels to fit; all of the model's where None.
         shifts: constants in the states' rates, per record.
         biases: outputs with a constant of their own, per record.
-        method: "output-error", or "prediction-error" for records with gusts or an unstable aircraft.
+        method: "output-error"; for records with gusts or an unstable aircraft "filter-error" (the gain by the gusts'
+            intensities) or "prediction-error" (any gain).
         iterations: at most this many.
         progress: called with the iteration and the cost.
 
@@ -125,12 +122,19 @@ def fit_in_time(
             time, table = uniform_table(piece, (*model.inputs, *names), who=f"'{model.name}'")
             pieces.append((float((time[-1] - time[0]) / (time.size - 1)), table))
             sources.append(f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s")
-    gain = method == "prediction-error"
-    likelihood = _OutputErrors(model, names, pieces, shifts, tuple(biases), delays=delays, gain=gain)
+    kind = FilterErrors if method == "filter-error" else OutputErrors
+    likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
     optimum = minimise(likelihood, iterations=iterations, tolerance=0.02, progress=progress)
     numbers = optimum.row * likelihood.row.scale
     spread = np.sqrt(np.diag(np.linalg.pinv(optimum.information, hermitian=True))) * likelihood.row.scale
-    named = dict(zip(likelihood.row.names, numbers, strict=True))
+    logarithmic = likelihood.row.column("logarithmic") > 0.0
+    named = dict(
+        zip(
+            likelihood.row.names,
+            np.where(logarithmic, np.exp(np.where(logarithmic, numbers, 0.0)), numbers),
+            strict=True,
+        )
+    )
     found = model.with_values({n: float(named[n]) for n in model.free})
     k = len(model.free)
     parameters = tuple(
@@ -164,8 +168,9 @@ def _words(parameters: Sequence[ParameterAccuracy], optimum: Optimum) -> tuple[s
     vague = [p.name for p in parameters if not p.cramer_rao_percent <= VAGUE]
     if vague:
         words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
-    if optimum.at_bound:
-        words.append(f"ended on a bound: {', '.join(optimum.at_bound)}.")
+    stopped = [p.name for p in parameters if p.at_bound]
+    if stopped:
+        words.append(f"ended on a bound: {', '.join(stopped)}.")
     return tuple(words)
 
 
@@ -178,158 +183,3 @@ def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Exp
             hint="Give the input one delay; the fit in time delays inputs.",
         )
     return next(iter(found.values()), None)
-
-
-class _OutputErrors:
-    """The likelihood of output errors or innovations; `refresh` takes their covariance anew for gradient and metric."""
-
-    def __init__(
-        self,
-        model: StateSpaceModel,
-        outputs: tuple[str, ...],
-        pieces: Sequence[tuple[float, Array]],
-        shifts: bool,
-        biases: tuple[str, ...],
-        *,
-        delays: tuple[Expression | None, ...],
-        gain: bool,
-    ) -> None:
-        self.delays = delays
-        self.model, self.outputs, self.pieces = model, outputs, pieces
-        self.rows_of = [model.outputs.index(o) for o in outputs]
-        m = len(model.inputs)
-        spread = np.std(np.concatenate([table[:, m:] for _, table in pieces]), axis=0) + 1e-12
-        self.floor = (_EXACT * spread) ** 2
-        self.covariance = np.diag((0.1 * spread) ** 2)
-        entries = [
-            Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper)
-            for n in model.free
-            for p in (model.parameters[n],)
-        ]
-        size = {s: float(spread[outputs.index(s)]) if s in outputs else 1.0 for s in model.states}
-        for number in range(len(pieces)):
-            for s in model.states:
-                first = pieces[number][1][0, m + outputs.index(s)] if s in outputs else 0.0
-                entries.append(Entry(f"start {s}[{number}]", "initial", float(first), 0.3 * size[s]))
-                if shifts:
-                    entries.append(Entry(f"shift {s}[{number}]", "nuisance", 0.0, 0.1 * size[s]))
-            for o in biases:
-                entries.append(Entry(f"bias {o}[{number}]", "nuisance", 0.0, 0.1 * float(spread[outputs.index(o)])))
-        for s in model.states if gain else ():
-            for o in outputs:
-                entries.append(
-                    Entry(f"gain {s}/{o}", "noise", _FIRST_GAIN * (s == o), 0.1 * size[s] / spread[outputs.index(o)])
-                )
-        self._row = Row(tuple(entries))
-        self._place = {name: i for i, name in enumerate(self._row.names)}
-
-    @property
-    def row(self) -> Row:
-        return self._row
-
-    def refresh(self, row: Array) -> None:
-        errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-        if np.all(np.isfinite(errors)) and np.max(np.abs(errors)) < _DIVERGED:
-            self.covariance = self._covariance(errors)
-
-    def _covariance(self, errors: Array) -> Array:
-        return np.asarray(errors.T @ errors / len(errors) + np.diag(self.floor))
-
-    def cost(self, row: Array) -> float:
-        """Negative log-likelihood at its own covariance, without constants: n/2 log det S."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-        if not np.all(np.isfinite(errors)) or np.max(np.abs(errors)) > _DIVERGED:
-            return float("inf")
-        return 0.5 * len(errors) * float(np.linalg.slogdet(self._covariance(errors))[1])
-
-    def scores(self, row: Array) -> tuple[float, Array, Array]:
-        numbers = np.asarray(row * self.row.scale)
-        batch = numbers + 1j * _STEP * np.vstack([np.zeros(numbers.size), np.eye(numbers.size)])
-        errors = self._errors(batch)
-        plain, slopes = errors[0].real, errors[1:].imag / _STEP * self.row.scale[:, None, None]
-        metric = np.linalg.inv(self.covariance)
-        weighted = slopes @ metric
-        gradient = np.einsum("pti,ti->p", weighted, plain)
-        information = np.einsum("pti,qti->pq", weighted, slopes, optimize=True)
-        return 0.5 * len(plain) * float(np.linalg.slogdet(self._covariance(plain))[1]), gradient, information
-
-    def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""
-        values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
-        n, m, k = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
-        shapes = {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
-        found = {s: np.zeros(shape, dtype=np.complex128) for s, shape in shapes.items()}
-        found["M"] += np.eye(n)
-        for e in self.model.elements:
-            found[e.matrix][e.row, e.column] = e.expression(values)
-        a, b = np.linalg.solve(found["M"], found["F"]), np.linalg.solve(found["M"], found["G"])
-        h1 = found["H1"][self.rows_of]
-        return a, b, found["H0"][self.rows_of] + h1 @ a, found["D"][self.rows_of] + h1 @ b, h1
-
-    def _errors(self, batch: Any) -> Any:
-        """Output errors of every record, one after the other, for a batch of rows: (n_batch, n_t, n_outputs)."""
-        n, m = len(self.model.states), len(self.model.inputs)
-        systems = [self._matrices(numbers) for numbers in batch]
-        a, b, c, d, h1 = (np.stack(part) for part in zip(*systems, strict=True))
-        gain = self._gain(batch)
-        parts = []
-        for number, (dt, table) in enumerate(self.pieces):
-            shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
-            bias = self._column(batch, f"bias {{}}[{number}]", self.outputs) + np.einsum("poi,pi->po", h1, shift)
-            x = self._column(batch, f"start {{}}[{number}]", self.model.states)
-            held = np.concatenate([b, np.broadcast_to(np.eye(n), (len(batch), n, n))], axis=2)
-            width = m + n
-            block = np.zeros((len(batch), n + 2 * width, n + 2 * width), dtype=np.complex128)
-            block[:, :n, :n], block[:, :n, n : n + width] = a, held
-            block[:, n : n + width, n + width :] = np.eye(width) / dt
-            step = expm(block * dt)
-            phi, g0, g1 = step[:, :n, :n], step[:, :n, n : n + width], step[:, :n, n + width :]
-            u = self._late(batch, table[:, :m], dt)
-            drive = np.einsum("pij,tpj->tpi", g0[:, :, :m], u[:-1]) + np.einsum(
-                "pij,tpj->tpi", g1[:, :, :m], np.diff(u, axis=0)
-            )
-            drive = drive + np.einsum("pij,pj->pi", g0[:, :, m:], shift)
-            through = np.einsum("pij,tpj->tpi", d, u) + bias
-            errors = np.empty((len(table), len(batch), len(self.outputs)), dtype=np.complex128)
-            for k in range(len(table)):
-                errors[k] = table[k, m:] - through[k] - np.einsum("pij,pj->pi", c, x)
-                if k + 1 < len(table):
-                    x = np.einsum("pij,pj->pi", phi, x) + drive[k]
-                    if gain is not None:
-                        x = x + np.einsum("pij,pj->pi", gain, errors[k])
-            parts.append(errors.transpose(1, 0, 2))
-        return np.concatenate(parts, axis=1)
-
-    def _late(self, batch: Any, u: Array, dt: float) -> Any:
-        """Inputs later by their delays, straight between samples, (n_t, n_batch, n_inputs)."""
-        late = np.broadcast_to(u[:, None, :], (len(u), len(batch), u.shape[1]))
-        if not any(self.delays):
-            return late
-        late = late.astype(np.complex128)
-        count = np.arange(len(u))
-        for p, numbers in enumerate(batch):
-            values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
-            for i, delay in enumerate(self.delays):
-                if delay is not None:
-                    lag = delay(values) / dt
-                    whole = int(np.floor(np.real(lag)))
-                    near, far = (u[np.clip(count - k, 0, len(u) - 1), i] for k in (whole, whole + 1))
-                    late[:, p, i] = near + (lag - whole) * (far - near)
-        return late
-
-    def _gain(self, batch: Any) -> Any:
-        """Gains from innovations to states, (n_batch, n_states, n_outputs); None for output error."""
-        places = [self._place.get(f"gain {s}/{o}") for s in self.model.states for o in self.outputs]
-        if not places or places[0] is None:
-            return None
-        shape = (len(batch), len(self.model.states), len(self.outputs))
-        return batch[:, [p for p in places if p is not None]].reshape(shape)
-
-    def _column(self, batch: Any, pattern: str, names: Sequence[str]) -> Any:
-        found = np.zeros((len(batch), len(names)), dtype=np.complex128)
-        for i, name in enumerate(names):
-            place = self._place.get(pattern.format(name))
-            if place is not None:
-                found[:, i] = batch[:, place]
-        return found

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.errors import CardError, IdentificationError
+from swashplate.errors import CardError, ExpressionError, IdentificationError
 from swashplate.identification.choices import CHOICES as CHOICES
 from swashplate.identification.choices import Free as Free
 from swashplate.identification.choices import choices_for
@@ -256,7 +256,7 @@ def _check_ties(table: Parameterization) -> None:
     with np.errstate(all="ignore"):
         try:
             values = table.identified(table.starts())
-        except ZeroDivisionError:
+        except ExpressionError:
             values = {}
     for name, expression in table.ties:
         _possible(table.vehicle, name, values.get(name, float("nan")), f"tied to '{expression.text}'")

@@ -25,7 +25,7 @@ noise nearly twice, less once more blurred. Measured: 1.06 times (40 records of 
 1.22 (median) to 1.47 (95th percentile) on an R-50 in hover, over 1,600 points of 3 flights."""
 
 BLURRED, LONGER = 0.3, 1.4
-"""Change [dB] that the second estimate makes, above which longer windows are advised, and how much longer."""
+"""Change [dB] that the second estimate makes, above which a longer window is wanted, and how much longer."""
 
 
 @dataclass(frozen=True)
@@ -88,14 +88,12 @@ def without(pieces: Sequence[Signals], omega: Array, guess: Complex) -> list[Sig
     return left
 
 
-def blur_words(first: FrequencyResponse, second: FrequencyResponse, *, longest: float) -> list[str]:
-    """Pairs that windows had blurred so much that something of it may be left.
+def blur(first: FrequencyResponse, second: FrequencyResponse) -> str:
+    """Pairs that windows had blurred so much that something of it may be left, in words ("" for none).
 
     Args:
-        first, second: estimates before and after. longest: of the records [s].
+        first, second: estimates before and after.
     """
-    if longest / 2.0 < LONGER * second.windows[0]:
-        return []
     places, worst = [], 0.0
     for output in second.outputs:
         for name in second.inputs:
@@ -112,9 +110,4 @@ def blur_words(first: FrequencyResponse, second: FrequencyResponse, *, longest: 
                 low, high = second.omega[off[[0, -1]]] / (2.0 * np.pi)
                 places.append(f"{output} / {name} at {low:.3g}-{high:.3g} Hz")
                 worst = max(worst, float(change[off].max()))
-    if not places:
-        return []
-    return [
-        f"windows of up to {second.windows[0]:.3g} s blurred {', '.join(places)}, by up to {worst:.1f} dB before it "
-        f"was sharpened: something of it may be left. Longer windows (--windows {longest / 2:.3g},...) show it better."
-    ]
+    return f"blurred {', '.join(places)}, by up to {worst:.1f} dB before it was sharpened" if places else ""

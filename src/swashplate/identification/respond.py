@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from swashplate.identification.conditioning import (
     random_error,
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.resolution import TWICED, blur_words, first_guess, without
+from swashplate.identification.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
 
 LINES_PER_DECADE = 50
@@ -88,7 +89,7 @@ def respond(
             is made, and compared with the direct one. One reference with as many flights as inputs counts as one
             reference per flight (one log per swept axis).
         band: lowest and highest frequency [Hz]; by default one period of the longest window to a tenth of the rate.
-        windows: lengths [s]; by the book's rules where None.
+        windows: lengths [s]; by the book's rules where None, with a longer one where those blur a clear response.
         overlap: of neighbouring windows.
         bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
             in the flights. They only warn.
@@ -125,34 +126,38 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    lowest = max(band[0] if band else 0.0, 1.0 / chosen.lengths[0])
-    if lowest >= highest:
-        raise FlightError(
-            f"the records tell nothing below {1.0 / chosen.lengths[0]:.3g} Hz, and {highest:.3g} Hz was asked as the "
-            f"highest frequency.",
-            where=", ".join(piece.name for piece in pieces),
-            hint="Give longer records or a higher band.",
-        )
-    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
     question = _Question(inputs, outputs, own[0].values.shape[1] - n)
-    matrices, notes = _matrices(own, omega, chosen.lengths, overlap)
-    blurred = _composed(matrices, omega, question)
-    guess = first_guess(blurred)
-    rest, _ = _matrices(without(own, omega, guess), omega, chosen.lengths, overlap)
-    made = _composed(matrices, omega, question, guess=guess, rest=rest)
+    limits = (band[0] if band else 0.0, highest)
+    estimate = _estimate(own, chosen.lengths, overlap, limits, question)
+    half, words = min(piece.duration for piece in pieces) / 2.0, blur(estimate.blurred, estimate.made)
+    blur_words: list[str] = []
+    if words and half >= LONGER * chosen.lengths[0]:
+        words = f"windows of up to {chosen.lengths[0]:.3g} s {words}"
+        if windows is None:
+            estimate = _estimate(own, (half, *chosen.lengths), overlap, limits, question)
+            blur_words = [f"{words}; one of {half:.3g} s, half the shortest record, was added."]
+        else:
+            blur_words = [f"{words}: something of it may be left. Longer windows (--windows {half:.3g},...) help."]
+    omega, matrices, notes, blurred, made = estimate
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
+    if band and band[1] > highest:
+        notes.append(
+            f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
+        )
+    made = replace(made, sources=tuple(piece.name for piece in pieces))
     warnings, problems = [*chosen.warnings, *notes], response_warnings.damaged(flights)
     problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
         direct = _composed(matrices, omega, replace(question, references=0))
         warnings += response_warnings.bias_words(blurred, direct)
-    warnings += response_warnings.few_averages(matrices)
-    warnings += blur_words(blurred, made, longest=min(piece.duration for piece in pieces))
+    # The window that was added counts only where its own error says so.
+    warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
+    warnings += blur_words
     warnings += response_warnings.mixing_words(made)
     warnings += response_warnings.lead_words(made)
-    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, inputs))
+    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
     if others and not references:
         warnings += response_warnings.bystander_words(
@@ -162,12 +167,11 @@ def respond(
         made,
         input_units=tuple(_unit(flights[0], name) for name in inputs),
         output_units=tuple(_unit(flights[0], name) for name in outputs),
-        sources=tuple(piece.name for piece in pieces),
         warnings=tuple(warnings),
         problems=tuple(problems),
         settings={
             "rate": rate,
-            "band_hz": [float(lowest), float(highest)],
+            "band_hz": [float(omega[0] / TWO_PI), float(highest)],
             "overlap": overlap,
             "references": list(references),
             "averages": [m.averages for m in matrices],
@@ -196,6 +200,38 @@ class _Question:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     references: int
+
+
+class _Estimate(NamedTuple):
+    omega: Array
+    matrices: list[SpectralMatrix]
+    notes: list[str]
+    blurred: FrequencyResponse
+    made: FrequencyResponse
+
+
+def _estimate(
+    pieces: Sequence[Signals],
+    lengths: tuple[float, ...],
+    overlap: float,
+    limits: tuple[float, float],
+    question: _Question,
+) -> _Estimate:
+    """Responses in two passes, as the windows blur them and sharpened."""
+    lowest, highest = max(limits[0], 1.0 / lengths[0]), limits[1]
+    if lowest >= highest:
+        raise FlightError(
+            f"the records tell nothing below {1.0 / lengths[0]:.3g} Hz, and {highest:.3g} Hz was asked as the "
+            f"highest frequency.",
+            where=", ".join(piece.name for piece in pieces),
+            hint="Give longer records or a higher band.",
+        )
+    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
+    matrices, notes = _matrices(pieces, omega, lengths, overlap)
+    blurred = _composed(matrices, omega, question)
+    guess = first_guess(blurred)
+    rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
+    return _Estimate(omega, matrices, notes, blurred, _composed(matrices, omega, question, guess=guess, rest=rest))
 
 
 def _unit(flight: Flight, name: str) -> str:

@@ -75,7 +75,7 @@ def load(path: Path) -> FrequencyResponse:
         omega = np.asarray(data["frequency"].values, dtype=np.float64)
     except Exception as error:  # whatever the libraries raise on foreign or damaged bytes is the file's fault
         raise FlightError(
-            f"does not hold frequency responses of swashplate ({type(error).__name__}).",
+            "does not hold frequency responses of swashplate.",
             where=path,
             hint="Make it with 'swash respond LOG --inputs ... --outputs ... --out DIR'.",
         ) from error

@@ -27,13 +27,19 @@ def _hertz(omega: Array, where: NDArray[np.bool_]) -> str:
     return f"{inside.min():.3g}-{inside.max():.3g} Hz"
 
 
+def _logs(found: FrequencyResponse) -> str:
+    """The records behind responses."""
+    return ", ".join(found.sources) or "flight"
+
+
 def still(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in names if all(np.ptp(flight.values(name)) == 0.0 for flight in flights))
 
 
 def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str]) -> list[str]:
+    where = ", ".join(sorted({flight.provenance.source or "flight" for flight in flights}))
     return [
-        f"{role} '{name}' never moves; there is no response for it."
+        f"{where}: {role} '{name}' never moves; there is no response for it."
         for role, names in (("input", inputs), ("output", outputs))
         for name in still(flights, names)
     ]
@@ -50,19 +56,21 @@ def damaged(flights: Sequence[Flight]) -> list[str]:
 
 def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
     """Inputs that no frequency, or hardly one, tells apart."""
-    words = []
+    alive = [o for o, name in enumerate(found.outputs) if name not in dead]
+    together: dict[tuple[str, ...], list[str]] = {}
     for i, name in enumerate(found.inputs):
-        lost = np.isnan(found.response[:, :, i]).all(axis=1) & np.isfinite(found.input_power[:, i])
-        if name in dead or not lost.any():
+        lost = np.isnan(found.response[:, alive, i]).all(axis=1) & np.isfinite(found.input_power[:, i])
+        if name in dead or not alive or len(found.inputs) < 2 or not lost.any():
             continue
         mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
         mean[i] = -1.0
-        partner = found.inputs[int(np.argmax(mean))] if len(found.inputs) > 1 else "itself"
-        words.append(
-            f"input '{name}' cannot be told from '{partner}' at {_hertz(found.omega, lost)}: less than "
-            f"{100 * SINGULAR:g} % of its power is its own. No number is given there; move the inputs independently."
-        )
-    return words
+        pair = tuple(sorted((name, found.inputs[int(np.argmax(mean))])))
+        together.setdefault(pair, []).append(_hertz(found.omega, lost))
+    return [
+        f"{_logs(found)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
+        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently."
+        for (one, other), bands in together.items()
+    ]
 
 
 def incoherent(found: FrequencyResponse) -> list[str]:
@@ -74,8 +82,8 @@ def incoherent(found: FrequencyResponse) -> list[str]:
         if all(found.band(output, name) is None for name in found.inputs):
             best = float(np.nanmax(found.coherence[:, o, :]))
             words.append(
-                f"no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a quarter of an "
-                f"octave (largest single value {best:.2f}): do not use its responses."
+                f"{_logs(found)}: no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a "
+                f"quarter of an octave (largest single value {best:.2f}): do not use its responses."
             )
     return words
 

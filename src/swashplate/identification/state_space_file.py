@@ -119,7 +119,11 @@ def parse(text: str, *, path: str = "") -> StateSpaceModel:
     except tomllib.TOMLDecodeError as error:
         raise CardError(f"is not TOML: {error}.", where=path) from None
     if document.get("kind") != "state-space":
-        raise CardError(f"kind is {document.get('kind')!r}, expected 'state-space'.", where=path)
+        raise CardError(
+            f"kind is {document.get('kind')!r}, expected 'state-space'.",
+            where=path,
+            hint='A model file of states and equations says kind = "state-space" in its first line.',
+        )
     if document.get("schema", SCHEMA) > SCHEMA:
         raise CardError(f"schema {document['schema']} is newer than {SCHEMA}.", where=path, hint="Update swashplate.")
     unknown = sorted(set(document) - _SECTIONS)
@@ -164,6 +168,8 @@ class _Reader:
                 raise CardError(f"{key} is {number!r}, expected a number.", where=self.path, channel=name)
         low, high = float(entry.get("lower", -np.inf)), float(entry.get("upper", np.inf))
         value = float(entry.get("value", 0.0))
+        if low > high:
+            raise CardError(f"lower is {low:g}, above upper, {high:g}.", where=self.path, channel=name)
         if "tie" not in entry and not low <= value <= high:
             raise CardError(f"value {value:g} lies outside [{low:g}, {high:g}].", where=self.path, channel=name)
         return ModelParameter(
@@ -310,7 +316,13 @@ class _Reader:
             units={name: str(unit) for name, unit in units.items()},
             document=self.document,
         )
-        return model.with_values({})  # tied values follow, circles are found
+        try:
+            model = model.with_values({})  # tied values follow, circles are found
+            for e in model.elements:
+                e.expression(model.numbers())
+        except ExpressionError as error:
+            raise CardError(error.problem, where=self.path, hint=error.hint) from None
+        return model
 
 
 def to_toml(model: StateSpaceModel) -> str:

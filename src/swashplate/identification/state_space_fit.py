@@ -39,6 +39,18 @@ SPREAD = 0.3
 
 SCREENED, STARTED = 48, 4
 
+_ROUGH = 25
+"""Iterations of each start, before the best is followed to its end."""
+
+RESCUES, RESCUED, _HOPE = 4, 96, 0.99
+"""Times that a bad end is shaken hard, points that are tried then, and what has to be left of the cost at most."""
+
+_HARD, _TURNED = 0.4, 0.08
+"""Relative scatter of these points, and the share of parameters whose sign is turned."""
+
+_ENOUGH = 1e-4
+"""Share of the cost that an iteration has to gain for it to go on."""
+
 _VERY_WRONG = 3e4
 """J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
 
@@ -74,6 +86,8 @@ def fit_state_space(
         IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
     """
     began = time.perf_counter()
+    if not model.free:
+        raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
     targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
     others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
     return fit_targets(
@@ -111,6 +125,8 @@ def _targets(
         raise IdentificationError(
             f"the model has inputs {', '.join(model.inputs)} and outputs {', '.join(model.outputs)}; the responses "
             f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
+            where=f"model '{model.name}'"
+            + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
             hint="Name the model's channels as the flight's.",
         )
     found, ceilings, missing = [], [], []
@@ -319,15 +335,41 @@ def _best(
     ends = []
     for row in candidates:
         if np.isfinite(cost.cost(np.clip(row, low, high))):
-            rough = iterations if starts == 1 else min(25, iterations)
+            rough = iterations if starts == 1 else min(_ROUGH, iterations)
             ends.append(minimise(cost, start=row, tolerance=1e-2, iterations=rough, progress=progress))
     if not ends:
         raise IdentificationError(
             f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
         )
     best = min(ends, key=lambda end: end.cost)
-    final = minimise(cost, start=best.row, tolerance=1e-4, iterations=iterations, progress=progress)
+    for turn in range(RESCUES if starts > 1 and iterations > _ROUGH else 0):
+        if np.mean(cost.each(best.row)) <= ACCEPTABLE:
+            break
+        before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
+        if best.cost > _HOPE * before.cost:
+            break
+    final = minimise(
+        cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
+    )
     return replace(final, history=(*best.history, *final.history[1:])), cost
+
+
+def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
+    """A better end than a bad one, from points around it that are shaken hard and have some signs turned."""
+    random = np.random.default_rng(seed)
+    low, high = cost.row.bounds()
+    shape = (RESCUED, best.row.size)
+    turned = np.where(random.random(shape) < _TURNED, -1.0, 1.0)
+    shaken = np.clip(best.row * turned * np.exp(_HARD * random.standard_normal(shape)), low, high)
+
+    def price(row: Array) -> float:
+        each = np.nan_to_num(cost.each(row), nan=_VERY_WRONG, posinf=_VERY_WRONG)
+        return float(np.sum(np.minimum(each, _VERY_WRONG))) if np.isfinite(cost.cost(row)) else np.inf
+
+    prices = np.array([price(row) for row in shaken])
+    hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
+    ends = [minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
+    return min((best, *ends), key=lambda end: end.cost)
 
 
 def _words(

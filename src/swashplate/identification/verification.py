@@ -8,12 +8,13 @@ constants; everything that moves has to come from the model and the recorded inp
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from swashplate.errors import FlightError
+from swashplate.flights.filters import filtered
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.linear_simulation import delayed, free_and_forced
 from swashplate.identification.records import uniform_table
@@ -24,6 +25,9 @@ GOOD_J, GOOD_TIC = 2.0, 0.30
 
 _WEIGHT = {"rad": np.degrees(1.0), "rad/s": np.degrees(1.0), "m/s": 1.0 / 0.3048, "m/s^2": 1.0 / 0.3048}
 """1 deg, 1 deg/s, 1 ft/s and 1 ft/s^2 weigh alike."""
+
+_TOP, _ORDER = 0.45, 3
+"""Highest corner of a band as a share of the sample rate, and order of its filter (each way)."""
 
 GROWTH = 3.0
 """Times that an unstable mode may grow by e before the record is cut: beyond, the shifts would be all that is seen."""
@@ -65,6 +69,7 @@ class Verification:
     Attributes:
         model: what was flown. cost: J_rms. outputs: per output. traces: to look at.
         warnings: what a reader must know. flights: the conditioned records.
+        inside: the same within the fitted band alone, where one was asked for.
     """
 
     model: StateSpaceModel
@@ -74,6 +79,7 @@ class Verification:
     warnings: tuple[str, ...]
     flights: tuple[Flight, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    inside: Verification | None = None
 
     @property
     def good(self) -> bool:
@@ -94,14 +100,31 @@ class Verification:
             "records": [{"source": t.source, "biases": dict(t.biases), "shifts": dict(t.shifts)} for t in self.traces],
             "warnings": list(self.warnings),
             "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
+            "band_hz": self.settings.get("band_hz"),
+            "inside_band": None if self.inside is None else self.inside.as_dict() | {"flights": []},
         }
 
     def __repr__(self) -> str:
-        lines = [f"{self.model.name} in time: J_rms = {self.cost:.2f} (good up to {GOOD_J:g})"]
+        band = self.settings.get("band_hz")
+        where = " between {:g} and {:g} Hz".format(*band) if band else ""
+        lines = [f"{self.model.name} in time{where}: J_rms = {self.cost:.2f} (good up to {GOOD_J:g})"]
         lines.append(f"  {'output':<10}{'rms error':>12}  {'unit':<8}{'Theil':>7}{'fit %':>8}")
         for o in self.outputs:
             lines.append(f"  {o.output:<10}{o.rms:>12.4g}  {o.unit:<8}{o.theil:>7.2f}{o.fit:>8.1f}")
-        return "\n".join([*lines, *(f"! {text}" for text in self.warnings)])
+        lines += [f"! {text}" for text in self.warnings]
+        return "\n".join(lines if self.inside is None else [*lines, repr(self.inside)])
+
+
+def verify_inside(
+    model: StateSpaceModel, flights: Flight | Sequence[Flight], *, band: tuple[float, float] | None
+) -> Verification:
+    """`verify` on the records as they are and, where the model was fitted over a band, within that band too.
+
+    What a model does outside its band is not told by the fit: a record's slow drift, say, which a loop fights with
+    commands that a near-integrator then adds up.
+    """
+    whole = verify(model, flights)
+    return whole if band is None else replace(whole, inside=verify(model, flights, band=band))
 
 
 def verify(
@@ -110,6 +133,7 @@ def verify(
     *,
     outputs: Sequence[str] | None = None,
     shifts: bool = True,
+    band: tuple[float, float] | None = None,
 ) -> Verification:
     """Fly a model along recorded inputs and compare.
 
@@ -118,6 +142,7 @@ def verify(
         flights: conditioned; not used for the fit.
         outputs: which to compare; all that model and flights share where None.
         shifts: solve for constant shifts of the states' rates too (else for output biases and start states only).
+        band: limits [Hz] within which inputs and outputs are compared (filtered alike, without phase); all where None.
 
     Raises:
         FlightError: an input that the flights lack, or no output that both have.
@@ -137,6 +162,8 @@ def verify(
         for piece in flight.split():
             time, table = uniform_table(piece, (*model.inputs, *shared), who=f"'{model.name}'")
             dt = float((time[-1] - time[0]) / (time.size - 1))
+            if band is not None:
+                table = filtered(table, rate=1.0 / dt, cutoff=(band[0], min(band[1], _TOP / dt)), order=_ORDER)
             longest = time.size if growth * (time[-1] - time[0]) <= GROWTH else max(20, int(GROWTH / growth / dt))
             if longest < time.size:
                 text = (
@@ -158,7 +185,7 @@ def verify(
         traces=tuple(traces),
         warnings=tuple(warnings),
         flights=flights,
-        settings={"outputs": list(shared), "shifts": shifts},
+        settings={"outputs": list(shared), "shifts": shifts, "band_hz": list(band) if band else None},
     )
 
 

@@ -11,6 +11,7 @@ from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import render
 from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Report
 from swashplate.reporting.versions import date, versions
 from swashplate.reporting.words import listed
@@ -38,7 +39,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
     if not (m.responses or m.transfer_functions or m.fit or m.verification or m.time_fit):
         raise SwashError("there is nothing to report.")
     parts = [
-        sections_responses.verification_section(m.verification, m.rival) if m.verification else None,
+        verification_section(m.verification, m.rival) if m.verification else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
         sections_responses.time_fit_section(m.time_fit) if m.time_fit else None,
         sections_responses.fit_costs_section(m.fit) if m.fit else None,
@@ -90,7 +91,8 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
     if m.responses:
         r = m.responses
         pairs = [(o, i) for o in r.outputs for i in r.inputs if r.band(o, i) is not None]
-        words = f"{len(pairs)} of {len(r.outputs) * len(r.inputs)} responses have a coherent band ({r.method} estimate)"
+        have = "response has" if len(r.outputs) * len(r.inputs) == 1 else "responses have"
+        words = f"{len(pairs)} of {len(r.outputs) * len(r.inputs)} {have} a coherent band ({r.method} estimate)"
         rows.append(("Responses", f"{words}, from {listed(r.sources, most=4)}.", "plain"))
     if m.transfer_functions:
         words = "; ".join(
@@ -117,10 +119,11 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         )
     if m.verification:
         v = m.verification
+        inside = "" if v.inside is None else f" ({v.inside.cost:.2f} within the band of the fit)"
         rows.append(
             (
                 "In time",
-                f"J_rms {v.cost:.2f} on {listed([t.source for t in v.traces], most=3)}.",
+                f"J_rms {v.cost:.2f}{inside} on {listed([t.source for t in v.traces], most=3)}.",
                 "good" if v.good else "caution",
             )
         )
@@ -130,6 +133,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         *(m.time_fit.warnings if m.time_fit else ()),
         *(m.responses.warnings if m.responses else ()),
         *(m.fit.warnings if m.fit else ()),
+        *(text for f in m.transfer_functions for text in f.warnings),
     ]
     rows.append(
         ("Beware", " ".join(told[:3]) or "nothing that these flights could show.", "caution" if told else "plain")

@@ -1,4 +1,4 @@
-"""Sections on frequency responses, the models fitted to them, their verification in time and suggested gains."""
+"""Sections on frequency responses, the models fitted to them, and suggested gains."""
 
 from __future__ import annotations
 
@@ -18,17 +18,14 @@ from swashplate.identification.spectra import Complex
 from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
 from swashplate.identification.state_space_result import StateSpaceFit
 from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
-from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
+from swashplate.identification.verification import Verification
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
-from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure, verification_figure
+from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
 from swashplate.simulation.linearize import Mode
-
-_TRACES = 4
-"""Stretches of a verification that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -259,48 +256,6 @@ def bodes_section(m: ResponseMaterial) -> Section:
 
 def excitation_section(r: FrequencyResponse) -> Section:
     return Section("excitation", "What was excited", (excitation(r),), folded=True)
-
-
-def verification_section(v: Verification, rival: Verification | None = None) -> Section:
-    rows = tuple(
-        (
-            Cell(o.output),
-            Cell(unit_words(o.unit)),
-            Cell(value_words(o.rms), number=True),
-            Cell(f"{o.theil:.2f}", number=True, tone="good" if o.theil <= GOOD_TIC else "caution"),
-            Cell(f"{o.fit:.0f}", number=True),
-        )
-        for o in v.outputs
-    )
-    blocks: list[Block] = [Text(text, tone="caution") for text in v.warnings]
-    blocks.append(
-        Text(
-            f"J_rms = {v.cost:.2f} (1 deg, 1 deg/s, 1 ft/s and 1 ft/s² alike); up to {GOOD_J:g} is good.",
-            tone="good" if v.good else "caution",
-        )
-    )
-    blocks.append(
-        Table(
-            "Along records of the fit"
-            if any("NOT A HOLD-OUT" in text for text in v.warnings)
-            else "Along unseen records",
-            ("output", "unit", "rms error", "Theil", "fit %"),
-            rows,
-            note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
-        )
-    )
-    if rival is not None:
-        theirs = tuple(
-            (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
-            for o in rival.outputs
-        )
-        blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
-    outputs = tuple(o.output for o in v.outputs)
-    for k, trace in enumerate(v.traces[:_TRACES]):
-        twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
-        other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
-        blocks.append(verification_figure(trace, outputs, v.model.inputs, number=k, rival=other))
-    return Section("verification", "Verification in time", tuple(blocks))
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:

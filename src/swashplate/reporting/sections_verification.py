@@ -1,0 +1,63 @@
+"""The section on an identified linear model's verification in time."""
+
+from __future__ import annotations
+
+from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
+from swashplate.reporting.figures_responses import verification_figure
+from swashplate.reporting.structure import Block, Cell, Section, Table, Text
+from swashplate.reporting.theme import unit_words
+from swashplate.reporting.words import value_words
+
+_TRACES = 4
+"""Stretches that are drawn."""
+
+
+def verification_section(v: Verification, rival: Verification | None = None) -> Section:
+    rows = tuple(
+        (
+            Cell(o.output),
+            Cell(unit_words(o.unit)),
+            Cell(value_words(o.rms), number=True),
+            Cell(f"{o.theil:.2f}", number=True, tone="good" if o.theil <= GOOD_TIC else "caution"),
+            Cell(f"{o.fit:.0f}", number=True),
+        )
+        for o in v.outputs
+    )
+    blocks: list[Block] = [Text(text, tone="caution") for text in v.warnings]
+    blocks.append(
+        Text(
+            f"J_rms = {v.cost:.2f} (1 deg, 1 deg/s, 1 ft/s and 1 ft/s² alike); up to {GOOD_J:g} is good.",
+            tone="good" if v.good else "caution",
+        )
+    )
+    if v.inside is not None:
+        low, high = v.inside.settings["band_hz"]
+        theil = ", ".join(f"{o.output} {o.theil:.2f}" for o in v.inside.outputs)
+        blocks.append(
+            Text(
+                f"Between {low:g} and {high:g} Hz, the band of the fit: J_rms = {v.inside.cost:.2f}, Theil {theil}.",
+                tone="good" if v.inside.good else "caution",
+            )
+        )
+    blocks.append(
+        Table(
+            "Along records of the fit"
+            if any("NOT A HOLD-OUT" in text for text in v.warnings)
+            else "Along unseen records",
+            ("output", "unit", "rms error", "Theil", "fit %"),
+            rows,
+            note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
+        )
+    )
+    if rival is not None:
+        theirs = tuple(
+            (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
+            for o in rival.outputs
+        )
+        blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
+    outputs = tuple(o.output for o in v.outputs)
+    for k, trace in enumerate(v.traces[:_TRACES]):
+        twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
+        other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
+        blocks.append(verification_figure(trace, outputs, v.model.inputs, number=k, rival=other))
+    return Section("verification", "Verification in time", tuple(blocks))
