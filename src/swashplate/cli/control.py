@@ -33,7 +33,9 @@ Sensors = Annotated[
         help="KIND@RATE+DELAYms, separated by commas: imu, gyro, mocap, sonar, pressure, flow (optical), compass.",
     ),
 ]
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or a vehicle's name.")]
+Model = Annotated[
+    str, typer.Argument(metavar="MODEL", help="A vehicle's name or file, or a state-space file of `swash fit-ss`.")
+]
 Voltage = Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the trims [V].")]
 
 
@@ -61,9 +63,11 @@ def _named(texts: list[str] | None, option: str) -> dict[str, float]:
     return {name: options.numbers(value, option=option, count=1)[0] for name, value in found.items()}
 
 
-def _delays(texts: list[str] | None) -> dict[str, float] | float:
-    """`--delay 20` for all inputs, or `--delay NAME=20` each; milliseconds to seconds."""
-    if texts and len(texts) == 1 and "=" not in texts[0]:
+def _delays(texts: list[str] | None) -> dict[str, float] | float | None:
+    """`--delay 20` for all inputs, or `--delay NAME=20` each; milliseconds to seconds. None where nothing is said."""
+    if not texts:
+        return None
+    if len(texts) == 1 and "=" not in texts[0]:
         return options.numbers(texts[0], option="--delay", count=1)[0] / 1e3
     return {name: value / 1e3 for name, value in _named(texts, "--delay").items()}
 

@@ -211,7 +211,7 @@ def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
     fade = np.repeat([1.0 / u.force_time, 1.0 / u.moment_time], 3)
     vehicle = plan.equations.vehicle
     white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pq", u.twist), "r": u.twist_yaw}
-    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1"), u.flapping)
+    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1", "a", "b"), u.flapping)
     white |= dict.fromkeys(("eta_bar", "zeta_bar", "c", "d"), u.bar)
     white |= dict.fromkeys(("omega_lower", "omega_upper", "omega"), u.speed)
     inner = vehicle.state_names[_BODY:]
