@@ -169,7 +169,7 @@ def simulate(
 
 
 def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
-    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle or of a linear model of it.
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle or a linear model of it.
 
     Args:
         path: the file.

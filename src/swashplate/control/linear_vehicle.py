@@ -1,4 +1,4 @@
-"""An identified (or ready) state-space model as a vehicle that can be trimmed, held, flown and exported like any other."""
+"""An identified (or ready) state-space model as a vehicle: trimmed, held, flown and exported like any other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
 
     Args:
         model: with u, v, w, phi, theta, p, q and r among its states, deviations from hover.
-        limits: of inputs, from the trim; otherwise those of the file's [limits], otherwise 1 (or 20 degrees) either way.
+        limits: of inputs, from the trim; otherwise those of the file's [limits], otherwise 1 (20 degrees) either way.
 
     Raises:
         CardError: for delays that differ between outputs, limits that are none, or a model that is not enough to fly.

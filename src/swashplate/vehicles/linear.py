@@ -76,7 +76,9 @@ def linear(card: Card) -> Vehicle:
     where = card.path or card.title
     absent = sorted(set(_OPTIONS) - set(card.options))
     if absent or set(card.options) - set(_OPTIONS):
-        raise CardError(f"has {', '.join(card.options)}; expected {', '.join(_OPTIONS)}.", where=where, channel="options")
+        raise CardError(
+            f"has {', '.join(card.options)}; expected {', '.join(_OPTIONS)}.", where=where, channel="options"
+        )
     states, inputs = tuple(card.options["states"]), tuple(card.options["inputs"])
     units = dict(zip(states, card.options["state_units"], strict=True))
     lost = [name for name in NEEDED if name not in states]
