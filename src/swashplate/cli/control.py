@@ -49,6 +49,11 @@ class Holding(StrEnum):
     SPEED = "speed"
 
 
+class Gain(StrEnum):
+    FLYING = "flying"
+    STEADY = "steady"
+
+
 class Precision(StrEnum):
     DOUBLE = "double"
     FLOAT = "float"
@@ -103,6 +108,10 @@ def design(
     input_weights: Annotated[
         str | None, typer.Option("--input-weights", metavar="R1,R2,...", help="Weights of all inputs instead.")
     ] = None,
+    gain: Annotated[
+        Gain,
+        typer.Option("--gain", help="Of the observer: found as it flies, or constant (a small processor)."),
+    ] = Gain.FLYING,
     voltage: Voltage = None,
     switched: given.Switch = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the controller (.toml).")] = None,
@@ -144,6 +153,10 @@ def design(
         voltage=voltage,
     )
     found = [analyse(made, at=i, where=model) for i in range(len(speeds))]
+    if gain is Gain.STEADY:
+        from swashplate.control.steady_observer import with_steady_gain
+
+        made = with_steady_gain(made)
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code
@@ -176,6 +189,8 @@ def _tell(made: Lqg, found: list[Analysis], speeds: tuple[float, ...]) -> None:
         f"{name} {1e3 * d / plan.rate:g} ms" for name, d in zip(made.vehicle.input_names, plan.delays, strict=True) if d
     )
     typer.echo(f"{'LQG' if plan.sensors else 'LQR'} of {made.vehicle.name}, {plan.rate:g} Hz, {plan.n} states")
+    if plan.period:
+        told += f"; constant gains, a cycle of {plan.period}"
     typer.echo(f"told: {told}\nlate: {late or 'nothing'}")
     for speed, analysis in zip(speeds, found, strict=True):
         mode = analysis.modes[0]

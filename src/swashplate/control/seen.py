@@ -114,7 +114,7 @@ def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
     e = np.zeros((len(plan.names), 1))
     e[: plan.n, 0] = trim.state
     w = np.array([*trim.inputs, float(trim.environment.voltage)])[:, None]
-    made = Numbers(*(jnp.asarray(part) for part in numbers))
+    made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
     return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
 
 
