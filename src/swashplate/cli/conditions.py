@@ -110,9 +110,15 @@ def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
         return None
     if switches:
         raise SwashError("has no options: it is a linear model.", where=name, channel="--option")
-    from swashplate.control.linear_vehicle import linear_vehicle
+    from swashplate.control.linear_vehicle import linear_vehicle, unlimited
 
-    return linear_vehicle(structure(name))
+    model = structure(name)
+    made = linear_vehicle(model)
+    if usual := unlimited(model):
+        ranges = dict(zip(made.input_names, made.input_limits, strict=True))
+        told = ", ".join(sorted({f"{ranges[n][1]:.3g} {model.units.get(n, '1')}" for n in usual}))
+        typer.echo(f"Careful: range of {', '.join(usual)}: assumed, {told} either way; [limits] says it.", err=True)
+    return made
 
 
 def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None, mass: float | None = None) -> Vehicle:

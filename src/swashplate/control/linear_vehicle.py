@@ -83,7 +83,7 @@ def _ranges(model: StateSpaceModel, given: Mapping[str, tuple[float, float]]) ->
     return ranges
 
 
-def has_usual_limits(model: StateSpaceModel) -> tuple[str, ...]:
+def unlimited(model: StateSpaceModel) -> tuple[str, ...]:
     """Inputs whose range the file does not say."""
     return tuple(name for name in model.inputs if name not in model.document.get("limits", {}))
 
