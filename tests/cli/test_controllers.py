@@ -61,6 +61,15 @@ def test_the_law_on_estimates_is_a_file_that_comes_back(tmp_path: Path) -> None:
     assert again.autopilot == autopilot(sp.vehicle("coax"), sp.trim(sp.vehicle("coax")), mode="manual")
 
 
+def test_decoupling_of_a_linear_model_as_a_page(tmp_path: Path) -> None:
+    outcome = swash("control", "decouple", "hybrid", "--report", tmp_path / "d.html")
+    assert outcome.code == 0, outcome.err
+    page = (tmp_path / "d.html").read_text(encoding="utf-8")
+    assert "p over q [%]" in page
+    assert "largest off-axis over on-axis response at 3 rad/s: bare inputs" in page
+    assert "The filter's modes" in page or "The filter&#39;s modes" in page
+
+
 def test_json_says_what_the_table_says() -> None:
     found = json.loads(swash("decouple", "coax", "--lag", "hover", "--json").out)
     assert found["lag_at_hover_deg"] == pytest.approx(17.01, abs=0.01)

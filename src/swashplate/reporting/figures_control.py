@@ -39,7 +39,8 @@ def style(i: int) -> tuple[str, str]:
     return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
 
 
-def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
+def over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
+    """Layout of panels over one logarithmic frequency axis [rad/s]."""
     layout = stacked(titles, height=height, x_title="frequency [rad/s]")
     for k in range(len(titles)):
         layout[f"xaxis{'' if k == 0 else k + 1}"]["type"] = "log"
@@ -48,7 +49,7 @@ def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any
 
 def loops_figure(check: ControlCheck) -> Figure:
     """Every loop opened at its input, the others closed: gain and phase."""
-    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout = over_frequency(["gain [dB]", "phase [deg]"])
     traces, keys = [], []
     m = len(check.vehicle.input_names)
     inverse = np.linalg.inv(np.eye(m) + check.opened)
@@ -81,7 +82,7 @@ def loops_figure(check: ControlCheck) -> Figure:
 
 def rejection_figure(check: ControlCheck) -> Figure:
     """What is left of a disturbance on each state that is held."""
-    layout = _over_frequency(["|S| [dB]"], height=280)
+    layout = over_frequency(["|S| [dB]"], height=280)
     layout["yaxis"]["range"] = [-40, 12]
     traces, keys = [], []
     for i, r in enumerate(check.rejections):
@@ -106,7 +107,7 @@ def rejection_figure(check: ControlCheck) -> Figure:
 
 def attitude_figure(check: ControlCheck) -> Figure:
     """Responses of the attitudes to the pilot's commands, with the bandwidths."""
-    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout = over_frequency(["gain [dB]", "phase [deg]"])
     traces, keys = [], []
     for i, a in enumerate(check.attitudes):
         color, dash = style(i)
