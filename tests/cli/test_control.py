@@ -51,6 +51,7 @@ def test_observability_says_it_in_words() -> None:
         (("--state-weights", "1,2,3"), "state weights: are for 3 of 22: x, y, z"),
         (("--input-weights", "1,2"), "input weights: are for 2 of 4: motor_lower, motor_upper"),
         (("--method", "lqr", "--gain", "steady"), "gain: has no observer"),
+        (("--delay", "-5"), "--delay: is -5 ms, expected 0 to 1000"),
         (("--delay", "rudder=20"), "rudder: expected motor_lower"),
         (("--out", "c.json"), "ends in '.json', expected .toml"),
     ],
@@ -67,7 +68,7 @@ def test_a_state_space_file_is_held_with_its_delays(tmp_path: Path) -> None:
     made = swash("control", "design", "thirteen_state", "--method", "lqr", "--out", file)
     assert made.code == 0, made.err
     assert "lateral 20 ms, longitudinal 20 ms, pedal 20 ms, collective 20 ms" in made.out
-    assert "range of lateral, longitudinal, pedal, collective: assumed, 1 1 either way" in made.err
+    assert "range of lateral, longitudinal, pedal, collective: assumed, 1 either way" in made.err
     command = (
         "simulate",
         "--vehicle",

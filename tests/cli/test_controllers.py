@@ -105,7 +105,7 @@ def test_json_says_what_the_table_says() -> None:
         (("control", "decouple", "hybrid", "--pair", "lateral=p", "--pair", "longitudinal=p"), "gives p to two inputs"),
         (("control", "decouple", "hybrid", "--at", "1,0"), "--at: '1,0' is not all positive"),
         (("control", "decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
-        (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: there is no such file"),
         (("control", "check", "coax", "--controller", "x.toml", "--scale", "0"), "--scale: is 0, expected a positive"),
         (
             ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--pilot", "--out", "f.nc"),

@@ -116,7 +116,7 @@ def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
     made = linear_vehicle(model)
     if usual := unlimited(model):
         ranges = dict(zip(made.input_names, made.input_limits, strict=True))
-        told = ", ".join(sorted({f"{ranges[n][1]:.3g} {model.units.get(n, '1')}" for n in usual}))
+        told = ", ".join(sorted({f"{ranges[n][1]:.3g} {model.units.get(n, '')}".removesuffix(" 1") for n in usual}))
         typer.echo(f"Careful: range of {', '.join(usual)}: assumed, {told} either way; [limits] says it.", err=True)
     return made
 

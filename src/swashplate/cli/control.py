@@ -72,9 +72,13 @@ def _delays(texts: list[str] | None) -> dict[str, float] | float | None:
     """`--delay 20` for all inputs, or `--delay NAME=20` each; milliseconds to seconds. None where nothing is said."""
     if not texts:
         return None
-    if len(texts) == 1 and "=" not in texts[0]:
-        return options.numbers(texts[0], option="--delay", count=1)[0] / 1e3
-    return {name: value / 1e3 for name, value in _named(texts, "--delay").items()}
+    plain = len(texts) == 1 and "=" not in texts[0]
+    found = {"": options.numbers(texts[0], option="--delay", count=1)[0]} if plain else _named(texts, "--delay")
+    for name, value in found.items():
+        if not 0.0 <= value <= 1000.0:
+            told = f"{name}={value:g}" if name else f"{value:g}"
+            raise SwashError(f"is {told} ms, expected 0 to 1000.", channel="--delay")
+    return found[""] / 1e3 if plain else {name: value / 1e3 for name, value in found.items()}
 
 
 @app.command("design", short_help="Design an LQG or LQR controller with integral action.")
@@ -182,13 +186,15 @@ def design(
 def _tell(made: Lqg, found: list[Analysis], speeds: tuple[float, ...]) -> None:
     from swashplate.cli.console import console
     from swashplate.cli.tables import table
+    from swashplate.vehicles.linear import NAME as LINEAR
 
     plan = made.plan
     told = ", ".join(map(str, plan.sensors)) or "the states themselves"
     late = ", ".join(
         f"{name} {1e3 * d / plan.rate:g} ms" for name, d in zip(made.vehicle.input_names, plan.delays, strict=True) if d
     )
-    typer.echo(f"{'LQG' if plan.sensors else 'LQR'} of {made.vehicle.name}, {plan.rate:g} Hz, {plan.n} states")
+    called = made.vehicle.card.title if made.vehicle.name == LINEAR else made.vehicle.name
+    typer.echo(f"{'LQG' if plan.sensors else 'LQR'} of {called}, {plan.rate:g} Hz, {plan.n} states")
     if plan.period:
         told += f"; constant gains, a cycle of {plan.period}"
     typer.echo(f"told: {told}\nlate: {late or 'nothing'}")
