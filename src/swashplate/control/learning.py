@@ -20,6 +20,8 @@ from swashplate.vehicles.vehicle import Vehicle
 Array = NDArray[np.float64]
 _NUDGE = 0.004
 """rad s/m; a change of the law's tilt with speed that moves the path by half a metre on the CoaX."""
+_MODELS_PER_NUMBER = 5
+"""Fewer models than that for each number, and a regression explains what is chance."""
 
 
 def corrected_by_step(
@@ -79,7 +81,7 @@ def drift_sources(
         least: shares smaller than this are left out.
 
     Returns:
-        (name, share), largest first, and R^2.
+        (name, share), largest first, and R^2; nothing where there are too few models for a regression.
     """
     y = np.asarray(drift, dtype=np.float64)
     arrived = np.isfinite(y)
@@ -92,7 +94,7 @@ def drift_sources(
             if not any(np.allclose(x, other) for other in columns.values()):
                 columns[name] = x
     y = y[arrived] - np.mean(y[arrived])
-    if y.size <= len(columns) + 1 or not columns:
+    if y.size < _MODELS_PER_NUMBER * len(columns) or not columns:
         return (), 0.0
     X = np.column_stack(list(columns.values()))
     slopes = np.linalg.lstsq(X, y, rcond=None)[0]
