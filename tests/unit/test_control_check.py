@@ -18,6 +18,7 @@ from swashplate.control.sensor_suite import suite
 from swashplate.control.stability import loop_margins, loop_modes
 from swashplate.control.step_response import cross_ratio, step_metrics
 from swashplate.errors import SwashError
+from swashplate.reporting.control_check import compose_check
 from swashplate.simulation.closed_loop import REFERENCES, simulate_closed_loop
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
@@ -200,6 +201,7 @@ def test_linear_quadratic_controllers_with_and_without_an_observer(coax: Vehicle
     assert seen.margins.together.alpha < fed.margins.together.alpha
     assert {step.reference for step in seen.steps} == {"x", "y", "z", "psi"}
     assert {r.state for r in seen.rejections} >= {"x", "y", "z", "psi"}
+    assert "rejection" in {section.identifier for section in compose_check(seen).sections}
 
 
 def test_rejection_by_linear_algebra_is_that_of_the_differentiated_loop(coax: Vehicle, hover: Trim) -> None:

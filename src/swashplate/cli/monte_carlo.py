@@ -83,9 +83,7 @@ def fly(
         drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
     pilot = from_file(controller, seed=seed)(vehicle, hover)
     if isinstance(pilot, Lqg):
-        typer.echo(
-            "Careful: this controller takes no pilot's command; it holds still for the maneuver's time.", err=True
-        )
+        typer.echo("Careful: this controller takes no pilot's command; it holds its place.", err=True)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)

@@ -90,7 +90,7 @@ def rejection_figure(check: ControlCheck) -> Figure:
         hover = f"{r.state}<br>%{{x:.3g}} rad/s, %{{y:.2f}} dB"
         traces.append(line(r.omega, 20.0 * np.log10(r.size), name=r.state, color=color, dash=dash, hover=hover))
         keys.append(Key(r.state, color, dash))
-    ends = check.omega[[0, -1]]
+    ends = check.rejections[0].omega[[0, -1]]
     for level, words in ((-3.0, "-3 dB: bandwidth"), (5.0, "5 dB: Level 1 peak")):
         traces.append(line(ends, [level, level], name=words, color=GREY, dash="dot", hover=words))
     keys.append(Key("-3 dB (bandwidth) and 5 dB (peak)", GREY, "dot"))
