@@ -49,6 +49,27 @@ def test_c_code_is_written_where_asked(tmp_path: Path) -> None:
     assert "void swash_step(float memory[5]" in (tmp_path / "c.c").read_text()
 
 
+def test_the_law_on_estimates_is_a_file_that_comes_back(tmp_path: Path) -> None:
+    from swashplate.control.observed_autopilot import ObservedAutopilot
+
+    file = tmp_path / "estimated.toml"
+    outcome = swash("decouple", "coax", "--sensors", "imu@100,sonar,compass,flow@25+40ms", "--out", file)
+    assert outcome.code == 0, outcome.err
+    again = read_controller(file)
+    assert isinstance(again, ObservedAutopilot)
+    assert [str(s) for s in again.observer.plan.sensors] == ["imu@100", "sonar@20", "compass@20", "flow@25+40ms"]
+    assert again.autopilot == autopilot(sp.vehicle("coax"), sp.trim(sp.vehicle("coax")), mode="manual")
+
+
+def test_decoupling_of_a_linear_model_as_a_page(tmp_path: Path) -> None:
+    outcome = swash("control", "decouple", "hybrid", "--report", tmp_path / "d.html")
+    assert outcome.code == 0, outcome.err
+    page = (tmp_path / "d.html").read_text(encoding="utf-8")
+    assert "p over q [%]" in page
+    assert "largest off-axis over on-axis response at 3 rad/s: bare inputs" in page
+    assert "The filter's modes" in page or "The filter&#39;s modes" in page
+
+
 def test_json_says_what_the_table_says() -> None:
     found = json.loads(swash("decouple", "coax", "--lag", "hover", "--json").out)
     assert found["lag_at_hover_deg"] == pytest.approx(17.01, abs=0.01)
@@ -74,13 +95,17 @@ def test_json_says_what_the_table_says() -> None:
         (("decouple", "coax", "--step", "0.2", "--to-speed", "1.8"), "--step and --to-speed: are two steps"),
         (("decouple", "coax", "--to-speed", "-1"), "--to-speed: is -1 m/s, expected a positive speed"),
         (("decouple", "coax", "--to-speed", "40"), "reaches"),
+        (("decouple", "coax", "--drift", "0.4"), "--drift: was seen on a step"),
+        (("decouple", "coax", "--step", "0.2", "--drift", "60"), "--drift: is 60 m, expected at most 6"),
+        (("decouple", "coax", "--sensors", "imu@100,mocap"), "--sensors: goes into the file of --out"),
+        (("decouple", "coax", "--sensors", "imu,gyro", "--out", "c.toml"), "gyro and imu is there twice"),
         (("decouple", "coax", "--report", "path.pdf"), "ends in '.pdf', expected .html"),
         (("decouple", "raptor50"), "`swash control decouple` takes any linear model"),
         (("control", "decouple", "raptor50", "--pair", "cyclic=p"), "has no input cyclic; it has theta0, B1, A1"),
         (("control", "decouple", "hybrid", "--pair", "lateral=p", "--pair", "longitudinal=p"), "gives p to two inputs"),
         (("control", "decouple", "hybrid", "--at", "1,0"), "--at: '1,0' is not all positive"),
         (("control", "decouple", "nothing.toml"), "neither a vehicle's name nor a file"),
-        (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("control", "check", "coax", "--controller", "nowhere.toml"), "nowhere.toml: there is no such file"),
         (("control", "check", "coax", "--controller", "x.toml", "--scale", "0"), "--scale: is 0, expected a positive"),
         (
             ("simulate", "--vehicle", "coax", "--maneuver", "step:pitch,1s", "--pilot", "--out", "f.nc"),

@@ -1,7 +1,8 @@
 """The observer on the CoaX's real flights, open loop: near-white innovations, rates better predicted than by the model.
 
-Model, delays, lever arm and disturbances are what the August flight taught (docs/real-flights.md); the July flight is
-seen by that model for the first time, with its own delays and lever arm.
+Model, delays, lever arm and disturbances are what the August flight taught (docs/real-flights.md; the disturbing forces
+by the likelihood of its innovations, which slower and larger ones explain better than the fit's 0.38 s); the July
+flight is seen by that model for the first time, with its own delays and lever arm.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ LEARNT = {
     "bar_heading_transport": 1.0,
 }
 DISTURBED = Unrest(
-    force=0.194,
-    force_down=0.090,
+    force=0.4,
+    force_down=0.2,
     moment=3.0,
     moment_yaw=15.6,
-    force_time=0.380,
+    force_time=1.0,
     moment_time=0.698,
     jolt=0.019,
     twist=0.30,
@@ -83,12 +84,13 @@ def test_rates_are_predicted_better_than_by_the_raw_model(name: str, request: py
             assert by_observer < 0.7 * size, (axis, found.rms())
 
 
-@pytest.mark.parametrize(("name", "tilt", "height"), [("august", 0.18, 0.3), ("july", 0.30, 0.75)])
+@pytest.mark.parametrize(("name", "tilt", "height"), [("august", 0.18, 0.3), ("july", 0.30, 0.65)])
 def test_innovations_are_near_white(name: str, tilt: float, height: float, request: pytest.FixtureRequest) -> None:
     """Largest correlation over 20 lags (white: 0.08 and 0.11) and sizes.
 
-    Roll and pitch are near white in both; July's height is not: the vertical model is August's, and July's controller
-    hides how wrong it is there (docs/real-flights.md: heave cannot be judged).
+    Roll and pitch are near white in both; July's height is not. That is no noise: what is left follows the upper
+    motor's command 0.15 to 0.2 s before (correlation -0.46 in July, 0.15 at most in August), so July's rotors answer
+    more than August's model says; the battery's voltage was not logged.
     """
     along_it: Along = request.getfixturevalue(name)
     names = ("x", "y", "z", "phi", "theta", "psi")
@@ -97,6 +99,7 @@ def test_innovations_are_near_white(name: str, tilt: float, height: float, reque
         assert found[axis].whiteness < tilt, found[axis]
         assert 0.3 < found[axis].consistency < 1.5, found[axis]
     assert found["z"].whiteness < height, found["z"]
-    assert all(entry.whiteness < 0.5 for axis, entry in found.items() if axis != "z"), found
+    assert 0.5 < found["z"].consistency < 1.0, found["z"]
+    assert all(entry.whiteness < 0.4 for axis, entry in found.items() if axis != "z"), found
     assert all(0.1 < entry.consistency < 2.0 for entry in found.values()), found
     assert np.all(np.isfinite(along_it.estimates))

@@ -10,7 +10,7 @@ import pytest
 import swashplate as sp
 from swashplate.control.autopilot import autopilot
 from swashplate.control.check import ControlCheck, check_controller
-from swashplate.control.lqg_analysis import analyse
+from swashplate.control.lqg_analysis import analyse, sensitivity
 from swashplate.control.lqg_design import design
 from swashplate.control.requirements import BANDWIDTH, PHASE_MARGIN, REJECTION_PEAK, froude_scale
 from swashplate.control.sampled_loop import SampledLoop, sampled_loop
@@ -18,6 +18,7 @@ from swashplate.control.sensor_suite import suite
 from swashplate.control.stability import loop_margins, loop_modes
 from swashplate.control.step_response import cross_ratio, step_metrics
 from swashplate.errors import SwashError
+from swashplate.reporting.control_check import compose_check
 from swashplate.simulation.closed_loop import REFERENCES, simulate_closed_loop
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.vehicle import Vehicle
@@ -199,3 +200,31 @@ def test_linear_quadratic_controllers_with_and_without_an_observer(coax: Vehicle
     assert seen.margins.together.alpha == analyse(told).margins.together.alpha
     assert seen.margins.together.alpha < fed.margins.together.alpha
     assert {step.reference for step in seen.steps} == {"x", "y", "z", "psi"}
+    assert {r.state for r in seen.rejections} >= {"x", "y", "z", "psi"}
+    assert "rejection" in {section.identifier for section in compose_check(seen).sections}
+
+
+def test_rejection_by_linear_algebra_is_that_of_the_differentiated_loop(coax: Vehicle, hover: Trim) -> None:
+    """Two routes: the controller's own matrices, and the derivative of its step as it is flown."""
+    fed = design(coax, sensors=())
+    w = np.geomspace(0.05, 200.0, 30)
+    loop = sampled_loop(coax, fed, hover)
+    for state in ("phi", "psi", "x", "z"):
+        found = sensitivity(fed, w, state)
+        assert found is not None
+        np.testing.assert_allclose(found, loop.sensitivity(w, state), rtol=1e-6, atol=1e-9)
+
+
+def test_rejection_with_an_observer(coax: Vehicle) -> None:
+    """What a held place leaves of a wrong sensor: nothing that stays, all that is fast; late readings leave more."""
+    w = np.geomspace(0.002, 300.0, 60)
+    left = {}
+    for late in (0, 40):
+        told = design(coax, sensors=suite(f"imu@100,mocap@100+{late}ms"), delays=0.02)
+        found = sensitivity(told, w, "x")
+        assert found is not None
+        left[late] = np.abs(found)
+        assert left[late][0] < 0.05
+        assert left[late][-1] == pytest.approx(1.0, abs=0.05)
+    assert left[40].max() > left[0].max() > 1.0
+    assert sensitivity(told, w, "u") is None  # motion capture shows no speed

@@ -109,12 +109,33 @@ def _switch(text: str) -> Any:
     return {"true": True, "false": False}.get(text.lower(), text)
 
 
+def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
+    """The vehicle of a state-space file or a ready structure."""
+    from swashplate.identification.state_space_file import is_state_space, structure, structure_names
+
+    if name not in structure_names() and not (Path(name).is_file() and is_state_space(name)):
+        return None
+    if switches:
+        raise SwashError("has no options: it is a linear model.", where=name, channel="--option")
+    from swashplate.control.linear_vehicle import linear_vehicle, unlimited
+
+    model = structure(name)
+    made = linear_vehicle(model)
+    if usual := unlimited(model):
+        ranges = dict(zip(made.input_names, made.input_limits, strict=True))
+        told = ", ".join(sorted({f"{ranges[n][1]:.3g} {model.units.get(n, '')}".removesuffix(" 1") for n in usual}))
+        typer.echo(f"Careful: range of {', '.join(usual)}: assumed, {told} either way; [limits] says it.", err=True)
+    return made
+
+
 def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None, mass: float | None = None) -> Vehicle:
-    """A vehicle with other numbers and options."""
+    """A vehicle with other numbers and options; of a state-space file the linear one."""
     from swashplate.vehicles.catalogue import from_card
     from swashplate.vehicles.catalogue import vehicle as find
 
     switches = options.assignments(switched, option="--option")
+    if (found := _linear(name, switches)) is not None:
+        return found
     made = find(name, **{key: _switch(value) for key, value in switches.items()})
     numbers = {
         key: options.numbers(value, option="--set", count=1)[0]

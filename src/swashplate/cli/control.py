@@ -33,7 +33,9 @@ Sensors = Annotated[
         help="KIND@RATE+DELAYms, separated by commas: imu, gyro, mocap, sonar, pressure, flow (optical), compass.",
     ),
 ]
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or a vehicle's name.")]
+Model = Annotated[
+    str, typer.Argument(metavar="MODEL", help="A vehicle's name or file, or a state-space file of `swash fit-ss`.")
+]
 Voltage = Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the trims [V].")]
 
 
@@ -45,6 +47,11 @@ class Method(StrEnum):
 class Holding(StrEnum):
     PLACE = "place"
     SPEED = "speed"
+
+
+class Gain(StrEnum):
+    FLYING = "flying"
+    STEADY = "steady"
 
 
 class Precision(StrEnum):
@@ -61,11 +68,17 @@ def _named(texts: list[str] | None, option: str) -> dict[str, float]:
     return {name: options.numbers(value, option=option, count=1)[0] for name, value in found.items()}
 
 
-def _delays(texts: list[str] | None) -> dict[str, float] | float:
-    """`--delay 20` for all inputs, or `--delay NAME=20` each; milliseconds to seconds."""
-    if texts and len(texts) == 1 and "=" not in texts[0]:
-        return options.numbers(texts[0], option="--delay", count=1)[0] / 1e3
-    return {name: value / 1e3 for name, value in _named(texts, "--delay").items()}
+def _delays(texts: list[str] | None) -> dict[str, float] | float | None:
+    """`--delay 20` for all inputs, or `--delay NAME=20` each; milliseconds to seconds. None where nothing is said."""
+    if not texts:
+        return None
+    plain = len(texts) == 1 and "=" not in texts[0]
+    found = {"": options.numbers(texts[0], option="--delay", count=1)[0]} if plain else _named(texts, "--delay")
+    for name, value in found.items():
+        if not 0.0 <= value <= 1000.0:
+            told = f"{name}={value:g}" if name else f"{value:g}"
+            raise SwashError(f"is {told} ms, expected 0 to 1000.", channel="--delay")
+    return found[""] / 1e3 if plain else {name: value / 1e3 for name, value in found.items()}
 
 
 @app.command("design", short_help="Design an LQG or LQR controller with integral action.")
@@ -99,6 +112,10 @@ def design(
     input_weights: Annotated[
         str | None, typer.Option("--input-weights", metavar="R1,R2,...", help="Weights of all inputs instead.")
     ] = None,
+    gain: Annotated[
+        Gain,
+        typer.Option("--gain", help="Of the observer: found as it flies, or constant (a small processor)."),
+    ] = Gain.FLYING,
     voltage: Voltage = None,
     switched: given.Switch = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the controller (.toml).")] = None,
@@ -140,6 +157,10 @@ def design(
         voltage=voltage,
     )
     found = [analyse(made, at=i, where=model) for i in range(len(speeds))]
+    if gain is Gain.STEADY:
+        from swashplate.control.steady_observer import with_steady_gain
+
+        made = with_steady_gain(made)
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code
@@ -165,13 +186,17 @@ def design(
 def _tell(made: Lqg, found: list[Analysis], speeds: tuple[float, ...]) -> None:
     from swashplate.cli.console import console
     from swashplate.cli.tables import table
+    from swashplate.vehicles.linear import NAME as LINEAR
 
     plan = made.plan
     told = ", ".join(map(str, plan.sensors)) or "the states themselves"
     late = ", ".join(
         f"{name} {1e3 * d / plan.rate:g} ms" for name, d in zip(made.vehicle.input_names, plan.delays, strict=True) if d
     )
-    typer.echo(f"{'LQG' if plan.sensors else 'LQR'} of {made.vehicle.name}, {plan.rate:g} Hz, {plan.n} states")
+    called = made.vehicle.card.title if made.vehicle.name == LINEAR else made.vehicle.name
+    typer.echo(f"{'LQG' if plan.sensors else 'LQR'} of {called}, {plan.rate:g} Hz, {plan.n} states")
+    if plan.period:
+        told += f"; constant gains, a cycle of {plan.period}"
     typer.echo(f"told: {told}\nlate: {late or 'nothing'}")
     for speed, analysis in zip(speeds, found, strict=True):
         mode = analysis.modes[0]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from swashplate.cli import conditions as given
 from swashplate.cli import options
 from swashplate.errors import SwashError
 
@@ -61,7 +62,7 @@ def check(
     from swashplate.cli.simulate import from_file
     from swashplate.control.check import check_controller
 
-    vehicle = sp.vehicle(model)
+    vehicle = given.vehicle_of(model, None, None)
     nominal = vehicle.card.values().get("voltage_nominal")
     trim = sp.trim(vehicle, speed=speed, voltage=nominal if voltage is None else voltage)
     made = from_file(controller)(vehicle, trim)

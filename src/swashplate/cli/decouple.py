@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 _PAPERS_SPEED = 1.8  # m/s, Fankhauser et al., Fig. 10
+_FURTHEST = 6.0  # m of drift, as far as the step goes
 
 
 class Mode(StrEnum):
@@ -88,6 +89,10 @@ def decouple(
         Path | None,
         typer.Option("--fit", metavar="FILE", help="With a step: also on models drawn from a fit.json."),
     ] = None,
+    drift: Annotated[
+        float | None,
+        typer.Option("--drift", help="Seen on the step with this law [m to the right after 6 m]: take it out."),
+    ] = None,
     draws: Annotated[int, typer.Option("--draws", help="How many of them.", min=2)] = 500,
     seed: Annotated[int, typer.Option("--seed", help="Of the draws.", min=0)] = 0,
     json: options.Json = False,
@@ -107,6 +112,10 @@ def decouple(
         to_speed = _PAPERS_SPEED
     if fit is not None and step is None and to_speed is None:
         raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
+    if drift is not None and step is None and to_speed is None:
+        raise SwashError("was seen on a step.", channel="--drift", hint="Add that step: --step 0.4 or --to-speed 1.8.")
+    if drift is not None and not abs(drift) <= _FURTHEST:
+        raise SwashError(f"is {drift:g} m, expected at most {_FURTHEST:g} either way.", channel="--drift")
     if out is not None and out.suffix != ".toml":
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     if c_code is not None and c_code.suffix != ".c":
@@ -136,6 +145,15 @@ def decouple(
         speed_terms=speed_terms,
         mixing=None if mixing is None else mixing.value,
     )
+    if to_speed is not None:
+        from swashplate.control.straightness import command_for_speed
+
+        step = command_for_speed(vehicle, made, hover, speed=to_speed)
+    if drift is not None:
+        from swashplate.control.learning import corrected_by_step
+
+        assert step is not None
+        made = corrected_by_step(vehicle, made, hover, command=step, drift=drift)
     law, slowest = made.numbers.law, loop_modes(vehicle, made, hover)[0]
     if made.mode != "manual":  # a pilot damps what "manual" leaves alone
         require_stable(slowest, rate=made.rate, where=model)
@@ -168,13 +186,12 @@ def decouple(
             "together": {"disc": together.alpha, "gain": together.gain, "phase_deg": math.degrees(together.phase)},
         }
     flown = {}
-    if step is not None or to_speed is not None:
+    sources: Any = ((), 0.0)
+    if step is not None:
+        from swashplate.control.learning import drift_sources
         from swashplate.control.robustness import draw_models
-        from swashplate.control.straightness import command_for_speed, step_run
+        from swashplate.control.straightness import step_run
 
-        if step is None:
-            assert to_speed is not None
-            step = command_for_speed(vehicle, made, hover, speed=to_speed)
         bare = autopilot(vehicle, hover, mode="manual", rate=rate, decoupled=False)
         drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
         runs = {
@@ -182,11 +199,13 @@ def decouple(
             for name, controller in (("without", bare), ("with", made))
         }
         flown = _figures(runs, draws)
-        found["step"] = {"command": step, **flown}
+        if drawn is not None and (spread := runs["with"].drawn) is not None:
+            sources = drift_sources(spread.drift, drawn)
+        found["step"] = {"command": step, **flown, "drift_sources": dict(sources[0])}
         if report is not None:
             from swashplate.reporting.straightness import straightness_report
 
-            straightness_report(vehicle, runs, command=step, lag=degrees[volts], path=report)
+            straightness_report(vehicle, runs, command=step, lag=degrees[volts], sources=sources[0], path=report)
     if json:
         typer.echo(as_json(found))
     elif not quiet:
@@ -214,6 +233,9 @@ def decouple(
                 for name, entry in flown.items()
             ]
             console().print(table(head, cells))
+        if sources[0]:
+            told = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in sources[0][:4])
+            typer.echo(f"\nof the drift's variance with the law: {told} (a line explains {100.0 * sources[1]:.0f} %)")
         if code is not None:
             told = f"{code.operations} operations a step, {code.work_bytes} bytes of temporaries"
             typer.echo(f"\nC of one step: {told}")

@@ -40,6 +40,9 @@ def decouple(
     at: Annotated[str, typer.Option("--at", metavar="W,...", help="Frequencies of the table [rad/s].")] = "1,3,10,20",
     speed: Annotated[float, typer.Option("--speed", help="Of a vehicle's steady flight [m/s].")] = 0.0,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Matrix and filter (.json).")] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="The coupling and steps as HTML.")
+    ] = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -50,6 +53,8 @@ def decouple(
     """
     if out is not None and out.suffix != ".json":
         raise SwashError(f"ends in '{out.suffix}', expected .json.", where=out, channel="--out")
+    if report is not None and report.suffix != ".html":
+        raise SwashError(f"ends in '{report.suffix}', expected .html.", where=report, channel="--report")
     frequencies = options.numbers(at, option="--at")
     if min(frequencies) <= 0.0:
         raise SwashError(f"'{at}' is not all positive.", channel="--at")
@@ -93,6 +98,10 @@ def decouple(
     }
     if out is not None:
         write_text(out, as_json(document) + "\n")
+    if report is not None:
+        from swashplate.reporting.linear_decoupling import decoupling_report
+
+        decoupling_report(system, made, name=model, frequency=frequency, problem=problem, path=report, **axes)
     if json:
         typer.echo(as_json(document))
     elif not quiet:
@@ -108,8 +117,8 @@ def decouple(
         console().print(
             table(head, [(name, *(f"{v:+.4f}" for v in row)) for name, row in zip(axes["inputs"], mixing, strict=True)])
         )
-        if out is not None:
-            typer.echo(f"\nWritten: {out}")
+        if written := [str(path) for path in (out, report) if path is not None]:
+            typer.echo(f"\nWritten: {', '.join(written)}")
     end_with([] if problem is None else [f"No filter: {problem}"])
 
 

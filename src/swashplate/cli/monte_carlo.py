@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import typer
+
 from swashplate.errors import DivergenceError, SwashError
 
 if TYPE_CHECKING:
@@ -57,6 +59,7 @@ def fly(
 
     import swashplate as sp
     from swashplate.cli.simulate import from_file
+    from swashplate.control.lqg import Lqg
     from swashplate.control.robustness import SENSOR_NOISE, draw_models, spread
     from swashplate.control.variations import draw_delays, draw_numbers, load_them, tolerances_of
     from swashplate.simulation.closed_loop_batch import simulate_closed_loops
@@ -79,6 +82,8 @@ def fly(
     if payload:
         drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
     pilot = from_file(controller, seed=seed)(vehicle, hover)
+    if isinstance(pilot, Lqg):
+        typer.echo("Careful: this controller takes no pilot's command; it holds its place.", err=True)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)
@@ -118,7 +123,12 @@ def _battery(text: str | None) -> tuple[float, float] | None:
         return None
     from swashplate.cli.options import numbers
 
-    ends = numbers(text.replace("-", ","), option="--battery", count=2)
+    try:
+        ends = numbers(text.replace("-", ","), option="--battery", count=2)
+    except SwashError:
+        raise SwashError(
+            f"is '{text}', expected the voltages at start and end.", channel="--battery", hint="Example: 12.5-10.5"
+        ) from None
     if not 0.0 < ends[1] <= ends[0]:
         raise SwashError(f"'{text}' does not fall.", channel="--battery", hint="Example: --battery 12.5-10.5")
     return ends[0], ends[1]
@@ -142,4 +152,11 @@ def _setting(gusts: str) -> Gusts | None:
 
     if gusts == "none":
         return None
-    return INDOOR if gusts == "indoor" else outdoor(numbers(gusts, option="--gusts", count=1)[0])
+    if gusts == "indoor":
+        return INDOOR
+    try:
+        return outdoor(numbers(gusts, option="--gusts", count=1)[0])
+    except SwashError as error:
+        raise SwashError(
+            f"is '{gusts}', expected none, indoor, or a mean wind in m/s ({error.problem}).", channel="--gusts"
+        ) from None

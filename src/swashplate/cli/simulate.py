@@ -172,20 +172,26 @@ def simulate(
 
 
 def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
-    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle.
+    """What makes the controller of a file for a vehicle: the file's, if it is for that vehicle or a linear model of it.
 
     Args:
         path: the file.
         seed: of the noise that a controller with sensors of its own sees.
     """
+    from dataclasses import replace
+
     from swashplate.control.controller_file import read_controller
     from swashplate.control.lqg import Lqg
+    from swashplate.control.lqg_transfer import flown_on
     from swashplate.control.observed_autopilot import ObservedAutopilot
     from swashplate.errors import ControllerError
+    from swashplate.vehicles.linear import NAME as LINEAR
 
     saved = read_controller(path)
 
     def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if isinstance(saved, Lqg) and saved.vehicle.name == LINEAR and vehicle.name != LINEAR:
+            return replace(flown_on(saved, vehicle, trim), seed=seed)
         of = saved.vehicle if isinstance(saved.vehicle, str) else saved.vehicle.name
         if of != vehicle.name:
             raise ControllerError(f"is for '{of}', not for '{vehicle.name}'.", where=path)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.control.check_steps import COUPLING_WITHIN, STEPS, Coupling, Step, couplings_of, fly_steps
 from swashplate.control.lqg import Lqg
-from swashplate.control.lqg_analysis import analyse
+from swashplate.control.lqg_analysis import analyse, sensitivity
 from swashplate.control.margins import Margins
 from swashplate.control.observed_autopilot import ObservedAutopilot
 from swashplate.control.requirements import (
@@ -36,13 +36,18 @@ Command = Literal["auto", "rate", "attitude"]
 ATTITUDES: Mapping[str, tuple[str, float]] = {"phi": ("roll", 1.0), "theta": ("pitch", -1.0), "psi": ("psi", 1.0)}
 """Attitude by name: the reference that a pilot moves it by, and its sign (a pitch command is nose down positive)."""
 _OBSERVED = (
-    "With an observer, modes and margins are those of its steady filter on the model of its design. Disturbance "
-    "rejection and bandwidth are not computed; the steps are flown with its noisy sensors."
+    "With an observer, modes, margins and disturbance rejection are those of its steady filter on the model of its "
+    "design; a disturbance is added to a state in every sensor that shows it. It takes no pilot's command, so there is "
+    "no bandwidth; the steps are flown with its noisy sensors."
 )
 _FED = (
     "Modes, margins, disturbance rejection and bandwidth are those of the law fed with the true states: the observer's "
     "own lag is not in them. The steps are flown with its noisy sensors."
 )
+_DISTURBED = ("phi", "theta", "psi", "x", "y", "z", "u", "v")
+"""States whose disturbance rejection is told."""
+_LOWEST, _POINTS = 0.02, 400
+"""rad/s, and points of the grid, with an observer."""
 _NEUTRAL = 1e-6
 """1/s."""
 _HALF_POWER = 10.0 ** (-3.0 / 20.0)
@@ -200,7 +205,9 @@ def check_controller(
         omega=w,
         opened=loop.opened(w),
         attitudes=tuple(_attitude(loop, w, state, BANDWIDTH[task], command, n) for state in _commanded(loop)),
-        rejections=tuple(_rejections(loop, w, n)) if margins else (),
+        rejections=_rejections(
+            w, {s: np.abs(loop.sensitivity(w, s)) for s in _DISTURBED if s in loop.states} if margins else {}, n
+        ),
         steps=tuple(steps),
         couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
@@ -211,7 +218,10 @@ def check_controller(
 def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task: str, duration: float) -> ControlCheck:
     """A controller with an observer: its margins by its own analysis, its steps with noisy sensors."""
     speeds = np.asarray(controller.feedback.speeds)
-    analysis = analyse(controller, at=int(np.argmin(np.abs(speeds - trim.speed))), where=vehicle.name)
+    at = int(np.argmin(np.abs(speeds - trim.speed)))
+    analysis = analyse(controller, at=at, where=vehicle.name)
+    w = np.geomspace(_LOWEST, np.pi * controller.rate * 0.999, _POINTS)
+    left = {state: sensitivity(controller, w, state, at=at) for state in _DISTURBED}
     held = ("x", "y") if float(controller.feedback.place) > 0.5 else ("ahead", "right")
     problems: list[str] = []
     steps = fly_steps(vehicle, controller, trim, ["psi", "z", *held], duration, problems)
@@ -227,7 +237,7 @@ def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task:
         omega=nothing,
         opened=nothing.astype(complex),
         attitudes=(),
-        rejections=(),
+        rejections=_rejections(w, {state: np.abs(s) for state, s in left.items() if s is not None}, scale),
         steps=tuple(steps),
         couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
@@ -281,12 +291,9 @@ def _attitude(
     return AttitudeResponse(state, reference, w, response, found, kind, level)
 
 
-def _rejections(loop: SampledLoop, w: Array, scale: float) -> list[Rejection]:
+def _rejections(w: Array, sizes: Mapping[str, Array], scale: float) -> tuple[Rejection, ...]:
     found = []
-    for state in ("phi", "theta", "psi", "x", "y", "z", "u", "v"):
-        if state not in loop.states:
-            continue
-        size = np.abs(loop.sensitivity(w, state))
+    for state, size in sizes.items():
         if np.min(size) > _HALF_POWER:  # nobody holds it
             continue
         below = size < _HALF_POWER
@@ -302,4 +309,4 @@ def _rejections(loop: SampledLoop, w: Array, scale: float) -> list[Rejection]:
         level = None if standard is None else standard.level(bandwidth, scale=scale)
         peak_level = None if standard is None else REJECTION_PEAK.level(peak)
         found.append(Rejection(state, bandwidth, peak, float(w[worst]), w, size, level, peak_level))
-    return found
+    return tuple(found)

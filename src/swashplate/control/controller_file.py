@@ -61,6 +61,8 @@ def read_controller(path: str | Path) -> Autopilot | Lqg | ObservedAutopilot:
     """
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ControllerError("there is no such file.", where=path, hint="Check the path.") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ControllerError(f"cannot be read: {error}.", where=path) from None
     except tomllib.TOMLDecodeError as error:

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control import observer
+from swashplate.control import constant_gain, observer
 from swashplate.control.lqg_law import LAW_MEMORY, Feedback, lqr_law
 from swashplate.control.matrices import JaxMatrices, Matrices
 from swashplate.control.observer import Estimate, Numbers, Plan
@@ -44,7 +44,7 @@ class Carried(NamedTuple):
     Attributes:
         estimate: of the observer.
         given: commands, newest first, a row per sample, as many as the longest delay and one.
-        counts: samples since each sensor last took a reading.
+        counts: samples since each sensor last took a reading, and with constant gains the phase of their cycle.
         law: memory of the feedback.
     """
 
@@ -90,16 +90,21 @@ def lqg_step(
     estimate = carried.estimate
     taken, counts = [], []
     if plan.sensors:
+        since = carried.counts[: len(plan.sensors)]
         due = [
-            xp.where(xp.abs(count - at.arrives) < 0.5, 1.0, 0.0)
-            for count, at in zip(carried.counts, plan.sampling, strict=True)
+            xp.where(xp.abs(count - at.arrives) < 0.5, 1.0, 0.0) for count, at in zip(since, plan.sampling, strict=True)
         ]
-        taken = [xp.where(count < 0.5, 1.0, 0.0) for count in carried.counts]
+        taken = [xp.where(count < 0.5, 1.0, 0.0) for count in since]
         counts = [
-            xp.where(count > at.every - 1.5, 0.0, count + 1.0)
-            for count, at in zip(carried.counts, plan.sampling, strict=True)
+            xp.where(count > at.every - 1.5, 0.0, count + 1.0) for count, at in zip(since, plan.sampling, strict=True)
         ]
-        estimate, _, _ = observer.corrected(plan, numbers, estimate, y, due, M.column([*before, voltage]), M)
+        w = M.column([*before, voltage])
+        if plan.period:
+            phase = carried.counts[-1]
+            estimate = constant_gain.corrected_steadily(plan, numbers, estimate, y, phase, w, M)
+            counts.append(xp.where(phase > plan.period - 1.5, 0.0, phase + 1.0))
+        else:
+            estimate, _, _ = observer.corrected(plan, numbers, estimate, y, due, w, M)
         x = M.scalars(estimate.mean)[: plan.n]
     else:
         x = M.scalars(y)
@@ -109,28 +114,37 @@ def lqg_step(
     given = [commands, *carried.given[:-1]]
     if plan.sensors:
         acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
-        estimate = observer.predicted(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
+        moved = constant_gain.predicted_steadily if plan.period else observer.predicted
+        estimate = moved(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
     return Carried(estimate, given, counts, kept), commands
 
 
 # ---- rows --------------------------------------------------------------------------------------------------------
+def sizes(plan: Plan) -> tuple[int, int, int]:
+    """Of what is carried: estimates, rows of their covariance (none with constant gains), counts."""
+    if not plan.sensors:
+        return 0, 0, 0
+    N = len(plan.names)
+    return N, 0 if plan.period else N, len(plan.sensors) + (1 if plan.period else 0)
+
+
 def carried_size(plan: Plan) -> int:
-    N = len(plan.names) if plan.sensors else 0
-    return N + N * N + (max(plan.delays) + 1) * plan.inputs + len(plan.sensors) + LAW_MEMORY
+    N, rows, counts = sizes(plan)
+    return N + rows * rows + (max(plan.delays) + 1) * plan.inputs + counts + LAW_MEMORY
 
 
 def carried_from(plan: Plan, row: Any) -> Carried:
     """What is carried, from a flat row."""
-    N = len(plan.names) if plan.sensors else 0
-    m, depth, sensors = plan.inputs, max(plan.delays) + 1, len(plan.sensors)
-    mean, covariance, rest = row[:N, None], row[N : N + N * N].reshape(N, N), row[N + N * N :]
+    N, rows, counts = sizes(plan)
+    m, depth = plan.inputs, max(plan.delays) + 1
+    covariance, rest = row[N : N + rows * rows].reshape(rows, rows), row[N + rows * rows :]
     given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
     rest = rest[depth * m :]
     return Carried(
-        Estimate(mean, covariance),
+        Estimate(row[:N, None], covariance),
         given,
-        [rest[i] for i in range(sensors)],
-        [rest[sensors + i] for i in range(LAW_MEMORY)],
+        [rest[i] for i in range(counts)],
+        [rest[counts + i] for i in range(LAW_MEMORY)],
     )
 
 
@@ -146,11 +160,13 @@ def _shapes(plan: Plan, speeds: int) -> list[tuple[int, ...]]:
     N, channels = len(plan.names), len(plan.channels)
     parameters = len(plan.equations.vehicle.parameter_names) + 2
     of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), ()]
-    return [(parameters,), (6,), (N,), (channels,), *of_feedback]
+    steady = [(plan.period, N, channels)] if plan.period else []
+    return [(parameters,), (6,), (N,), (channels,), *steady, *of_feedback]
 
 
 def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
-    return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in (*numbers, *feedback)])
+    parts = [part for part in (*numbers, *feedback) if part is not None]
+    return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
 
 
 def numbers_from(plan: Plan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
@@ -159,7 +175,8 @@ def numbers_from(plan: Plan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
         size = int(np.prod(shape))
         parts.append(row[place : place + size].reshape(shape))
         place += size
-    return Numbers(*parts[: len(Numbers._fields)]), Feedback(*parts[len(Numbers._fields) :])
+    own = len(parts) - len(Feedback._fields)
+    return Numbers(*parts[:own]), Feedback(*parts[own:])
 
 
 # ---- in simulation -----------------------------------------------------------------------------------------------
@@ -272,11 +289,12 @@ class Lqg:
         plan = self.plan
         given = np.tile(self.start.inputs, max(plan.delays) + 1)
         law = [*[0.0] * 4, self.start.speed, self.start.speed]
-        tail = np.concatenate([given, np.zeros(len(plan.sensors)), law])
+        tail = np.concatenate([given, np.zeros(sizes(plan)[2]), law])
         if not plan.sensors:
             return tail
         estimate = self.first_estimate()
-        return np.concatenate([estimate.mean.ravel(), estimate.covariance.ravel(), tail])
+        known = [] if plan.period else [estimate.covariance.ravel()]
+        return np.concatenate([estimate.mean.ravel(), *known, tail])
 
     def first_estimate(self) -> Estimate:
         """At the trim, stored readings included."""
@@ -331,7 +349,8 @@ class Lqg:
 
 
 def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
-    return _stored_compiled(plan, Numbers(*(jnp.asarray(part) for part in numbers)), jnp.asarray(mean), jnp.asarray(w))
+    made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
+    return _stored_compiled(plan, made, jnp.asarray(mean), jnp.asarray(w))
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)

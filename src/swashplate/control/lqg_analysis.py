@@ -8,131 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from swashplate.control import observer
 from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_design import typical
 from swashplate.control.margins import Margins, margins
-from swashplate.control.matrices import JaxMatrices
 from swashplate.control.observer import DISTURBED, Numbers, Plan
-from swashplate.control.optimal import delayed, sampled, steady_filter
+from swashplate.control.optimal import steady_filter
+from swashplate.control.seen import Seen, seen
 from swashplate.errors import ControllerError
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 
 Array = NDArray[np.float64]
 _LOWEST = 0.02
 """rad/s."""
-
-
-@dataclass(frozen=True)
-class Seen:
-    """The sampled model that an observer works with about a trim.
-
-    Attributes:
-        F, G: of states, disturbances, biases, late readings and waiting commands.
-        H: outputs.
-        process, noise: covariances per sample; the noise of a sensor that is heard every k-th time is k times its own.
-        names: of its states.
-        vehicle: places of the vehicle's states in it; all but disturbances and biases follow the vehicle.
-        moved: places of what a truth without disturbances and biases has.
-    """
-
-    F: Array
-    G: Array
-    H: Array
-    process: Array
-    noise: Array
-    names: tuple[str, ...]
-    vehicle: tuple[int, ...]
-    moved: tuple[int, ...]
-
-
-def seen(plan: Plan, numbers: Numbers, model: LinearModel, *, without: Sequence[str] = ()) -> Seen:
-    """The observer's linear model about a model's trim.
-
-    Args:
-        plan, numbers: the observer.
-        model: of the vehicle; states behind those of the vehicle (actuators) are allowed.
-        without: states left out (a place that nothing sees).
-    """
-    n, nb = len(model.states), len(plan.biases)
-    own = n + 6 + nb
-    A = np.zeros((own, own))
-    A[:n, :n] = model.A
-    for i, name in enumerate(DISTURBED):
-        A[model.states.index(name), n + i] = 1.0
-    A[n : n + 6, n : n + 6] = -np.diag(np.asarray(numbers.fade))
-    B = np.zeros((own, plan.inputs))
-    B[:n] = model.B
-    F, G = sampled(A, B, plan.dt)
-    slopes, more = outputs(plan, numbers, model.trim), n - plan.n
-    H = np.hstack([slopes[:, : plan.n], np.zeros((len(slopes), more)), slopes[:, plan.n : own - more]])
-    names = [*model.states, *(f"disturbance {d}" for d in DISTURBED), *(f"bias {b}" for b in plan.biases)]
-    noise_of = np.asarray(numbers.process)
-    process = np.concatenate([noise_of[: plan.n], np.full(more, 1e-8), noise_of[plan.n : own - more]])
-    F, H, added = _late_readings(F, H, plan)
-    G = np.vstack([G, np.zeros((len(added), plan.inputs))])
-    names += added
-    F, G, waiting = delayed(F, G, plan.delays)
-    H = np.hstack([H, np.zeros((H.shape[0], len(waiting)))])
-    names += [f"{model.inputs[j]} {ago} ago" for j, ago in waiting]
-    every = [at.every for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
-    noise = np.diag(np.asarray(numbers.measurement) * every)
-    full = np.zeros(len(names))
-    full[:own] = process
-    kept = [i for i, name in enumerate(names) if name not in without]
-    names = [names[i] for i in kept]
-    vehicle = tuple(names.index(name) for name in model.states if name not in without)
-    unmoved = {f"disturbance {d}" for d in DISTURBED} | {f"bias {b}" for b in plan.biases}
-    moved = tuple(i for i, name in enumerate(names) if name not in unmoved)
-    return Seen(F[np.ix_(kept, kept)], G[kept], H[:, kept], np.diag(full[kept]), noise, tuple(names), vehicle, moved)
-
-
-def _late_readings(F: Array, H: Array, plan: Plan) -> tuple[Array, Array, list[str]]:
-    """The model with chains of samples for readings that arrive late."""
-    channel, names = 0, []
-    for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
-        rows = slice(channel, channel + len(sensor.channels))
-        channel = rows.stop
-        for step in range(at.late):
-            size, m = F.shape[0], len(sensor.channels)
-            larger = np.zeros((size + m, size + m))
-            larger[:size, :size], larger[size:, :size] = F, H[rows]
-            wider = np.hstack([H, np.zeros((H.shape[0], m))])
-            wider[rows] = 0.0
-            wider[rows, size:] = np.eye(m)
-            F, H = larger, wider
-            names += [f"{sensor.kind}.{name} {step + 1} ago" for name in sensor.channels]
-    return F, H, names
-
-
-def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
-    """Slopes of all channels by everything estimated, about a trim."""
-    enable_double_precision()
-    if not plan.sensors:
-        return np.zeros((0, len(plan.names)))
-    e = np.zeros((len(plan.names), 1))
-    e[: plan.n, 0] = trim.state
-    w = np.array([*trim.inputs, float(trim.environment.voltage)])[:, None]
-    made = Numbers(*(jnp.asarray(part) for part in numbers))
-    return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _outputs(plan: Plan, numbers: Numbers, e: Any, w: Any) -> Any:
-    M = JaxMatrices()
-    return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]
+_SHOWN_AS = {"range": ("z", -1.0), "height": ("z", -1.0)}
+"""Readings that show a state under another name, and their sign."""
 
 
 @dataclass(frozen=True)
@@ -197,19 +93,9 @@ def analyse_loop(
         points: of the frequency grid.
         where: the model's name.
     """
-    known = seen(plan, numbers, model, without=() if place else ("x", "y"))
-    truth = known
-    if later is not None:
-        truth = seen(replace(plan, delays=tuple(later)), numbers, model, without=() if place else ("x", "y"))
-    K, C = _gains(plan, model, gains, known, place)
-    plant = _plant(truth)
-    L, P = None, np.zeros_like(known.F)
-    if plan.sensors:
-        scale = np.array([typical(n.split(" ")[-1] if n.startswith(("dist", "bias")) else n) for n in known.names])
-        L, P = steady_filter(known.F, known.H, known.process, known.noise, known.names, scale=scale, where=where)
-        P = P - L @ known.H @ P
-    compensator = _compensator(known, K, C, L, plan.dt)
-    closed, entering = _closed(plant, compensator, L is not None)
+    parts = steady_loop(plan, numbers, model, gains, place=place, later=later, where=where)
+    known, truth, plant, compensator, P = parts
+    closed, entering = _closed(plant, compensator, bool(plan.sensors))
     values = np.linalg.eigvals(closed).astype(np.complex128)
     values = values[np.abs(values) > 1e-8]
     modes = np.asarray(np.log(values) * plan.rate, dtype=np.complex128)
@@ -236,9 +122,103 @@ def analyse_loop(
         modes,
         margins(w, loop, names),
         _spread(truth, closed, entering),
-        {} if L is None else {n: float(np.sqrt(max(P[i, i], 0.0))) for i, n in enumerate(known.names)},
+        {n: float(np.sqrt(max(P[i, i], 0.0))) for i, n in enumerate(known.names)} if plan.sensors else {},
         _delay_margin(w, loop),
     )
+
+
+class SteadyLoop(NamedTuple):
+    """A controller with its steady observer about a trim, and what it controls.
+
+    Attributes:
+        known, truth: the observer's model, and the aircraft (other delays).
+        plant: (A, B, H) of the truth without disturbances and biases.
+        compensator: (A, B, C, D) from readings to commands.
+        covariance: of the estimates.
+    """
+
+    known: Seen
+    truth: Seen
+    plant: tuple[Array, Array, Array]
+    compensator: tuple[Array, Array, Array, Array]
+    covariance: Array
+
+
+def steady_loop(
+    plan: Plan,
+    numbers: Numbers,
+    model: LinearModel,
+    gains: Array,
+    *,
+    place: bool,
+    later: Sequence[int] | None = None,
+    where: str = "",
+) -> SteadyLoop:
+    """The parts of a loop; arguments as in `analyse_loop`."""
+    known = seen(plan, numbers, model, without=() if place else ("x", "y"))
+    truth = known
+    if later is not None:
+        truth = seen(replace(plan, delays=tuple(later)), numbers, model, without=() if place else ("x", "y"))
+    K, C = _gains(plan, model, gains, known, place)
+    plant = _plant(truth)
+    L, P = None, np.zeros_like(known.F)
+    if plan.sensors:
+        scale = np.array([typical(n.split(" ")[-1] if n.startswith(("dist", "bias")) else n) for n in known.names])
+        L, P = steady_filter(known.F, known.H, known.process, known.noise, known.names, scale=scale, where=where)
+        P = P - L @ known.H @ P
+    return SteadyLoop(known, truth, plant, _compensator(known, K, C, L, plan.dt), P)
+
+
+def sensitivity(controller: Lqg, frequencies: Array, state: str, *, at: int = 0) -> NDArray[np.complex128] | None:
+    """What is left of a disturbance added to a state wherever a sensor shows it: (state + disturbance) / disturbance.
+
+    Args:
+        controller: with or without sensors.
+        frequencies: [rad/s], below Nyquist's.
+        state: its name; a height by sonar or pressure counts as z.
+        at: number of the trim.
+
+    Returns:
+        One number per frequency; None where no sensor shows the state.
+    """
+    plan, f = controller.plan, controller.feedback
+    parts = steady_loop(
+        plan,
+        controller.numbers,
+        linearize(controller.vehicle, _trim_of(controller, at)),
+        np.asarray(f.gains)[at],
+        place=float(f.place) > 0.5,
+    )
+    names = [parts.truth.names[i] for i in parts.truth.moved]
+    if state not in names:
+        return None
+    (_, B, _), (_, Bc, _, Dc) = parts.plant, parts.compensator
+    closed, _ = _closed(parts.plant, parts.compensator, bool(plan.sensors))
+    drive, shown = np.zeros(closed.shape[0]), False
+    for i, (channel, late) in enumerate(_channels(plan, parts.truth)):
+        name, sign = _SHOWN_AS.get(channel.split(".")[-1], (channel.split(".")[-1], 1.0))
+        if name != state:
+            continue
+        shown = True
+        if late:  # it enters the chain of samples that are on their way
+            drive[names.index(f"{channel} 1 ago")] += sign
+        else:
+            drive += sign * np.concatenate([B @ Dc[:, i], Bc[:, i]])
+    if not shown:
+        return None
+    pick = np.zeros((1, closed.shape[0]))
+    pick[0, names.index(state)] = 1.0
+    z = np.exp(1j * np.asarray(frequencies) / plan.rate)
+    return np.asarray(1.0 + _response(z, closed, drive[:, None], pick, None)[:, 0, 0], dtype=np.complex128)
+
+
+def _channels(plan: Plan, model: Seen) -> list[tuple[str, int]]:
+    """Of every reading its channel and how many samples late it is; without sensors the states."""
+    if not plan.sensors:
+        return [(model.names[i], 0) for i in model.vehicle]
+    return [
+        (f"{s.kind}.{name}", at.late) for s, at in zip(plan.sensors, plan.sampling, strict=True) for name in s.channels
+    ]
 
 
 def _delay_margin(w: Array, loop: Any) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control import observer
+from swashplate.control.linear_vehicle import delays_of
 from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_law import Feedback
 from swashplate.control.observer import Numbers, Plan, Unrest
@@ -59,7 +60,7 @@ def design(
     *,
     sensors: Suite = (),
     rate: float = 100.0,
-    delays: Mapping[str, float] | float = 0.0,
+    delays: Mapping[str, float] | float | None = None,
     holding: Holding = "place",
     speeds: Sequence[float] = (0.0,),
     allowed: Mapping[str, float] | None = None,
@@ -76,7 +77,8 @@ def design(
         vehicle: the model, published or identified.
         sensors: what the observer is told: `sensor_suite.suite("imu@100,mocap@100+10ms")`.
         rate: steps per second [Hz].
-        delays: from command to action [s], one for all or by input; rounded up to whole samples.
+        delays: from command to action [s], one for all or by input; rounded up to whole samples. Where not given those
+            that were identified with a linear model, otherwise none.
         holding: "place" and heading and height, or "speed" ahead and to the right with these.
         speeds: of the trims that the gains are scheduled over [m/s]; more than one needs holding "speed".
         allowed: deviations by state or integral that weigh as much as the effort (`ALLOWED`).
@@ -137,7 +139,9 @@ def design_states(vehicle: Vehicle, delays: Sequence[int]) -> tuple[str, ...]:
     return (*vehicle.state_names, *waiting, *SUMS)
 
 
-def _delays(vehicle: Vehicle, delays: Mapping[str, float] | float) -> list[float]:
+def _delays(vehicle: Vehicle, delays: Mapping[str, float] | float | None) -> list[float]:
+    if delays is None:
+        delays = delays_of(vehicle)
     if not isinstance(delays, Mapping):
         delays = dict.fromkeys(vehicle.input_names, float(delays))
     unknown = sorted(set(delays) - set(vehicle.input_names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,7 @@ def lqg_document(controller: Lqg) -> dict[str, Any]:
         "air": {"air_density": float(about.air_density), "gravity": float(about.gravity)},
         "sensors": [{"kind": s.kind, "rate": s.rate, "delay": s.delay, "sigma": list(s.sigma)} for s in plan.sensors],
         "unrest": controller.unrest._asdict(),
+        **({"steady": np.asarray(controller.numbers.steady).tolist()} if plan.period else {}),
         "feedback": {name: np.asarray(part).tolist() for name, part in f._asdict().items()},
         "card": tomllib.loads(controller.vehicle.card.to_toml()),
     }
@@ -74,6 +76,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
         waits = [float(document["delays"][name]) for name in vehicle.input_names]
         unrest = Unrest(**{name: float(value) for name, value in document["unrest"].items()})
         around = Environment(**{name: float(document["air"][name]) for name in ("air_density", "gravity")})
+        steady = np.asarray(document["steady"], dtype=np.float64) if "steady" in document else None
         parts = {name: np.asarray(document["feedback"][name], dtype=np.float64) for name in Feedback._fields}
     except (KeyError, TypeError, ValueError) as error:
         raise ControllerError(f"an entry is missing or no number: {error}.", where=path) from None
@@ -83,11 +86,20 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
     if not rate > 0.0 or not all(np.all(np.isfinite(part)) for part in parts.values()):
         raise ControllerError("holds numbers that are not finite, or no positive rate.", where=path)
     plan = Plan(equations_of(vehicle), sensors, rate, tuple(round(wait * rate) for wait in waits)).checked()
+    if steady is not None:
+        expected = (len(plan.names), len(plan.channels))
+        if steady.ndim != 3 or steady.shape[1:] != expected or not np.all(np.isfinite(steady)):
+            raise ControllerError(
+                f"has shape {steady.shape}, expected (samples of a cycle, {expected[0]}, {expected[1]}).",
+                where=path,
+                channel="steady",
+            )
+        plan = replace(plan, period=len(steady))
     feedback = Feedback(**parts)
     _check_sizes(vehicle, plan, feedback, path)
     around = around._replace(voltage=float(feedback.voltage))
     fade, process = observer.process_noise(plan, unrest)
-    numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan))
+    numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan), steady)
     start = Trim(
         feedback.states[0],
         feedback.inputs[0],

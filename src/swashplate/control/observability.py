@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control import observer
-from swashplate.control.lqg_analysis import Seen, seen
 from swashplate.control.lqg_design import typical
 from swashplate.control.observer import DISTURBED, Numbers, Plan, Unrest
 from swashplate.control.optimal import Direction, plain, shares, unseen
+from swashplate.control.seen import Seen, seen
 from swashplate.control.sensor_suite import BIASED, Suite
 from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.linearize import linearize

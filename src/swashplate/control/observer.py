@@ -114,12 +114,14 @@ class Plan:
         sensors: the suite.
         rate: steps per second [Hz].
         delays: of each input, in samples.
+        period: samples after which constant gains of the observer repeat; 0 where it finds its gains as it flies.
     """
 
     equations: Equations
     sensors: Suite
     rate: float
     delays: tuple[int, ...]
+    period: int = 0
 
     @property
     def dt(self) -> float:
@@ -190,16 +192,18 @@ class Numbers(NamedTuple):
         fade: 1 / time constant of the disturbances, six [1/s].
         process: variance that a sample adds to each estimate.
         measurement: variance of each channel.
+        steady: constant gains through a cycle, (period, N, channels); None where the observer finds them as it flies.
     """
 
     parameters: Any
     fade: Any
     process: Any
     measurement: Any
+    steady: Any = None
 
 
 class Estimate(NamedTuple):
-    """Estimates, a column (N, 1), and their covariance (N, N)."""
+    """Estimates, a column (N, 1), and their covariance (N, N), or (0, 0) with constant gains."""
 
     mean: Any
     covariance: Any
@@ -211,7 +215,7 @@ def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
     fade = np.repeat([1.0 / u.force_time, 1.0 / u.moment_time], 3)
     vehicle = plan.equations.vehicle
     white = {**dict.fromkeys("uvw", u.jolt), **dict.fromkeys("pq", u.twist), "r": u.twist_yaw}
-    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1"), u.flapping)
+    white |= dict.fromkeys(("alpha_lower", "beta_lower", "a1", "b1", "a", "b"), u.flapping)
     white |= dict.fromkeys(("eta_bar", "zeta_bar", "c", "d"), u.bar)
     white |= dict.fromkeys(("omega_lower", "omega_upper", "omega"), u.speed)
     inner = vehicle.state_names[_BODY:]
@@ -271,7 +275,7 @@ def shown(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: 
     return [value for sensor in plan.sensors for value in readings(sensor, body, force, bias, xp).values()]
 
 
-def _pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
+def pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
     """Of each sensor its sampling, its channels, and where its kept readings begin."""
     found, channel, place = [], 0, plan.n + 6 + len(plan.biases)
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
@@ -284,7 +288,7 @@ def _pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
 def arriving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """What should arrive now: fresh readings, and for late sensors the oldest one kept."""
     now = shown(plan, numbers, e, w, xp)
-    for at, part, place in _pieces(plan):
+    for at, part, place in pieces(plan):
         if at.kept:
             m = part.stop - part.start
             now[part] = list(e[place + m * (at.kept - 1) : place + m * at.kept])
@@ -294,7 +298,7 @@ def arriving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], x
 def keeping(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """Estimates with the readings taken now put in store; `w` ends in a flag per sensor: 1 where it takes one."""
     now, after = shown(plan, numbers, e, w, xp), list(e)
-    for number, (at, part, place) in enumerate(_pieces(plan)):
+    for number, (at, part, place) in enumerate(pieces(plan)):
         m, taken = part.stop - part.start, w[plan.inputs + 1 + number]
         for i in reversed(range(m * at.kept)):
             fresh = now[part.start + i] if i < m else e[place + i - m]
@@ -319,10 +323,7 @@ def corrected(
     xp = M.xp
     expected, H = M.linearised(lambda e, w: arriving(plan, numbers, e, w, xp), estimate.mean, w)
     heard = M.column([flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels])
-    away = M.scalars(y - expected)
-    for i, name in enumerate(plan.channels):
-        if name.endswith(".psi"):
-            away[i] = xp.atan2(xp.sin(away[i]), xp.cos(away[i]))
+    away = innovations_of(plan, y, expected, M)
     innovations, noise = M.column(away), M.column([numbers.measurement[i] for i in range(len(away))])
 
     def channel(i: Any, carry: Any) -> Any:
@@ -334,6 +335,15 @@ def corrected(
 
     after = M.repeated(len(away), channel, (estimate.mean, estimate.covariance))
     return Estimate(*after), innovations, H @ estimate.covariance @ H.T + np.eye(len(away)) * noise
+
+
+def innovations_of(plan: Plan, y: Any, expected: Any, M: Matrices) -> list[Any]:
+    """Readings less what was expected, headings the short way round."""
+    away = M.scalars(y - expected)
+    for i, name in enumerate(plan.channels):
+        if name.endswith(".psi"):
+            away[i] = M.xp.atan2(M.xp.sin(away[i]), M.xp.cos(away[i]))
+    return away
 
 
 def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: Sequence[Any], M: Matrices) -> Estimate:

@@ -130,7 +130,7 @@ def along(controller: Lqg, flight: Flight, pose: Array, *, ahead: float = 0.1) -
     found = _along(
         plan,
         steps,
-        Numbers(*(jnp.asarray(part) for part in controller.numbers)),
+        Numbers(*(None if part is None else jnp.asarray(part) for part in controller.numbers)),
         jnp.asarray(mean),
         jnp.asarray(variance * 10.0),
         jnp.asarray(read),

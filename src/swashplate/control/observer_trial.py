@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control.lqg import Lqg, SensedStep
+from swashplate.control.steady_observer import steady_sigmas
 from swashplate.simulation.closed_loop import REFERENCES, told
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
@@ -132,6 +133,7 @@ def trial(
         jnp.asarray(wanted),
         jnp.asarray(parameter_row(vehicle, controller.start.environment)),
         jnp.asarray(spread),
+        jnp.asarray(steady_sigmas(controller)[:n] if plan.period else np.zeros(n)),
     )
     truth, estimates, sigmas = (np.moveaxis(np.asarray(part), 0, 1) for part in found)
     judged = slice(round(_SETTLING * plan.rate), None)
@@ -168,6 +170,7 @@ def _fly(
     wanted: Any,
     p: Any,
     spread: Any,
+    promised: Any,
 ) -> Any:
     rates = row_rates(equations, padded=False)
     n, N, dt = x0.shape[0], len(control.plan.names), control.plan.dt
@@ -187,7 +190,10 @@ def _fly(
                 x,
             )
             after = after + spread * jax.random.normal(jax.random.fold_in(own, k), x.shape)
-            predicted = memory[:n], jnp.sqrt(jnp.diagonal(memory[N : N + N * N].reshape(N, N))[:n])
+            sure = promised  # constant gains carry no covariance
+            if not control.plan.period:
+                sure = jnp.sqrt(jnp.diagonal(memory[N : N + N * N].reshape(N, N))[:n])
+            predicted = memory[:n], sure
             return (after, memory, inputs, k + 1), (after, *predicted)
 
         start = (x0, memory, jnp.zeros(len(equations.vehicle.input_names)), 0)

@@ -82,6 +82,8 @@ def draw_models(
 def _document(path: str | Path) -> dict[str, Any]:
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ControllerError("there is no such file.", where=path, hint="Check the path.") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise ControllerError(f"cannot be read as a fit: {error}.", where=path) from None
     if not isinstance(document, dict) or document.get("kind") != "fit":

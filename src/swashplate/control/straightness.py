@@ -84,7 +84,7 @@ def step_paths(
         ControllerError: where no flight covers the distance.
     """
     flown = _fly(vehicle, controller, trim, command, duration, size, parameters)
-    return _paths(flown, command, distance)
+    return paths_of(flown, command, distance)
 
 
 def step_run(
@@ -107,13 +107,13 @@ def step_run(
         ControllerError: where no flight covers the distance.
     """
     own = _fly(vehicle, controller, trim, command, duration, 1, None)
-    path = _paths(own, command, distance)
+    path = paths_of(own, command, distance)
     flight = own.flight(0).between(0.0, float(path.time[0]))
     if not parameters:
         return StepRun(flight, path, None, ())
     size = len(next(iter(parameters.values())))
     many = _fly(vehicle, controller, trim, command, duration, size, parameters)
-    drawn = _paths(many, command, distance)
+    drawn = paths_of(many, command, distance)
     tracks = []
     for i in range(min(size, _TRACKS)):
         until = many.time <= (drawn.time[i] if np.isfinite(drawn.time[i]) else duration)
@@ -181,7 +181,12 @@ def _fly(
     )
 
 
-def _paths(flown: Batch, command: float, distance: float) -> Path:
+def paths_of(flown: Batch, command: float, distance: float) -> Path:
+    """Where flights went until they had covered a distance [m]; `command` is what they were asked for, for messages.
+
+    Raises:
+        ControllerError: where no flight covers it.
+    """
     x, y, u = flown["x"], flown["y"], flown["u"]
     covered = np.hypot(x, y) >= distance
     arrived = np.any(covered, axis=0)

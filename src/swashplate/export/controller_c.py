@@ -164,7 +164,12 @@ def _heading(controller: Autopilot | Lqg, traced: _Traced, precision: Precision)
  * reference  {", ".join(Reference._fields)}
  * command    {", ".join(traced.commands)}
  * memory     {traced.memory}; starts as swash_memory says
+ *
+ * swash_step keeps its temporaries in a static array: one caller at a time. swash_step_in takes them from its
+ * caller, {precision} work[SWASH_WORK], which need not survive between steps; with a memory and a work of its own
+ * each caller may interrupt every other.
  */
+#define SWASH_WORK {counts[0] + counts[2] + max(int(traced.function.sz_w()), 1)}
 """
 
 
@@ -173,25 +178,30 @@ def _ending(traced: _Traced, precision: Precision) -> str:
     suffix = "f" if precision == "float" else ""
     # Dots keep them floating numbers; 17 digits bring a double back as it was.
     start = ",\n  ".join(f"{value!r}{suffix}" for value in traced.start)
-    work, whole = int(f.sz_w()), int(f.sz_iw())
+    whole = int(f.sz_iw())
     return f"""
 const {precision} swash_memory[{n}] = {{
   {start}
 }};
 
-void swash_step({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
-                const {precision} reference[8], {precision} command[{m}]) {{
-  static {precision} after[{n + m}], w[{max(work, 1)}];
-  static int iw[{max(whole, 1)}];
+void swash_step_in({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
+                   const {precision} reference[8], {precision} command[{m}], {precision} work[SWASH_WORK]) {{
+  int iw[{max(whole, 1)}];
   const {precision} *arg[{max(int(f.sz_arg()), 3)}];
   {precision} *res[{max(int(f.sz_res()), 1)}];
   int i;
   arg[0] = memory;
   arg[1] = measured;
   arg[2] = reference;
-  res[0] = after;
-  swash_traced(arg, res, iw, w, 0);
-  for (i = 0; i < {n}; ++i) memory[i] = after[i];
-  for (i = 0; i < {m}; ++i) command[i] = after[{n} + i];
+  res[0] = work;
+  swash_traced(arg, res, iw, work + {n + m}, 0);
+  for (i = 0; i < {n}; ++i) memory[i] = work[i];
+  for (i = 0; i < {m}; ++i) command[i] = work[{n} + i];
+}}
+
+void swash_step({precision} memory[{n}], const {precision} measured[{len(traced.measured)}],
+                const {precision} reference[8], {precision} command[{m}]) {{
+  static {precision} work[SWASH_WORK];
+  swash_step_in(memory, measured, reference, command, work);
 }}
 """

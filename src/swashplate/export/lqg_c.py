@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.lqg import Carried, Lqg, lqg_step
+from swashplate.control.lqg import Carried, Lqg, lqg_step, sizes
 from swashplate.control.lqg_law import LAW_MEMORY
 from swashplate.control.matrices import Scalars
 from swashplate.control.observer import Estimate
@@ -35,7 +35,15 @@ class CasadiMatrices:
         return [column[i] for i in range(column.shape[0])]
 
     def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
-        return self.linearised(f, x, w)[0]
+        """Without the slopes, which a call would compute all the same."""
+        import casadi
+
+        key = (f.__code__, x.shape[0], w.shape[0], "value")
+        if key not in self._made:
+            xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
+            found = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [found])
+        return self._made[key](x, w)
 
     def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
         """Traced once per place in the program: the four stages of a Runge-Kutta step call one function."""
@@ -66,21 +74,24 @@ def lqg_function(controller: Lqg) -> Any:
     import casadi
 
     plan = controller.plan
-    N = len(plan.names) if plan.sensors else 0
-    m, depth, sensors = plan.inputs, max(plan.delays) + 1, len(plan.sensors)
+    N, rows, sensors = sizes(plan)
+    m, depth = plan.inputs, max(plan.delays) + 1
     readings = len(plan.channels) if plan.sensors else plan.n
     memory = casadi.MX.sym("memory", controller.inner_memory.size)
     measured, reference = casadi.MX.sym("measured", readings + 1), casadi.MX.sym("reference", len(REFERENCES))
-    rest = memory[N + N * N :]
+    rest = memory[N + rows * rows :]
     given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
     counts = [rest[depth * m + i] for i in range(sensors)]
     law = [rest[depth * m + sensors + i] for i in range(LAW_MEMORY)]
-    estimate = Estimate(memory[:N], casadi.reshape(memory[N : N + N * N], N, N))
+    estimate = Estimate(memory[:N], casadi.reshape(memory[N : N + rows * rows], rows, rows))
     gains = [casadi.DM(np.asarray(each)) for each in controller.feedback.gains]
     feedback = controller.feedback._replace(gains=gains)
+    numbers = controller.numbers
+    if plan.period:  # columns of readings that are not due vanish from the code
+        numbers = numbers._replace(steady=[casadi.sparsify(casadi.DM(np.asarray(each))) for each in numbers.steady])
     after, commands = lqg_step(
         plan,
-        controller.numbers,
+        numbers,
         feedback,
         Carried(estimate, given, counts, law),
         measured[:readings],
@@ -89,7 +100,7 @@ def lqg_function(controller: Lqg) -> Any:
         CasadiMatrices(),
     )
     flat = [value for row in after.given for value in row] + after.counts + after.law
-    covariance = [casadi.reshape(casadi.densify(after.estimate.covariance), N * N, 1)] if N else []
+    covariance = [casadi.reshape(casadi.densify(after.estimate.covariance), rows * rows, 1)] if rows else []
     mean = [after.estimate.mean] if N else []
     result = casadi.vertcat(*mean, *covariance, *flat, *commands)
     return casadi.Function("swash_traced", [memory, measured, reference], [result])

@@ -21,6 +21,8 @@ rates = {w = "1"}                            # coefficients of the states' deriv
 # specific_force = "z", at = ["x_s", "y_s", "z_s"]   an accelerometer at a place from the centre of gravity
 [delays]
 collective = "tau"                           # by input, or by "output/input"
+[limits]                                     # of inputs, from the trim; only a controller needs them
+collective = [-1.0, 1.0]
 
 [parameters]
 Zw = {value = -0.6, unit = "1/s", upper = 0.0}
@@ -59,6 +61,7 @@ _SECTIONS = {
     "outputs",
     "delays",
     "parameters",
+    "limits",
     "fit",
 }
 _PARAMETER = {
@@ -264,6 +267,14 @@ class _Reader:
             if at[place] not in (0, "0", 0.0):
                 self._add("H1", row, self._state(rate, entry), f"{sign}({at[place]})", entry)
 
+    def _check_limits(self) -> None:
+        for name, ends in self._table("limits").items():
+            if name not in self.inputs:
+                raise CardError("is no input of this model.", where=self.path, channel=f"limits.{name}")
+            numbers = isinstance(ends, list) and len(ends) == 2
+            if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) for v in ends):
+                raise CardError(f"is {ends!r}, expected [low, high].", where=self.path, channel=f"limits.{name}")
+
     def model(self) -> StateSpaceModel:
         for name, table in self._table("left").items():
             row = self._state(name, f"left.{name}")
@@ -295,6 +306,7 @@ class _Reader:
                 )
             delays[name] = self._expression(text, f"delays.{name}")
             self.used |= delays[name].names
+        self._check_limits()
         idle = sorted(set(self.parameters) - self.used)
         if idle:
             raise CardError(

@@ -39,7 +39,8 @@ def style(i: int) -> tuple[str, str]:
     return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
 
 
-def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
+def over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
+    """Layout of panels over one logarithmic frequency axis [rad/s]."""
     layout = stacked(titles, height=height, x_title="frequency [rad/s]")
     for k in range(len(titles)):
         layout[f"xaxis{'' if k == 0 else k + 1}"]["type"] = "log"
@@ -48,7 +49,7 @@ def _over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any
 
 def loops_figure(check: ControlCheck) -> Figure:
     """Every loop opened at its input, the others closed: gain and phase."""
-    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout = over_frequency(["gain [dB]", "phase [deg]"])
     layout["yaxis2"] |= {"tick0": 0, "dtick": 90}
     traces, keys = [], []
     m = len(check.vehicle.input_names)
@@ -82,7 +83,7 @@ def loops_figure(check: ControlCheck) -> Figure:
 
 def rejection_figure(check: ControlCheck) -> Figure:
     """What is left of a disturbance on each state that is held."""
-    layout = _over_frequency(["|S| [dB]"], height=280)
+    layout = over_frequency(["|S| [dB]"], height=280)
     layout["yaxis"]["range"] = [-40, 12]
     traces, keys = [], []
     for i, r in enumerate(check.rejections):
@@ -90,7 +91,7 @@ def rejection_figure(check: ControlCheck) -> Figure:
         hover = f"{r.state}<br>%{{x:.3g}} rad/s, %{{y:.2f}} dB"
         traces.append(line(r.omega, 20.0 * np.log10(r.size), name=r.state, color=color, dash=dash, hover=hover))
         keys.append(Key(r.state, color, dash))
-    ends = check.omega[[0, -1]]
+    ends = check.rejections[0].omega[[0, -1]]
     for level, words in ((-3.0, "-3 dB: bandwidth"), (5.0, "5 dB: Level 1 peak")):
         traces.append(line(ends, [level, level], name=words, color=GREY, dash="dot", hover=words))
     keys.append(Key("-3 dB (bandwidth) and 5 dB (peak)", GREY, "dot"))
@@ -107,7 +108,7 @@ def rejection_figure(check: ControlCheck) -> Figure:
 
 def attitude_figure(check: ControlCheck) -> Figure:
     """Responses of the attitudes to the pilot's commands, with the bandwidths."""
-    layout = _over_frequency(["gain [dB]", "phase [deg]"])
+    layout = over_frequency(["gain [dB]", "phase [deg]"])
     layout["yaxis2"] |= {"tick0": 0, "dtick": 90}
     traces, keys = [], []
     for i, a in enumerate(check.attitudes):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,13 @@ _STRAIGHT = 0.15
 
 
 def straightness_report(
-    vehicle: Vehicle, runs: Mapping[str, StepRun], *, command: float, lag: float, path: str | os.PathLike[str]
+    vehicle: Vehicle,
+    runs: Mapping[str, StepRun],
+    *,
+    command: float,
+    lag: float,
+    path: str | os.PathLike[str],
+    sources: Sequence[tuple[str, float]] = (),
 ) -> Path:
     """Write one self-contained HTML file that compares the step's paths.
 
@@ -39,6 +45,7 @@ def straightness_report(
         command: the step of the pitch command.
         lag: that the law takes out at hover [deg].
         path: where to write; the folder is made where it is missing.
+        sources: of the drawn models' drift, from `drift_sources`.
 
     Raises:
         SwashError: a place that cannot be written to.
@@ -46,14 +53,23 @@ def straightness_report(
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(compose_straightness(vehicle, runs, command=command, lag=lag)))
+        return write_text(
+            target, render(compose_straightness(vehicle, runs, command=command, lag=lag, sources=sources))
+        )
     except OSError as error:
         raise SwashError(
             f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
         ) from None
 
 
-def compose_straightness(vehicle: Vehicle, runs: Mapping[str, StepRun], *, command: float, lag: float) -> Report:
+def compose_straightness(
+    vehicle: Vehicle,
+    runs: Mapping[str, StepRun],
+    *,
+    command: float,
+    lag: float,
+    sources: Sequence[tuple[str, float]] = (),
+) -> Report:
     """The report's structure."""
     bare, law = runs["without"], runs["with"]
     drift = [float(run.path.drift[0]) for run in (bare, law)]
@@ -76,7 +92,7 @@ def compose_straightness(vehicle: Vehicle, runs: Mapping[str, StepRun], *, comma
         banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
         summary=tuple(summary),
         picture=_path_figure(runs),
-        sections=(_numbers(runs, lag), _time(runs), _made(vehicle)),
+        sections=(_numbers(runs, lag, vehicle, sources), _time(runs), _made(vehicle)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
@@ -128,7 +144,24 @@ def _path_figure(runs: Mapping[str, StepRun]) -> Figure:
     )
 
 
-def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
+def _sources(vehicle: Vehicle, sources: Sequence[tuple[str, float]]) -> Table:
+    card = vehicle.card.parameters
+    rows = tuple(
+        (Cell(name), Cell(card[name].unit if name in card else ""), Cell(f"{100.0 * share:.0f}", number=True))
+        for name, share in sources
+    )
+    return Table(
+        "What makes the drawn models' drift differ, with the law",
+        ("number", "unit", "share of the variance [%]"),
+        rows,
+        note="Linear regression over the drawn models. A step flown once with the law measures it: "
+        "`swash decouple ... --drift` takes what was seen out of the law.",
+    )
+
+
+def _numbers(
+    runs: Mapping[str, StepRun], lag: float, vehicle: Vehicle, sources: Sequence[tuple[str, float]]
+) -> Section:
     rows = []
     for name, run in runs.items():
         own = [float(getattr(run.path, key)[0]) for key in ("drift", "leftmost", "rightmost", "speed", "time")]
@@ -150,6 +183,8 @@ def _numbers(runs: Mapping[str, StepRun], lag: float) -> Section:
             "unless a constant lag is chosen that absorbs it."
         ),
     ]
+    if sources:
+        blocks.append(_sources(vehicle, sources))
     return Section("path", "The path in numbers", tuple(blocks))
 
 

@@ -11,9 +11,11 @@ from swashplate.errors import CardError
 from swashplate.vehicles.card import Card, packaged_cards, read_card
 from swashplate.vehicles.coax import coax
 from swashplate.vehicles.conventional import conventional
+from swashplate.vehicles.linear import NAME as LINEAR
+from swashplate.vehicles.linear import linear
 from swashplate.vehicles.vehicle import Vehicle
 
-_EQUATIONS: Mapping[str, Callable[[Card], Vehicle]] = {"coax": coax, "conventional": conventional}
+_EQUATIONS: Mapping[str, Callable[[Card], Vehicle]] = {"coax": coax, "conventional": conventional, LINEAR: linear}
 
 
 def from_card(card: Card) -> Vehicle:

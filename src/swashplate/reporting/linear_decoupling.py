@@ -1,0 +1,166 @@
+"""The decoupling of a linear model as a page: off-axis over on-axis response against frequency, and what steps do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swashplate.atomic import write_text
+from swashplate.control.linear_decoupling import Decoupling, coupling
+from swashplate.errors import SwashError
+from swashplate.reporting.figures_control import over_frequency, style
+from swashplate.reporting.html import render
+from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
+from swashplate.reporting.theme import line, stacked
+from swashplate.reporting.versions import date, versions
+
+_WORDS = {"bare": "bare inputs", "matrix": "constant matrix", "filter": "filter"}
+_LOW, _HIGH, _POINTS = 0.3, 60.0, 120
+"""rad/s, of the plots."""
+_STEP = 2.0
+"""Seconds of the step's answers."""
+
+
+def decoupling_report(
+    model: Any,
+    made: Mapping[str, Decoupling | None],
+    *,
+    name: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    frequency: float,
+    problem: str | None,
+    path: str | os.PathLike[str],
+) -> Path:
+    """Write one self-contained HTML file.
+
+    Args:
+        model: `control.StateSpace` that it is judged on.
+        made: "bare" (None), "matrix" and, where there is one, "filter".
+        name: of the model.
+        inputs, outputs: paired in order.
+        frequency: where the matrix was made [rad/s].
+        problem: why there is no filter.
+        path: where to write; the folder is made where it is missing.
+
+    Raises:
+        SwashError: a place that cannot be written to.
+    """
+    target = Path(path)
+    axes = {"inputs": list(inputs), "outputs": list(outputs)}
+    w = np.geomspace(_LOW, _HIGH, _POINTS)
+    ratios = {words: coupling(model, w, by=by, **axes) for words, by in made.items()}
+    pairs = [(i, k) for i in range(len(outputs)) for k in range(len(outputs)) if i != k]
+    near = int(np.argmin(np.abs(w - frequency)))
+    worst = {words: max(float(found[i, k, near]) for i, k in pairs) for words, found in ratios.items()}
+    told = "; ".join(f"{_WORDS[words]} {100.0 * value:.3g} %" for words, value in worst.items())
+    report = Report(
+        title=f"{name}: decoupling of {', '.join(outputs)}",
+        banners=(("caution", f"No filter: {problem}"),) if problem else (),
+        summary=(
+            ("Axes", ", ".join(f"{i} moves {o}" for i, o in zip(inputs, outputs, strict=True)), "plain"),
+            ("Coupling", f"largest off-axis over on-axis response at {frequency:g} rad/s: {told}.", "plain"),
+            ("Judged", "on the model that it was made from, where the filter is exact; flown, it is as good as that.",
+             "caution"),
+        ),
+        picture=_ratio_figure(w, ratios, pairs, outputs),
+        sections=(_steps(model, made, axes), _numbers(made, axes, frequency)),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )  # fmt: skip
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(report))
+    except OSError as error:
+        raise SwashError(
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
+
+
+def _keys(made: Sequence[str]) -> tuple[Key, ...]:
+    return tuple(Key(_WORDS[words], *style(number)) for number, words in enumerate(made))
+
+
+def _ratio_figure(
+    w: Any, ratios: Mapping[str, Any], pairs: Sequence[tuple[int, int]], outputs: Sequence[str]
+) -> Figure:
+    layout = over_frequency([f"{outputs[i]} over {outputs[k]} [%]" for i, k in pairs])
+    traces = []
+    for panel, (i, k) in enumerate(pairs):
+        layout[f"yaxis{'' if panel == 0 else panel + 1}"]["type"] = "log"
+        for number, (words, found) in enumerate(ratios.items()):
+            color, dash = style(number)
+            shown = 100.0 * np.maximum(found[i, k], 1e-5)  # an exact filter leaves rounding
+            hover = f"{_WORDS[words]}<br>%{{x:.3g}} rad/s, %{{y:.3g}} %"
+            axis = "" if panel == 0 else str(panel + 1)
+            traces.append(line(w, shown, name=words, color=color, dash=dash, hover=hover, axis=axis))
+    return Figure(
+        identifier="key-picture",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption="Off-axis over on-axis response; 100 % is as much across as along.",
+        alt="Off-axis over on-axis response against frequency, bare, with the matrix and with the filter.",
+        keys=_keys(list(ratios)),
+    )
+
+
+def _steps(model: Any, made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]]) -> Section:
+    """Both outputs on a step of each axis, scaled so that the on-axis answer's largest is one."""
+    import control
+
+    outputs = axes["outputs"]
+    plant = model[list(outputs), list(axes["inputs"])]
+    time = np.linspace(0.0, _STEP, 201)
+    titles = [f"{o} on {axis}'s axis" for axis in outputs for o in outputs]
+    layout, traces = stacked(titles, height=95), []
+    for number, by in enumerate(made.values()):
+        color, dash = style(number)
+        system = plant if by is None else plant * by.system
+        for k in range(len(outputs)):
+            push = np.zeros((len(outputs), time.size))
+            push[k] = 1.0
+            answer = np.atleast_2d(control.forced_response(system, time, push).outputs)
+            answer = (
+                answer / max(float(np.max(np.abs(answer[k]))), 1e-12) * np.sign(answer[k, np.argmax(np.abs(answer[k]))])
+            )
+            for i in range(len(outputs)):
+                panel = k * len(outputs) + i
+                axis = "" if panel == 0 else str(panel + 1)
+                traces.append(line(time, answer[i], name=titles[panel], color=color, dash=dash, axis=axis))
+    figure = Figure(
+        identifier="decoupled-steps",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"A step of each axis for {_STEP:g} s, in units of the largest on-axis answer.",
+        alt="Answers of all outputs to a step of each axis.",
+        keys=_keys(list(made)),
+    )
+    return Section("steps", "Steps", (figure,))
+
+
+def _numbers(made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[str]], frequency: float) -> Section:
+    blocks: list[Block] = []
+    matrix, filtered = made["matrix"], made.get("filter")
+    if matrix is not None:
+        rows = tuple(
+            (Cell(name), *(Cell(f"{value:+.4f}", number=True) for value in row))
+            for name, row in zip(axes["inputs"], matrix.matrix, strict=True)
+        )
+        title = f"The matrix, made at {frequency:g} rad/s"
+        blocks.append(Table(title, ("input", *(f"{o}'s axis" for o in axes["outputs"])), rows))
+    if filtered is not None:
+        modes = np.asarray(filtered.system.poles())
+        modes = modes[np.argsort(-modes.real)]
+        rows = tuple(
+            (Cell(f"{m.real:+.3f}", number=True), Cell(f"{abs(m.imag):.3f}", number=True))
+            for m in modes
+            if m.imag >= 0.0
+        )
+        blocks.append(Table("The filter's modes", ("real part [1/s]", "imaginary part [1/s]"), rows))
+    blocks.append(
+        Text("The matrix's columns leave the on-axis gains as they were. Falb and Wolovich (1967) for the filter.")
+    )
+    return Section("numbers", "Matrix and filter", tuple(blocks))
