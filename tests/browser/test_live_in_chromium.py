@@ -150,6 +150,23 @@ def test_the_helicopter_moves_under_the_stick_and_charts_advance(visit_: Any, co
     visit.done()
 
 
+def test_pictures_come_rarer_while_steps_are_late_and_more_often_again(visit_: Any, coax: str) -> None:
+    visit = visit_(coax).flies()
+    assert visit.of("swash.scene.software"), "this browser draws in software"
+    late = "new swash.pace.constructor(true)"
+    told = "Array.from({length: 8}, (_, i) => (p.told({steps: 100 * i, late: %s}), p.interval))"
+    slower = visit.of(f"(() => {{ const p = {late}; return {told % '5 * i'}; }})()")
+    assert slower[0] == 100.0
+    assert slower[-1] == 400.0
+    back = visit.of(f"(() => {{ const p = {late}; p.interval = 400; return {told % '0'}; }})()")
+    assert back[-1] < 350.0
+    drawn = "Number(document.documentElement.dataset.drawn)"
+    before = visit.of(drawn)
+    visit.page.wait_for_timeout(1000)
+    assert visit.of(drawn) - before <= 11, "ten a second at most"
+    visit.done()
+
+
 def test_decoupling_changes_the_path_of_the_same_stick(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
     visit.page.check("#ghost")

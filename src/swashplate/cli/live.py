@@ -54,9 +54,10 @@ def live(
             from swashplate.control.autopilot import Autopilot
             from swashplate.control.controller_file import read_controller
             from swashplate.links.live.session import Session
-            from swashplate.simulation.compilation import enable_compilation_cache
+            from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
 
             enable_compilation_cache()
+            dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
             chosen = None if controller is None else read_controller(controller)
             if chosen is not None and not isinstance(chosen, Autopilot):
                 raise SwashError(
