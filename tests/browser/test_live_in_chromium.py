@@ -226,7 +226,7 @@ def test_time_stops_steps_and_runs_slower(visit_: Any, coax: str) -> None:
     visit.done()
 
 
-def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...]) -> None:
+def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...], how: str = "model") -> None:
     visit.page.click("#faster")
     visit.page.click("#faster")
     visit.page.click("#record")
@@ -239,6 +239,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...]) -> None:
     visit.until(f"swash.now.recording > {seconds}")
     visit.page.click("#record")
     visit.until("swash.now.recordings.length > 0")
+    visit.page.select_option("#how", how)
     visit.page.click("#identify")
     visit.until("swash.now.job && swash.now.job[1] === 'running'")
     visit.until("swash.now.job[1] !== 'running'", seconds=900.0)
@@ -254,7 +255,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...]) -> None:
 def test_what_is_recorded_is_identified_and_reported(visit_: Any, raptor: str) -> None:
     visit = visit_(raptor).flies()
     visit.page.click("[data-mode=position]")
-    _identified(visit, seconds=10.0, axes=("roll", "pitch"))
+    _identified(visit, seconds=10.0, axes=("roll", "pitch"), how="responses")
     assert visit.of("swash.scene.crafts.own.model.bar !== null")
     visit.done()
 

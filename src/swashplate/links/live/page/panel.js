@@ -38,7 +38,7 @@ export class Panel {
     $("slower").onclick = () => this.#faster(-1);
     $("faster").onclick = () => this.#faster(1);
     $("record").onclick = () => say("record", { value: this.now?.recording === null });
-    $("identify").onclick = () => say("identify", { recording: Number($("which").value) });
+    $("identify").onclick = () => say("identify", { recording: Number($("which").value), how: $("how").value });
     $("stop-identifying").onclick = () => say("stop_identifying");
   }
 
