@@ -35,7 +35,8 @@ def export(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="A vehicle's name, a card or model file, a linear model's file, or a controller's file.",
+            help="A vehicle's name, a card or model file, a linear model's file (also .json or .mat of an export), "
+            "or a controller's file.",
         ),
     ],
     form: Annotated[
@@ -143,16 +144,20 @@ def _model(
     switched: list[str] | None,
 ) -> Export:
     import swashplate as sp
+    from swashplate.export.control_json import read_linear
     from swashplate.export.formats import export_model
+    from swashplate.export.matlab import read_matlab
 
-    if _kind(model) == "state-space":
+    ending = Path(model).suffix.lower()
+    if ending in (".json", ".mat") or _kind(model) == "state-space":
         if speed is not None or mass is not None or changed or switched:
             raise SwashError(
                 "is a linear model: it has no speed, card or options to change.",
                 where=model,
                 hint="Export it as it is.",
             )
-        return export_model(sp.structure(model), form.value, name=name, precision=precision.value)
+        linear = {".json": read_linear, ".mat": read_matlab}.get(ending, sp.structure)(model)
+        return export_model(linear, form.value, name=name, precision=precision.value)
     asked = given.conditions(model, speed=speed or "0", mass=mass, changed=changed, switched=switched)
     if len(asked.speeds) != 1:
         raise SwashError("takes one speed.", channel="--speed", hint="Give a single number.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from swashplate.export.traced import Traced
 
 Format = Literal["c", "fmu", "ardupilot-statespace", "control", "matlab", "simulink"]
-Model = Vehicle | StateSpaceModel
+Model = Vehicle | StateSpaceModel | Linear
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ def export_model(
     """A vehicle or a linear model in another program's format.
 
     Args:
-        model: a vehicle (packaged, a card's or identified) or a linear model as `swash fit-ss` writes it.
+        model: a vehicle (packaged, a card's or identified) or a linear model, as `swash fit-ss` writes it or as
+            `read_linear` and `read_matlab` read it.
         form: "c", "fmu", "ardupilot-statespace", "control", "matlab" or "simulink".
         name: what files and C functions begin with.
         trim: where a vehicle starts, and what its linear model is about; hover where none is given.
@@ -62,7 +63,7 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(_MAKERS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
-    if trim is not None and isinstance(model, StateSpaceModel):
+    if trim is not None and not isinstance(model, Vehicle):
         raise ExportError("a linear model holds at the one flight that it was identified in.", channel="--speed")
     called = identifier(name)
     about = trim
@@ -72,6 +73,8 @@ def export_model(
 
 
 def _linear(model: Model, about: Trim | None, name: str) -> Linear:
+    if isinstance(model, Linear):
+        return replace(model, name=name)
     if isinstance(model, StateSpaceModel):
         return of_state_space(model, name=name)
     assert about is not None
@@ -119,7 +122,7 @@ def _matlab(model: Model, about: Trim | None, name: str, precision: Precision) -
 def _ardupilot(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
     from swashplate.export.ardupilot_state_space import Sticks, ardupilot_state_space, to_json
 
-    sticks = Sticks({}) if about is None or isinstance(model, StateSpaceModel) else _sticks(model, about)
+    sticks = _sticks(model, about) if about is not None and isinstance(model, Vehicle) else Sticks({})
     numbers, notes = ardupilot_state_space(_linear(model, about, name), sticks)
     return Export(_encoded({f"{name}_ardupilot.json": to_json(numbers)}), notes)
 
@@ -142,8 +145,8 @@ def _sticks(vehicle: Vehicle, trim: Trim) -> Sticks:
 def _traced(model: Model, about: Trim | None, name: str) -> Traced:
     from swashplate.export.traced import trace_linear, trace_vehicle
 
-    if isinstance(model, StateSpaceModel):
-        return trace_linear(of_state_space(model, name=name), name=name)
+    if not isinstance(model, Vehicle):
+        return trace_linear(_linear(model, about, name), name=name)
     assert about is not None
     return trace_vehicle(model, about, name=name)
 

@@ -162,7 +162,9 @@ def parse_card(text: str, *, path: str = "") -> Card:
     except tomllib.TOMLDecodeError as error:
         raise CardError(f"is not TOML: {error}.", where=path) from None
     if document.get("kind") != "vehicle":
-        raise CardError(f"kind is {document.get('kind')!r}, expected 'vehicle'.", where=path)
+        linear = "A linear model holds near one flight and has no place, ground or rotor: `swash export` takes it."
+        hint = linear if document.get("kind") == "state-space" else None
+        raise CardError(f"kind is {document.get('kind')!r}, expected 'vehicle'.", where=path, hint=hint)
     if document.get("schema", 0) > CARD_SCHEMA:
         raise CardError(
             f"schema {document['schema']} is newer than {CARD_SCHEMA}.", where=path, hint="Update swashplate."
