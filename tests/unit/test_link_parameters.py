@@ -40,7 +40,7 @@ def raptor() -> dict[str, float]:
 
 
 def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[str, float]) -> None:
-    """Armed on the ground, interlock, run-up (at 400), lift-off and hover with the file's own gains, loops at 400 Hz."""
+    """Armed on the ground, interlock, run-up, lift-off and hover with the gains of the file, loops at 400 Hz."""
     axes = ("RLL", "PIT", "YAW")
     angle = tuple(raptor[f"ATC_ANG_{axis}_P"] for axis in axes)
     rate = {k: tuple(raptor[f"ATC_RAT_{axis}_{k}"] for axis in axes) for k in ("FF", "P", "I")}

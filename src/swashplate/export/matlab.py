@@ -71,11 +71,15 @@ def read_matlab(path: str | Path) -> Linear:
         units |= dict(zip(names, _texts(found, f"{kind}_units", path), strict=True))
     shapes = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m)}
     name, title, trust = (str(found[key]) if isinstance(found.get(key), str) else "" for key in _WORDS)
+    A, B, C, D = (_numbers(found, key, shape, path) for key, shape in shapes.items())
     return Linear(
         name,
         title,
         trust,
-        *(_numbers(found, key, shape, path) for key, shape in shapes.items()),
+        A,
+        B,
+        C,
+        D,
         states,
         inputs,
         outputs,
