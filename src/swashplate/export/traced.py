@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -166,8 +166,12 @@ class _Remembering(CasadiBackend):
         return found
 
 
-def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
+def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Traced:
     """A vehicle's equations, its numbers as parameters, and a trim to start from.
+
+    Args:
+        vehicle, trim, name: what is traced, where it starts, what its C begins with.
+        delays: of inputs by name [s]; none where not given (see `linear.logged_delays`).
 
     Raises:
         ExportError: without CasADi.
@@ -227,6 +231,7 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
         readings=function([force]),
         jacobians=function(hiding.shown(slopes)),
         looped=looping.looped([x, u, rest, p], [with_roots]) if looping.roots else None,
+        delays=tuple(delays.get(a, 0.0) for a in vehicle.input_names) if delays and any(delays.values()) else (),
     )
 
 

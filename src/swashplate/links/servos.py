@@ -147,8 +147,9 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
     except tomllib.TOMLDecodeError as error:
         raise LinkError(f"is not TOML: {error}.", where=where) from None
     table = Table(document, where)
-    if table.text("kind") != "servo-mapping" or table.number("schema") != 1:
-        raise table.error("kind", "is not a servo mapping of schema 1.")
+    if document.get("kind") != "servo-mapping" or document.get("schema") != 1:
+        raise table.error("kind", 'is no servo mapping: expected kind = "servo-mapping" and schema = 1.')
+    table.text("kind"), table.number("schema")
     table.text("title")
     meant = table.text("vehicle")
     if meant != vehicle.name or meant not in _KINDS:
