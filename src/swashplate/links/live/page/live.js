@@ -55,6 +55,7 @@ function heard(message) {
     charts.add(now.t, now.own, now.ghost);
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
   }
+  panel.now = now; // what buttons act on is never older than what was heard
   pace.told(now);
 }
 

@@ -94,7 +94,6 @@ export class Panel {
   }
 
   show(now, latency) {
-    this.now = now;
     const { setting } = now;
     for (const button of document.querySelectorAll("[data-mode]"))
       press(button, button.dataset.mode === setting.mode);
