@@ -78,7 +78,7 @@ class HeliAutopilot:
 
     Attributes:
         send: gives a packet to the physics and returns its answer.
-        rate: frames per second [Hz]; the loops run in every frame.
+        rate: frames per second [Hz] (SIM_RATE_HZ). every: the loops run in every so many of them.
         outputs: 16 or 32.
         sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
         log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep.
@@ -86,6 +86,7 @@ class HeliAutopilot:
 
     send: Send
     rate: int = 400
+    every: int = 1
     outputs: int = 16
     gains: Gains = field(default_factory=Gains)
     armed: bool = False
@@ -116,7 +117,8 @@ class HeliAutopilot:
         # Every hundredth answer is read the slow way that ArduPilot reads them all.
         state = read_line(answer) if self.count % 100 == 1 else _quickly(answer)
         self.answers.append(state)
-        self._control(state)
+        if self.count % self.every == 0:
+            self._control(state)
         return state
 
     def fly(self, seconds: float) -> dict[str, list[float]]:
@@ -138,7 +140,7 @@ class HeliAutopilot:
             g = self.gains
             target = np.clip(np.array(g.angle) * error, -1.5, 1.5)
             miss = target - gyro
-            self._sums = np.clip(self._sums + np.array(g.integral) * miss / self.rate, -0.4, 0.4)
+            self._sums = np.clip(self._sums + np.array(g.integral) * miss * self.every / self.rate, -0.4, 0.4)
             mixer = np.array(g.forward) * target + np.array(g.proportional) * miss + self._sums
             collective = self._climb(state)
             if self.sweep is not None:
@@ -162,7 +164,7 @@ class HeliAutopilot:
     def _climb(self, state: dict[str, list[float]]) -> float:
         climb = float(np.clip(0.8 * (self.height + state["position"][2]), -0.5, 0.8))
         miss = climb + state["velocity"][2]
-        self._lift = float(np.clip(self._lift + 0.06 * miss / self.rate, 0.0, 0.8))
+        self._lift = float(np.clip(self._lift + 0.06 * miss * self.every / self.rate, 0.0, 0.8))
         return float(np.clip(self._lift + 0.08 * miss, 0.0, 1.0))
 
     def _mixed(self, mixer: np.ndarray, collective: float) -> list[int]:

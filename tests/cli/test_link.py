@@ -96,3 +96,13 @@ def test_listening_beyond_this_machine_is_warned_of() -> None:
     )
     assert outcome.code == 0
     assert "Listening beyond this machine" in outcome.err
+
+
+def test_parameters_for_ardupilot_are_written_and_nothing_waits(tmp_path: Path) -> None:
+    file = tmp_path / "raptor50.parm"
+    outcome = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", file)
+    assert outcome.code == 0, outcome.err
+    assert f"written: {file}" in " ".join(outcome.err.split())
+    assert "H_SW_TYPE,3\n" in file.read_text(encoding="utf-8")
+    refused = swash("link", "ardupilot", "--vehicle", "raptor50", "--write-parameters", tmp_path / "no" / "x.parm")
+    assert "the folder does not exist" in one_message(refused)

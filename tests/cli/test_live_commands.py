@@ -53,6 +53,24 @@ def test_live_refuses_what_cannot_fly(tmp_path: Path) -> None:
     assert "is for 'coax', not for 'conventional'" in told
 
 
+def test_a_linear_model_cannot_be_flown_and_is_told_where_to_go(tmp_path: Path) -> None:
+    file = tmp_path / "linear.toml"
+    file.write_text('kind = "state-space"\nschema = 1\n')
+    for command in (["live", file], ["link", "ardupilot", "--vehicle", file]):
+        told = one_message(swash(*command, "--port", "0"))
+        assert "no place, ground or rotor" in told
+        assert "swash export" in told
+
+
+def test_what_is_misspelt_is_told_before_what_a_checkout_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PAGE", tmp_path / "nothing")
+    for command in (["live", "nosuch"], ["replay", "nothing.nc"], ["replay", "nothing.nc", "--model", "nosuch"]):
+        assert "vendor" not in one_message(swash(*command, "--port", "0"))
+    told = one_message(swash("live", "coax", "--port", "0", "--controller", _broken(tmp_path)))
+    assert "is not TOML" in told
+    assert "vendor_page.py" in one_message(swash("live", "coax", "--port", "0"))
+
+
 def _broken(folder: Path) -> Path:
     path = folder / "broken.toml"
     path.write_text("kind = ")
@@ -61,6 +79,10 @@ def _broken(folder: Path) -> Path:
 
 def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     assert "nothing.nc" in one_message(swash("replay", "nothing.nc", "--port", "0"))
+    (tmp_path / "poor.csv").write_text("time [s],p [rad/s]\n" + "".join(f"{0.01 * i},{i % 7}\n" for i in range(300)))
+    told = one_message(swash("replay", tmp_path / "poor.csv", "--model", "coax", "--port", "0"))
+    assert "lacks x, y, z" in told
+    assert "it has p" in told
     film, frames = tmp_path / "a.mp4", tmp_path / "frames"
     assert "Give one of them" in one_message(swash("replay", "x.nc", "--video", film, "--frames", frames))
     assert "does not exist" in one_message(swash("replay", "x.nc", "--video", tmp_path / "no" / "a.mp4"))

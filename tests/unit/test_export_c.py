@@ -83,6 +83,26 @@ def test_ten_seconds_and_the_jacobians_are_pythons(
 
 
 @needs_compiler
+def test_roots_in_one_loop_are_those_of_all_the_steps(tmp_path: Path) -> None:
+    """Main and tail rotor's inflow, climbing and sinking through their own wakes, thrust of either sign."""
+    vehicle, trim = flown_from("raptor50", {}, 0.0)
+    model = trace_vehicle(vehicle, trim, name="heli")
+    code = model_code(model)
+    assert model.looped is not None
+    assert code.source.count("for (step") == 1
+    assert len(re.findall(r"-= move\d", code.source)) == len(model.looped.steps) == 2
+    run = compiled(code, tmp_path)
+    s, p = starts(model, "surroundings"), starts(model, "parameters")
+    for sink in np.linspace(-8.0, 12.0, 41):
+        x, u = np.array(trim.state), np.array(trim.inputs)
+        x[vehicle.index("w")], x[vehicle.index("v")] = sink, 0.5 * sink
+        u[vehicle.input_names.index("theta0")] *= 1.0 - 0.1 * sink
+        (found,) = run.call("rates", x, u, s, p, out=(len(x),))
+        unrolled = np.array(model.rates.call([x, u, s, p])[0]).ravel()
+        np.testing.assert_allclose(found, unrolled, rtol=1e-12, atol=1e-10)
+
+
+@needs_compiler
 def test_every_option_of_a_helicopter_evaluates_as_plain_floats_do(tmp_path: Path) -> None:
     options = {"bar": True, "gyro": True, "servos": True, "rotor_speed": "throttle", "inflow": "pitt-peters"}
     vehicle = sp.vehicle("raptor50", ground=True, rotation="ccw", coning=True, **options)

@@ -16,10 +16,12 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.errors import ExportError
 from swashplate.export import fmu as fmu_module
 from swashplate.export.base_units import base_units
 from swashplate.export.compiler import compiler
 from swashplate.export.fmu import fmu, fmu_platform, internal_step
+from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
 from swashplate.export.traced import Traced, trace_linear, trace_vehicle
 from swashplate.identification.state_space_file import structure
@@ -105,6 +107,35 @@ def test_ten_seconds_are_pythons_with_accelerometers_and_derivatives(unit: Path,
     assert abs(rows[0, -2] + 9.81) < 1e-3
     by_difference = np.gradient(python[:, vehicle.index("q")], dt)
     assert np.max(np.abs(rows[5:-5, -1] - by_difference[5:-5])) < 0.05 * np.max(np.abs(by_difference))
+
+
+@needs_binary
+def test_what_an_identified_card_remembers_of_delays_goes_along_where_asked_for(tmp_path: Path) -> None:
+    plain = sp.vehicle("coax")
+    nuisance = {"nuisance": {"delay_servo": 0.03, "delay_motor": 0.06, "lever_x": 0.1}}
+    vehicle = plain.with_card(replace(plain.card, observer=nuisance))
+    export_model(vehicle, "fmu", name="late", delays=True).save(tmp_path)
+    trim = sp.trim(plain, voltage=plain.card.values()["voltage_nominal"])
+    n, dt = 301, 0.01
+    moved = {name: 0.02 * np.sin((3.0 + i) * np.arange(n) * dt) for i, name in enumerate(plain.input_names)}
+    inputs = {name: trim.commands()[name] + series for name, series in moved.items()}
+    steps = {name: 6 if name.startswith("motor") else 3 for name in inputs}
+    shifted = {
+        name: np.concatenate([np.full(steps[name], trim.commands()[name]), series[: n - steps[name]]])
+        for name, series in inputs.items()
+    }
+    flight = sp.simulate(plain, shifted, start=trim, rate=100, substeps=5, environment=trim.environment)
+    with running(tmp_path / "late.fmu") as (slave, at):
+        rows = fly(slave, at, inputs, list(plain.state_names), dt)
+    python = np.stack([flight.values(name) for name in plain.state_names], axis=1)
+    assert np.max(np.abs(rows - python) / np.maximum(1.0, np.abs(python))) < 1e-6
+    said = " ".join(export_model(vehicle, "c", name="late", trim=trim, delays=True).notes)
+    assert "hold back motor_lower by 0.06 s; motor_upper by 0.06 s; servo_roll by 0.03 s" in said
+    assert export_model(vehicle, "c", name="late", trim=trim).notes == ()
+    with pytest.raises(ExportError, match="the card remembers no delays"):
+        export_model(plain, "c", name="late", trim=trim, delays=True)
+    with pytest.raises(ExportError, match="brings its own delays"):
+        export_model(structure("six_dof"), "c", name="late", delays=True)
 
 
 @needs_binary

@@ -15,6 +15,7 @@ from swashplate.export.ardupilot_state_space import KEYS, Sticks, ardupilot_stat
 from swashplate.export.control_json import read_control, read_linear
 from swashplate.export.formats import export_model
 from swashplate.export.linear import Linear, of_state_space, of_vehicle
+from swashplate.export.matlab import read_matlab
 from swashplate.identification.state_space_file import structure
 
 
@@ -46,6 +47,37 @@ def test_json_brings_back_every_bit_name_and_unit(place: int, tmp_path: Path) ->
     assert system.output_labels == list(model.outputs)
     np.testing.assert_array_equal(system.A, model.A)
     assert system.dt == 0
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_what_left_as_mat_comes_back_and_goes_on(place: int, tmp_path: Path) -> None:
+    model = models()[place]
+    export_model(model, "matlab", name=model.name).save(tmp_path)
+    found = read_matlab(tmp_path / f"{model.name}.mat")
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(found, name), getattr(model, name))
+    for name in ("name", "title", "trust", "states", "inputs", "outputs"):
+        assert getattr(found, name) == getattr(model, name)
+    assert {n: u for n, u in found.units.items() if u} == {
+        n: model.units[n] for n in (*model.states, *model.inputs, *model.outputs) if model.units.get(n)
+    }
+    assert all(found.delay(o, i) == model.delay(o, i) for o in model.outputs for i in model.inputs)
+    assert all(found.about.get(name, 0.0) == value for name, value in model.about.items())
+    again, first = (export_model(m, "c", name="same").files["same.c"] for m in (found, model))
+    assert again == first
+
+
+@pytest.mark.parametrize(
+    ("leave", "said"), [("io_delay", "io_delay: is no matrix"), ("state_names", "state_names: is mis")]
+)
+def test_a_mat_file_that_lacks_a_variable_is_told(leave: str, said: str, tmp_path: Path) -> None:
+    from scipy.io import loadmat, savemat
+
+    export_model(models()[2], "matlab", name="hybrid").save(tmp_path)
+    whole = loadmat(tmp_path / "hybrid.mat")
+    savemat(tmp_path / "less.mat", {k: v for k, v in whole.items() if k != leave and not k.startswith("__")})
+    with pytest.raises(ExportError, match=said):
+        read_matlab(tmp_path / "less.mat")
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,30 @@ def test_a_pd_policy_flies_each_task_and_doing_nothing_does_not(name: str, least
     assert np.max(np.r_[rewards, idle]) <= 1.0
 
 
+def test_inner_states_are_told_in_info_and_observed_where_asked_for() -> None:
+    env = gymnasium.make("swashplate.links.gym:swashplate/Hover-v0", vehicle="coax", inner=True).unwrapped
+    check_env(env, skip_render_check=True)
+    vehicle, trim = env.flying.vehicle, env.flying.trim
+    assert env.flying.observed[12:] == vehicle.state_names[12:]
+    seen, info = env.reset(seed=3)
+    np.testing.assert_array_equal(seen[12:], 0.0)
+    plain = HelicopterEnv("coax")
+    assert plain.reset(seed=3)[0].tolist() == seen[:12].tolist()
+    push = np.array([0.5, -0.5, 0.3, 0.0], np.float32)
+    for _ in range(5):
+        seen, _, _, _, info = env.step(push)
+        alone, _, _, _, told = plain.step(push)
+    assert info["state"].tolist() == list(env.state.values()) == told["state"].tolist()
+    np.testing.assert_array_equal(seen, [*alone, *np.float32(info["state"] - trim.state)[12:]])
+    assert np.abs(seen[12:]).max() > 0.01
+    envs = gymnasium.make_vec(
+        "swashplate.links.gym:swashplate/Hover-v0", 2, "vector_entry_point", vehicle="coax", inner=True
+    )
+    many, info = envs.reset(seed=3)
+    assert many.shape == (2, len(vehicle.state_names))
+    assert info["state"].shape == many.shape
+
+
 def test_the_same_seed_gives_the_same_bits() -> None:
     def run(seed: int) -> tuple[np.ndarray, list[float]]:
         env = HelicopterEnv("coax", randomize={"mass": 0.05}, task_options={"duration": 1.0})

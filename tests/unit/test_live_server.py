@@ -25,7 +25,8 @@ import uvicorn
 import websockets
 from websockets.sync.client import connect
 
-from swashplate.links.live import server
+from swashplate.links.live import identifying, server
+from swashplate.links.live.identifying import commands
 from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
 from swashplate.links.live.session import Session
 
@@ -44,7 +45,7 @@ VALID: list[dict[str, Any]] = [
     {"type": "speed", "value": 0.25},
     {"type": "reset"},
     {"type": "record", "value": True},
-    {"type": "identify", "recording": 1},
+    {"type": "identify", "recording": 1, "how": "model"},
     {"type": "stop_identifying"},
 ]
 
@@ -76,8 +77,9 @@ def test_every_type_is_tried() -> None:
         '{"type": "gusts", "value": true}',
         '{"type": "speed", "value": 0}',
         '{"type": "mode", "value": ["raw"]}',
-        '{"type": "identify", "recording": "../1"}',
-        '{"type": "identify", "recording": 1.0}',
+        '{"type": "identify", "recording": "../1", "how": "model"}',
+        '{"type": "identify", "recording": 1.0, "how": "model"}',
+        '{"type": "identify", "recording": 1, "how": "rm"}',
         "[" * 1500,
         '{"type": "step"}' + " " * LONGEST,
     ],
@@ -188,7 +190,7 @@ def test_refused_messages_are_logged_once_and_end_the_connection(
 
 def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
     with running.socket() as page:
-        page.send(json.dumps({"type": "identify", "recording": 99}))
+        page.send(json.dumps({"type": "identify", "recording": 99, "how": "model"}))
         assert moments(page, lambda m: m["notice"])["notice"] == "There is no recording 99."
         page.send(json.dumps({"type": "record", "value": True}))
         moments(page, lambda m: (m["recording"] or 0.0) > 2.2)
@@ -203,6 +205,46 @@ def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
         assert later["t"] - still["t"] < 0.1
         page.send(json.dumps({"type": "pause", "value": False}))
         moments(page, lambda m: m["runs"])
+
+
+def test_what_a_recording_is_identified_with(tmp_path: Path) -> None:
+    raptor, coax = sp.vehicle("raptor50"), sp.vehicle("coax")
+    first, second = commands(raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")
+    assert first[3] == "identify"
+    assert first[-2:] == ["--free", "rotor"]
+    assert second[3:5] == ["respond", str(tmp_path / "f.nc")]
+    assert "throttle" not in " ".join(second)
+    assert len(commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")) == 1
+    (only,) = commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", how="responses")
+    assert only[3] == "respond"
+
+
+@pytest.mark.parametrize(
+    ("ways", "state", "words"),
+    [
+        (["exit 3", "touch out/report.html"], "done", "No model could be fitted to it"),
+        (
+            ["touch out/report.html; echo 'The fit failed: wide.' >&2; exit 2", "exit 9"],
+            "done",
+            "The fit failed: wide.",
+        ),
+        (["echo first >&2; exit 2", "echo second >&2; exit 2"], "failed", "second"),
+        (["touch out/report.html"], "done", ""),
+    ],
+)
+def test_the_second_way_is_taken_where_the_first_leaves_no_report(
+    ways: list[str], state: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "out").mkdir()
+    chosen = tuple(["sh", "-c", f"cd {tmp_path}; {way}"] for way in ways)
+    monkeypatch.setattr(identifying, "commands", lambda *_, **__: chosen)
+    monkeypatch.setattr(identifying.Identifying, "out", lambda self, number: tmp_path / "out")
+    job = identifying.Identifying(tmp_path)
+    asyncio.run(job.run(sp.vehicle("raptor50"), 1))
+    assert job.job is not None
+    assert job.job.state == state
+    assert job.job.words.startswith(words)
+    assert bool(job.job.words) == bool(words)
 
 
 def test_the_bar_comes_off_and_everything_else_stays(running: Running) -> None:

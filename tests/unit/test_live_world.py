@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from pathlib import Path
@@ -17,6 +18,7 @@ from swashplate.flights.maneuvers import Maneuver
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES, STICKS
+from swashplate.links.live.priority import come_first
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
@@ -248,6 +250,27 @@ def test_the_clock_keeps_time_and_counts_what_is_late() -> None:
     assert 4 <= clock.punctuality.late < stopped
     span = took[-1] - took[0]
     assert stopped == pytest.approx(span / 0.01 + 1, abs=6), "lost time is made up for"
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_RR"), reason="this system has no SCHED_RR")
+def test_a_thread_comes_first_where_the_machine_allows_it_and_nothing_that_it_starts_does() -> None:
+    found: dict[str, object] = {}
+
+    def ask() -> None:
+        found["granted"] = come_first()
+        found["own"] = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
+        child = threading.Thread(target=lambda: found.setdefault("child", os.sched_getscheduler(0)))
+        child.start()
+        child.join()
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    assert found == {
+        "granted": found["granted"],
+        "own": os.SCHED_RR if found["granted"] else os.SCHED_OTHER,
+        "child": os.SCHED_OTHER,
+    }
 
 
 def test_what_fails_in_the_clock_is_told() -> None:

@@ -35,7 +35,8 @@ def export(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="A vehicle's name, a card or model file, a linear model's file, or a controller's file.",
+            help="A vehicle's name, a card or model file, a linear model's file (also .json or .mat of an export), "
+            "or a controller's file.",
         ),
     ],
     form: Annotated[
@@ -60,6 +61,9 @@ def export(
         str | None,
         typer.Option("--name", help="What files and C functions begin with; the model's own name if not given."),
     ] = None,
+    delays: Annotated[
+        bool, typer.Option("--delays", help="Take along by how much an identified model's motion lagged its inputs.")
+    ] = False,
     mass: given.Mass = None,
     changed: given.Set = None,
     switched: given.Switch = None,
@@ -83,9 +87,10 @@ def export(
     called = name or Path(model).stem
     if _kind(model) == "controller":
         only_vehicles = {"--speed": speed, "--mass": mass, "--set": changed, "--option": switched}
+        only_vehicles |= {"--delays": delays or None}
         made = _controller(model, form, called, precision, [k for k, v in only_vehicles.items() if v is not None])
     else:
-        made = _model(model, form, called, precision, speed, mass, changed, switched)
+        made = _model(model, form, called, precision, speed, mass, changed, switched, delays)
     with folder_when_complete(out, ours=()) as folder:
         assert folder is not None
         made.save(folder)
@@ -141,19 +146,25 @@ def _model(
     mass: float | None,
     changed: list[str] | None,
     switched: list[str] | None,
+    delays: bool,
 ) -> Export:
     import swashplate as sp
+    from swashplate.export.control_json import read_linear
     from swashplate.export.formats import export_model
+    from swashplate.export.matlab import read_matlab
 
-    if _kind(model) == "state-space":
+    ending = Path(model).suffix.lower()
+    if ending in (".json", ".mat") or _kind(model) == "state-space":
         if speed is not None or mass is not None or changed or switched:
             raise SwashError(
                 "is a linear model: it has no speed, card or options to change.",
                 where=model,
                 hint="Export it as it is.",
             )
-        return export_model(sp.structure(model), form.value, name=name, precision=precision.value)
+        linear = {".json": read_linear, ".mat": read_matlab}.get(ending, sp.structure)(model)
+        return export_model(linear, form.value, name=name, precision=precision.value, delays=delays)
     asked = given.conditions(model, speed=speed or "0", mass=mass, changed=changed, switched=switched)
     if len(asked.speeds) != 1:
         raise SwashError("takes one speed.", channel="--speed", hint="Give a single number.")
-    return export_model(asked.vehicle, form.value, name=name, trim=asked.trims()[0], precision=precision.value)
+    trim = asked.trims()[0]
+    return export_model(asked.vehicle, form.value, name=name, trim=trim, precision=precision.value, delays=delays)

@@ -66,6 +66,12 @@ def ardupilot(
     record: Record = None,
     record_rate: RecordRate = 200.0,
     idle_exit: IdleExit = None,
+    write_parameters: Annotated[
+        Path | None,
+        typer.Option(
+            "--write-parameters", metavar="FILE", help="Write ArduPilot's parameters for this vehicle and end."
+        ),
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Be the physics of ArduPilot's SITL (`arducopter-heli --model JSON:127.0.0.1`): lockstep over UDP.
@@ -80,8 +86,12 @@ def ardupilot(
     from swashplate.links.notices import Notices
     from swashplate.links.sockets import listen_udp
 
-    listen_udp(listen, port).close()  # told before anything is compiled
+    if write_parameters is None:
+        listen_udp(listen, port).close()  # told before anything is compiled
     where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+    if write_parameters is not None:
+        _write_parameters(write_parameters, vehicle, where, servos, quiet=quiet)
+        return
     plant = _plant(vehicle, where, servos, suffix="", voltage=voltage, sag=sag, rate=record_rate if record else 0)
     sensing = _sensing(plant, sensors, seed)
     notices = Notices(_say)
@@ -140,6 +150,18 @@ def px4(
             pass
         finally:
             _finish(plant, record, session.exchanges, notices.summary(), quiet=quiet)
+
+
+def _write_parameters(file: Path, name: str, where: given.Conditions, servos: str | None, *, quiet: bool) -> None:
+    from swashplate.atomic import write_text
+    from swashplate.links.ardupilot.parameters import parameter_file, parameters
+
+    if not file.absolute().parent.is_dir():
+        raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
+    found = parameters(_mapping(name, servos, "", where.vehicle), where.vehicle, where.trims()[0])
+    write_text(file, parameter_file(found, title=where.vehicle.card.title))
+    if not quiet:
+        _say(f"written: {file}")
 
 
 def _say(words: str) -> None:

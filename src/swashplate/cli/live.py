@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
 from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.control.autopilot import Autopilot
 
 Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any free one.", min=0, max=65535)]
 Host = Annotated[str, typer.Option("--host", help="Address to listen on; other than loopback with --allow-remote.")]
@@ -43,28 +46,21 @@ def live(
     from swashplate.cli.console import progress
     from swashplate.links.live import server
 
-    server.check_page()
     if out.exists() and not out.is_dir():
         raise SwashError("is a file, expected a folder.", where=out, channel="--out")
+    vehicle = given.vehicle_of(model, None, switched)
+    from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
+
+    enable_compilation_cache()
+    dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
+    chosen = None if controller is None else _autopilot(controller)
+    server.check_page()
     listening = server.listen(host, port, allow_remote=allow_remote)
     try:
-        vehicle = given.vehicle_of(model, None, switched)
         with progress(quiet=quiet) as line:
             line.say("preparing (compiling takes longest the first time)")
-            from swashplate.control.autopilot import Autopilot
-            from swashplate.control.controller_file import read_controller
             from swashplate.links.live.session import Session
-            from swashplate.simulation.compilation import enable_compilation_cache
 
-            enable_compilation_cache()
-            chosen = None if controller is None else read_controller(controller)
-            if chosen is not None and not isinstance(chosen, Autopilot):
-                raise SwashError(
-                    "flies on sensors of its own, and the page has none.",
-                    where=controller,
-                    channel="--controller",
-                    hint="Give an autopilot, as `swash decouple` writes it without --sensors.",
-                )
             session = Session(vehicle, controller=chosen, folder=out)
         session.clock.start()
         try:
@@ -74,6 +70,21 @@ def live(
             session.close()
     finally:
         listening.close()
+
+
+def _autopilot(controller: Path) -> Autopilot:
+    from swashplate.control.autopilot import Autopilot
+    from swashplate.control.controller_file import read_controller
+
+    read = read_controller(controller)
+    if not isinstance(read, Autopilot):
+        raise SwashError(
+            "flies on sensors of its own, and the page has none.",
+            where=controller,
+            channel="--controller",
+            hint="Give an autopilot, as `swash decouple` writes it without --sensors.",
+        )
+    return read
 
 
 def need_live_extra() -> None:

@@ -55,19 +55,20 @@ def replay(
         raise SwashError("the folder does not exist.", where=video.parent, channel="--video", hint="Make it first.")
     if frames is not None and frames.exists() and not frames.is_dir():
         raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
+    chosen = None if model is None else find(model)
     listening = None
     if not filming:
         live.need_live_extra()
         from swashplate.links.live import server
 
-        server.check_page()
         listening = server.listen(host, port, allow_remote=allow_remote)
     try:
-        chosen = None if model is None else find(model)
         how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
         with progress(quiet=quiet) as line:
             line.say("reading the flight")
             log = read(flight, how=how)
+            if not filming:
+                server.check_page()
             # A simulation's true states have no outliers, and what looks like one is a maneuver.
             clean = log.provenance.simulated and "phi" in log
             logged = log.condition(rate=rate, cutoff=cutoff, outliers=not clean, trim_ground=not clean)

@@ -6,7 +6,9 @@ printer wraps them in pointer tests and unused arguments that a strict compiler 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from swashplate.errors import ExportError
@@ -29,6 +31,32 @@ _OWN = {
 }
 
 
+@dataclass(frozen=True)
+class Statement:
+    """One operation.
+
+    Attributes:
+        name: of the constant that it makes.
+        operation: as in the tables above.
+        reads: names of constants, or texts of inputs and numbers.
+    """
+
+    name: str
+    operation: str
+    reads: tuple[str, ...]
+
+    def text(self, real: str, precision: Precision) -> str:
+        return f"const {real} {self.name} = {_text(self.operation, self.reads, precision)};"
+
+
+@dataclass(frozen=True)
+class Statements:
+    """A function in its order of evaluation, and what each of its outputs' nonzeros is: (output, place) to text."""
+
+    body: tuple[Statement, ...]
+    outputs: dict[tuple[int, int], str]
+
+
 def _operations() -> dict[int, str]:
     import casadi
 
@@ -46,24 +74,22 @@ def _text(operation: str, of: Sequence[str], precision: Precision) -> str:
     return _OWN[operation].format(*of)
 
 
-def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
-    """Statements that compute a CasADi function.
+def statements(function: Any, *, precision: Precision, inputs: Sequence[str]) -> Statements:
+    """A CasADi function, traced on SX, as statements.
 
     Args:
-        function: traced on SX; sparse outputs store their nonzeros only.
-        real: the type's name.
-        precision: of constants and of the C library's functions.
+        function: sparse outputs have entries for their nonzeros only.
+        precision: of constants.
         inputs: names of the arrays it reads, in order.
-        outputs: names of the arrays it writes. They may be those it reads: all stores come last.
 
     Raises:
         ExportError: for an operation that the equations of this package do not use.
     """
     known = _operations()
     now: dict[int, str] = {}
-    lines: list[str] = []
+    made: list[Statement] = []
     places = [_places(function.sparsity_out(i)) for i in range(function.n_out())]
-    stores: list[str] = []
+    outputs: dict[tuple[int, int], str] = {}
     for i in range(function.n_instructions()):
         operation = known.get(function.instruction_id(i))
         if operation is None:
@@ -77,10 +103,56 @@ def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str
             text = literal(function.instruction_constant(i), precision)
             now[writes[0]] = f"({text})" if text.startswith("-") else text
         elif operation == "OUTPUT":
-            stores.append(f"  {outputs[writes[0]]}[{places[writes[0]][writes[1]]}] = {now[reads[0]]};")
+            outputs[writes[0], places[writes[0]][writes[1]]] = now[reads[0]]
         else:
-            lines.append(f"  const {real} t{i} = {_text(operation, [now[r] for r in reads], precision)};")
+            made.append(Statement(f"t{i}", operation, tuple(now[r] for r in reads)))
             now[writes[0]] = f"t{i}"
+    return Statements(tuple(_cheaper(made)), outputs)
+
+
+def _cheaper(made: Sequence[Statement]) -> list[Statement]:
+    """What several are divided by is divided by once, and a tangent is made of the sine and cosine that there are.
+
+    A division takes four times what a product takes, a tangent a call more; results change in their last bit.
+    """
+    shared = {by for by, count in Counter(s.reads[1] for s in made if s.operation == "DIV").items() if count > 1}
+    turned = {(s.operation, s.reads): s.name for s in made if s.operation in ("SIN", "COS")}
+    later = {s.name: place for place, s in enumerate(made)}
+    inverted: set[str] = set()
+    found: list[Statement] = []
+    for place, s in enumerate(made):
+        if s.operation == "DIV" and s.reads[1] in shared:
+            by = s.reads[1]
+            inverse = "i_" + "".join(c if c.isalnum() else "_" for c in by)
+            if by not in inverted:
+                inverted.add(by)
+                found.append(Statement(inverse, "INV", (by,)))
+            found.append(Statement(s.name, "MUL", (s.reads[0], inverse)))
+        elif s.operation == "TAN" and all(
+            (k, s.reads) in turned and later[turned[k, s.reads]] < place for k in ("SIN", "COS")
+        ):
+            found.append(Statement(s.name, "DIV", (turned["SIN", s.reads], turned["COS", s.reads])))
+        else:
+            found.append(s)
+    return found
+
+
+def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+    """Statements in C that compute a CasADi function.
+
+    Args:
+        function: traced on SX; sparse outputs store their nonzeros only.
+        real: the type's name.
+        precision: of constants and of the C library's functions.
+        inputs: names of the arrays it reads, in order.
+        outputs: names of the arrays it writes. They may be those it reads: all stores come last.
+
+    Raises:
+        ExportError: as `statements`.
+    """
+    found = statements(function, precision=precision, inputs=inputs)
+    lines = [f"  {s.text(real, precision)}" for s in found.body]
+    stores = [f"  {outputs[o]}[{place}] = {text};" for (o, place), text in found.outputs.items()]
     return "\n".join([*lines, *stores]) + "\n"
 
 

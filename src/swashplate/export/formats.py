@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from swashplate.atomic import write_bytes
 from swashplate.errors import ExportError
 from swashplate.export.c_text import Precision, identifier
-from swashplate.export.linear import Linear, of_state_space, of_vehicle
+from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from swashplate.export.traced import Traced
 
 Format = Literal["c", "fmu", "ardupilot-statespace", "control", "matlab", "simulink"]
-Model = Vehicle | StateSpaceModel
+Model = Vehicle | StateSpaceModel | Linear
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,24 @@ class Export:
 
 
 def export_model(
-    model: Model, form: Format, *, name: str, trim: Trim | None = None, precision: Precision = "double"
+    model: Model,
+    form: Format,
+    *,
+    name: str,
+    trim: Trim | None = None,
+    precision: Precision = "double",
+    delays: bool = False,
 ) -> Export:
     """A vehicle or a linear model in another program's format.
 
     Args:
-        model: a vehicle (packaged, a card's or identified) or a linear model as `swash fit-ss` writes it.
+        model: a vehicle (packaged, a card's or identified) or a linear model, as `swash fit-ss` writes it or as
+            `read_linear` and `read_matlab` read it.
         form: "c", "fmu", "ardupilot-statespace", "control", "matlab" or "simulink".
         name: what files and C functions begin with.
         trim: where a vehicle starts, and what its linear model is about; hover where none is given.
         precision: of C ("double" or "single"); the other formats are double.
+        delays: take along what an identified vehicle's motion lagged its logged inputs by. A linear model has its own.
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -62,65 +70,81 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(_MAKERS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
-    if trim is not None and isinstance(model, StateSpaceModel):
+    if trim is not None and not isinstance(model, Vehicle):
         raise ExportError("a linear model holds at the one flight that it was identified in.", channel="--speed")
+    if delays and not isinstance(model, Vehicle):
+        raise ExportError("a linear model brings its own delays.", channel="--delays", hint="Leave it out.")
+    late = logged_delays(model) if delays and isinstance(model, Vehicle) else None
     called = identifier(name)
     about = trim
     if isinstance(model, Vehicle) and about is None:
         about = find_trim(model, voltage=model.card.values().get("voltage_nominal"))
-    return _MAKERS[form](model, about, called, precision)
+    return _MAKERS[form](_Asked(model, about, late), called, precision)
 
 
-def _linear(model: Model, about: Trim | None, name: str) -> Linear:
+@dataclass(frozen=True)
+class _Asked:
+    """What is exported: a model, where it starts, and delays of a vehicle's inputs [s]."""
+
+    model: Model
+    about: Trim | None
+    late: Mapping[str, float] | None
+
+
+def _linear(asked: _Asked, name: str) -> Linear:
+    model, about = asked.model, asked.about
+    if isinstance(model, Linear):
+        return replace(model, name=name)
     if isinstance(model, StateSpaceModel):
         return of_state_space(model, name=name)
     assert about is not None
-    return of_vehicle(model, about, name=name)
+    return of_vehicle(model, about, name=name, delays=asked.late)
 
 
-def _c(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _c(asked: _Asked, name: str, precision: Precision) -> Export:
     from swashplate.export.model_c import model_code
     from swashplate.export.traced import late_notes
 
-    traced = _traced(model, about, name)
+    traced = _traced(asked, name)
     return Export(_encoded(model_code(traced, precision=precision).files()), (*traced.notes, *late_notes(traced)))
 
 
-def _fmu(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _fmu(asked: _Asked, name: str, precision: Precision) -> Export:
     from importlib import metadata
 
     from swashplate.export.fmu import fmu
 
-    traced = _traced(model, about, name)
+    traced = _traced(asked, name)
     content, message = fmu(traced, version=metadata.version("swashplate"))
     return Export({f"{name}.fmu": content}, (*traced.notes, *([message] if message else [])))
 
 
-def _simulink(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _simulink(asked: _Asked, name: str, precision: Precision) -> Export:
     from swashplate.export.simulink import simulink
     from swashplate.export.traced import late_notes
 
-    traced = _traced(model, about, name)
+    traced = _traced(asked, name)
     return Export(_encoded(simulink(traced)), (*traced.notes, *late_notes(traced)))
 
 
-def _control(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _control(asked: _Asked, name: str, precision: Precision) -> Export:
     from swashplate.export.control_json import control_json
 
-    return Export(_encoded({f"{name}_control.json": control_json(_linear(model, about, name))}))
+    return Export(_encoded({f"{name}_control.json": control_json(_linear(asked, name))}))
 
 
-def _matlab(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _matlab(asked: _Asked, name: str, precision: Precision) -> Export:
     from swashplate.export.matlab import matlab
 
-    return Export({f"{name}.mat": matlab(_linear(model, about, name))})
+    return Export({f"{name}.mat": matlab(_linear(asked, name))})
 
 
-def _ardupilot(model: Model, about: Trim | None, name: str, precision: Precision) -> Export:
+def _ardupilot(asked: _Asked, name: str, precision: Precision) -> Export:
     from swashplate.export.ardupilot_state_space import Sticks, ardupilot_state_space, to_json
 
-    sticks = Sticks({}) if about is None or isinstance(model, StateSpaceModel) else _sticks(model, about)
-    numbers, notes = ardupilot_state_space(_linear(model, about, name), sticks)
+    model, about = asked.model, asked.about
+    sticks = _sticks(model, about) if about is not None and isinstance(model, Vehicle) else Sticks({})
+    numbers, notes = ardupilot_state_space(_linear(asked, name), sticks)
     return Export(_encoded({f"{name}_ardupilot.json": to_json(numbers)}), notes)
 
 
@@ -139,20 +163,21 @@ def _sticks(vehicle: Vehicle, trim: Trim) -> Sticks:
     return Sticks(reach, states["phi"], float(vehicle.values().rotor_speed), (*limits["theta0"], commands["theta0"]))
 
 
-def _traced(model: Model, about: Trim | None, name: str) -> Traced:
+def _traced(asked: _Asked, name: str) -> Traced:
     from swashplate.export.traced import trace_linear, trace_vehicle
 
-    if isinstance(model, StateSpaceModel):
-        return trace_linear(of_state_space(model, name=name), name=name)
+    model, about = asked.model, asked.about
+    if not isinstance(model, Vehicle):
+        return trace_linear(_linear(asked, name), name=name)
     assert about is not None
-    return trace_vehicle(model, about, name=name)
+    return trace_vehicle(model, about, name=name, delays=asked.late)
 
 
 def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
     return {name: text.encode("utf-8") for name, text in texts.items()}
 
 
-_MAKERS: Mapping[Format, Callable[[Model, Trim | None, str, Precision], Export]] = {
+_MAKERS: Mapping[Format, Callable[[_Asked, str, Precision], Export]] = {
     "c": _c,
     "fmu": _fmu,
     "ardupilot-statespace": _ardupilot,

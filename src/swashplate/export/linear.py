@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.errors import ExportError
 from swashplate.flights.schema import channel, is_known
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.simulation.linearize import linearize
@@ -65,8 +66,29 @@ class Linear:
         )
 
 
-def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Linear:
-    """A vehicle about a trim, exactly differentiated; the outputs are the states."""
+def logged_delays(vehicle: Vehicle) -> dict[str, float]:
+    """By how much the motion lagged each logged input when a vehicle was identified [s].
+
+    Latency of the radio, the servo pulses and the logger's clock: the equations do not have it, the card's observer
+    section remembers it (`delay_motor` for motors, `delay_servo` for all else).
+
+    Raises:
+        ExportError: where the card remembers none.
+    """
+    found = vehicle.card.observer.get("nuisance", {})
+    names = {i: "delay_motor" if i.startswith("motor") else "delay_servo" for i in vehicle.input_names}
+    if not found.keys() & set(names.values()):
+        raise ExportError(
+            "the card remembers no delays.",
+            where=vehicle.card.path or vehicle.name,
+            channel="--delays",
+            hint="Only a model that `swash identify` wrote has them.",
+        )
+    return {name: max(0.0, float(found.get(key, 0.0))) for name, key in names.items()}
+
+
+def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Linear:
+    """A vehicle about a trim, exactly differentiated; the outputs are the states. Delays of inputs [s] where given."""
     found = linearize(vehicle, trim)
     units = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
     units |= {i: input_unit(i) for i in vehicle.input_names}
@@ -82,6 +104,7 @@ def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Linear:
         found.inputs,
         found.states,
         units,
+        dict(delays or {}),
         about={**trim.states(), **trim.commands()},
     )
 

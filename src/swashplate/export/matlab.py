@@ -1,14 +1,18 @@
-"""A linear model as a .mat file: matrices, names, units, delays and trim, for MATLAB, Octave or scipy."""
+"""A linear model as a .mat file, and back: matrices, names, units, delays and trim, for MATLAB, Octave or scipy."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from swashplate.errors import ExportError
 from swashplate.export.linear import Linear
+from swashplate.flights.readers import mat
+from swashplate.flights.readers.source import open_source
 
 _HEADER = 116  # bytes of free text that a level 5 file begins with
 
@@ -45,6 +49,68 @@ def matlab(model: Linear) -> bytes:
     written = bytearray(buffer.getvalue())
     written[:_HEADER] = b"MATLAB 5.0 MAT-file, linear model by swashplate".ljust(_HEADER)  # scipy puts the time here
     return bytes(written)
+
+
+def read_matlab(path: str | Path) -> Linear:
+    """The model of a file that `swash export --format matlab` wrote, saved again by MATLAB or not.
+
+    Raises:
+        FlightError: where it is no .mat file of level 5.
+        ExportError: naming the variable that is missing, of another shape or no number.
+    """
+    found = mat.load(open_source(path))
+    states, inputs, outputs = (_texts(found, f"{kind}_names", path) for kind in ("state", "input", "output"))
+    n, m, k = len(states), len(inputs), len(outputs)
+    delays = _numbers(found, "io_delay", (k, m), path)
+    starts = [
+        *zip(states, _numbers(found, "state_start", (n, 1), path)[:, 0], strict=True),
+        *zip(inputs, _numbers(found, "input_start", (m, 1), path)[:, 0], strict=True),
+    ]
+    units: dict[str, str] = {}
+    for kind, names in (("state", states), ("input", inputs), ("output", outputs)):
+        units |= dict(zip(names, _texts(found, f"{kind}_units", path), strict=True))
+    shapes = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m)}
+    name, title, trust = (str(found[key]) if isinstance(found.get(key), str) else "" for key in _WORDS)
+    A, B, C, D = (_numbers(found, key, shape, path) for key, shape in shapes.items())
+    return Linear(
+        name,
+        title,
+        trust,
+        A,
+        B,
+        C,
+        D,
+        states,
+        inputs,
+        outputs,
+        units,
+        {f"{o}/{i}": float(delays[a, b]) for a, o in enumerate(outputs) for b, i in enumerate(inputs) if delays[a, b]},
+        {name: float(value) for name, value in starts} if any(value for _, value in starts) else {},
+    )
+
+
+_WORDS = ("name", "title", "trust")
+
+
+def _texts(found: Mapping[str, Any], key: str, path: str | Path) -> tuple[str, ...]:
+    value = found.get(key)
+    listed = [value] if isinstance(value, str) else value
+    if not isinstance(listed, list):
+        raise ExportError(
+            "is missing or is no cell array of text.",
+            where=path,
+            channel=key,
+            hint="`swash export MODEL --format matlab` writes it.",
+        )
+    # MATLAB's empty text comes as an array without entries.
+    return tuple(entry if isinstance(entry, str) else "" for entry in listed)
+
+
+def _numbers(found: Mapping[str, Any], key: str, shape: tuple[int, int], path: str | Path) -> Any:
+    value = mat.numbers(found.get(key))
+    if value is None or value.size != shape[0] * shape[1] or not np.all(np.isfinite(value)):
+        raise ExportError(f"is no matrix of {shape[0]} by {shape[1]} numbers.", where=path, channel=key)
+    return value.reshape(shape)
 
 
 def _cells(texts: Iterable[str]) -> Any:

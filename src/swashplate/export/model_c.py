@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from swashplate.export.c_expression import body
+from swashplate.export.c_loops import looped_body
 from swashplate.export.c_text import REAL, Precision, array, words
-from swashplate.export.traced import Traced, Variable, late_notes
+from swashplate.export.traced import Looped, Traced, Variable, late_notes
 
 _KINDS = ("state", "input", "surrounding", "parameter", "output")
 
@@ -75,12 +76,13 @@ def _equations(model: Traced, precision: Precision) -> dict[str, str]:
     given = ("x", "u", "s", "p")
 
     def printed(function: object, outputs: Sequence[str]) -> str:
-        text = body(function, real=f"{model.name}_real", precision=precision, inputs=given, outputs=outputs)
+        write: Callable[..., str] = looped_body if isinstance(function, Looped) else body
+        text = write(function, real=f"{model.name}_real", precision=precision, inputs=given, outputs=outputs)
         unused = [name for name in given if not re.search(rf"\b{name}\[", text)]
         return text + "".join(f"  (void){name};\n" for name in unused)
 
     return {
-        "RATES": printed(model.rates, ["rates"]),
+        "RATES": printed(model.looped or model.rates, ["rates"]),
         "OUTPUTS": printed(model.readings, ["outputs"]),
         "JACOBIANS": printed(model.jacobians, ["A", "B"]),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -51,6 +51,7 @@ class Traced:
             equations use; the outputs of a vehicle are what accelerometers at the CG read.
         rates, readings: derivatives of the states, and the outputs.
         jacobians: A and B, the rates by state and by input.
+        looped: the rates again, with the roots in them found in loops; None where there are none.
         delays: of each input [s]; empty where there are none. The functions do not have them.
         notes: what a user must know.
     """
@@ -67,6 +68,7 @@ class Traced:
     rates: Any = field(repr=False)
     readings: Any = field(repr=False)
     jacobians: Any = field(repr=False)
+    looped: Looped | None = field(default=None, repr=False)
     delays: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -86,6 +88,61 @@ def require_casadi() -> Any:
             "needs CasADi.", channel="C code", hint="Install swashplate with the extra 'export'."
         ) from None
     return casadi
+
+
+@dataclass(frozen=True)
+class Root:
+    """A root that is found by Newton's method in a loop, in symbols.
+
+    Attributes:
+        start: the first guess. guess: what `value` and `slope`, the residual and its derivative, are functions of.
+        root: stands for the solution wherever it is used. steps: at most.
+    """
+
+    start: Any
+    guess: Any
+    value: Any
+    slope: Any
+    root: Any
+    steps: int
+
+
+@dataclass(frozen=True)
+class Looped:
+    """A CasADi function whose roots are found in loops.
+
+    Attributes:
+        function: of (state, input, surrounding, parameter, guesses, roots); its outputs are those that are wanted, then
+            starts, values and slopes of the roots, each as a column.
+        steps: of each root, at most; later roots may depend on earlier ones.
+    """
+
+    function: Any = field(repr=False)
+    steps: tuple[int, ...] = ()
+
+
+class _Looping(CasadiBackend):
+    """Leaves roots as symbols. C can then end the search when the guess no longer moves, instead of unrolling it."""
+
+    def __init__(self, casadi: Any) -> None:
+        super().__init__()
+        self.roots: list[Root] = []
+        self._casadi = casadi
+
+    def newton(self, residual: Any, start: Any, *, steps: int) -> Any:
+        guess, root = (self._casadi.SX.sym(f"{name}{len(self.roots)}") for name in ("guess", "root"))
+        value, slope = residual(guess)
+        self.roots.append(Root(start, guess, value, slope, root, steps))
+        return root
+
+    def looped(self, given: Sequence[Any], results: Sequence[Any]) -> Looped:
+        """A function of `given` whose outputs are `results` and what the roots need."""
+        column = self._casadi.vertcat
+        symbols = [column(*(getattr(root, name) for root in self.roots)) for name in ("guess", "root")]
+        sought = [column(*(getattr(root, name) for root in self.roots)) for name in ("start", "value", "slope")]
+        inputs, outputs = [*given, *symbols], [*results, *sought]
+        made = self._casadi.Function("f", inputs, [self._casadi.densify(o) for o in outputs], {"cse": True})
+        return Looped(made, tuple(root.steps for root in self.roots))
 
 
 class _Remembering(CasadiBackend):
@@ -109,8 +166,12 @@ class _Remembering(CasadiBackend):
         return found
 
 
-def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
+def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Traced:
     """A vehicle's equations, its numbers as parameters, and a trim to start from.
+
+    Args:
+        vehicle, trim, name: what is traced, where it starts, what its C begins with.
+        delays: of inputs by name [s]; none where not given (see `linear.logged_delays`).
 
     Raises:
         ExportError: without CasADi.
@@ -134,10 +195,13 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
     force = casadi.vertcat(*vehicle.specific_force(state, inputs, parameters, environment, plain))
     used = [i for i, does in enumerate(casadi.which_depends(casadi.vertcat(right, force), s, 1)) if does]
 
+    rest = s[used] if used else casadi.SX(0, 1)
+
     def function(results: Sequence[Any]) -> Any:
-        rest = s[used] if used else casadi.SX(0, 1)
         return casadi.Function("f", [x, u, rest, p], list(results), {"cse": True})
 
+    looping = _Looping(casadi)
+    with_roots = rates(looping)
     numbers = vehicle.values()
     card = vehicle.card.parameters
     return Traced(
@@ -166,6 +230,8 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str) -> Traced:
         rates=function([right]),
         readings=function([force]),
         jacobians=function(hiding.shown(slopes)),
+        looped=looping.looped([x, u, rest, p], [with_roots]) if looping.roots else None,
+        delays=tuple(delays.get(a, 0.0) for a in vehicle.input_names) if delays and any(delays.values()) else (),
     )
 
 

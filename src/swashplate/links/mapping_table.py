@@ -10,6 +10,7 @@ from swashplate.errors import LinkError
 from swashplate.links.servo import CHANNELS, PULSES, Servo
 
 _MISSING: Any = object()
+_HINT = "The how-to 'Fly a vehicle under ArduPilot or PX4' has a whole mapping."
 
 
 class Table:
@@ -29,7 +30,7 @@ class Table:
 
     def error(self, key: str, problem: str) -> LinkError:
         """An error at one of its entries."""
-        return LinkError(problem, where=self.where, channel=f"{self._path}{key}", hint="See the how-to on links.")
+        return LinkError(problem, where=self.where, channel=f"{self._path}{key}", hint=_HINT)
 
     def _get(self, key: str, missing: Any) -> Any:
         self._asked.add(key)

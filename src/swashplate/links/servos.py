@@ -28,40 +28,45 @@ class HelicopterMapping:
     Attributes:
         channels: outputs that it uses, from 1.
         shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
+        type: of the swashplate. swash, tail, throttle: its outputs.
+        collective_pulse, collective_deg, cyclic_deg, tail_deg, full, spool: as the file has them [us], [deg], [1], [s].
     """
 
     def __init__(self, table: Table, vehicle: Vehicle) -> None:
         swash, tail, throttle = (table.part(name) for name in ("swashplate", "tail", "throttle"))
         servos = table.part("servos", missing={})
         numbers = swash.numbers("channels")
-        self._swash = tuple(swash.servo(number, servos) for number in numbers)
+        self.type = swash.text("type")
+        self.swash = tuple(swash.servo(number, servos) for number in numbers)
         rows = swashplates.shares(
-            swash.text("type"),
+            self.type,
             angles=swash.numbers("angles", missing=()),
             phase=swash.number("phase", missing=0.0),
             matrix=swash.rows("matrix"),
             where=table.where,
         )
-        if len(rows) != len(self._swash):
-            raise table.error("swashplate.channels", f"has {len(self._swash)} servos, the type has {len(rows)}.")
+        if len(rows) != len(self.swash):
+            raise table.error("swashplate.channels", f"has {len(self.swash)} servos, the type has {len(rows)}.")
         self._inverse = swashplates.unmixed(rows)
-        pulses = (np.array(swash.pair("collective_pulse")) - CENTRE) / HALF
-        pitches = np.radians(swash.pair("collective_deg"))
+        self.collective_pulse, self.collective_deg = swash.pair("collective_pulse"), swash.pair("collective_deg")
+        pulses, pitches = (np.array(self.collective_pulse) - CENTRE) / HALF, np.radians(self.collective_deg)
         if pulses[0] == pulses[1]:
             raise swash.error("collective_pulse", "has two equal pulses.")
         self._collective = (pulses, pitches)
-        lateral, longitudinal = np.radians(swash.pair("cyclic_deg"))
+        self.cyclic_deg = swash.pair("cyclic_deg")
+        lateral, longitudinal = np.radians(self.cyclic_deg)
         self._cyclic = (lateral, longitudinal)
-        self._tail = tail.servo(tail.number("channel"), servos)
-        self._tail_pitch = np.radians(tail.pair("deg"))
-        self._throttle = throttle.servo(throttle.number("channel"), servos)
-        self._full = throttle.number("full", missing=1.0)
-        self._spool = throttle.number("spool_time", missing=8.0)
-        if not (self._full > 0.0 and self._spool > 0.0):
+        self.tail = tail.servo(tail.number("channel"), servos)
+        self.tail_deg = tail.pair("deg")
+        self._tail_pitch = np.radians(self.tail_deg)
+        self.throttle = throttle.servo(throttle.number("channel"), servos)
+        self.full = throttle.number("full", missing=1.0)
+        self.spool = throttle.number("spool_time", missing=8.0)
+        if not (self.full > 0.0 and self.spool > 0.0):
             raise table.error("throttle", "expected full and spool_time above zero.")
         table.done()
-        self.channels = tuple(s.channel for s in (*self._swash, self._tail, self._throttle))
-        self.shares = (self._throttle.channel,)
+        self.channels = tuple(s.channel for s in (*self.swash, self.tail, self.throttle))
+        self.shares = (self.throttle.channel,)
         self.restart()
 
     def restart(self) -> None:
@@ -70,32 +75,32 @@ class HelicopterMapping:
 
     def inputs(self, pulses: Sequence[float], duration: float) -> Array:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
-        collective, roll, pitch = self._inverse @ [s.travel(pulses[s.channel - 1]) for s in self._swash]
+        collective, roll, pitch = self._inverse @ [s.travel(pulses[s.channel - 1]) for s in self.swash]
         (first, last), (least, most) = self._collective
         theta0 = least + (collective - first) / (last - first) * (most - least)
         side, ahead = self._cyclic
         low, high = self._tail_pitch
-        tail = 0.5 * (low + high) + 0.5 * (high - low) * self._tail.travel(pulses[self._tail.channel - 1])
-        asked = min(1.0, self._throttle.share(pulses[self._throttle.channel - 1]) / self._full)
-        self._running = min(asked, self._running + duration / self._spool)
+        tail = 0.5 * (low + high) + 0.5 * (high - low) * self.tail.travel(pulses[self.tail.channel - 1])
+        asked = min(1.0, self.throttle.share(pulses[self.throttle.channel - 1]) / self.full)
+        self._running = min(asked, self._running + duration / self.spool)
         return np.array([theta0, -ahead * pitch, side * roll, tail, self._running])
 
 
 class CoaxialMapping:
-    """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`."""
+    """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`, and its outputs."""
 
     def __init__(self, table: Table, vehicle: Vehicle) -> None:
         motors, cyclic = table.part("motors"), table.part("cyclic")
         servos = table.part("servos", missing={})
-        self._motors = tuple(motors.servo(motors.number(name), servos) for name in ("lower", "upper"))
-        self._servos = tuple(cyclic.servo(cyclic.number(name), servos) for name in ("roll", "pitch"))
+        self.motors = tuple(motors.servo(motors.number(name), servos) for name in ("lower", "upper"))
+        self.servos = tuple(cyclic.servo(cyclic.number(name), servos) for name in ("roll", "pitch"))
         self._travel = (cyclic.number("roll_travel", missing=1.0), cyclic.number("pitch_travel", missing=1.0))
         table.done()
         numbers = vehicle.card.values()
         stopped = [-numbers[f"o_drive_{name}"] / numbers[f"k_drive_{name}"] for name in ("lower", "upper")]
         self._stopped = tuple(max(0.0, command) for command in stopped)
-        self.channels = tuple(s.channel for s in (*self._motors, *self._servos))
-        self.shares = tuple(s.channel for s in self._motors)
+        self.channels = tuple(s.channel for s in (*self.motors, *self.servos))
+        self.shares = tuple(s.channel for s in self.motors)
 
     def restart(self) -> None:
         """Nothing is carried over."""
@@ -106,9 +111,9 @@ class CoaxialMapping:
         An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
         """
         motors = [
-            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self._motors, self._stopped, strict=True)
+            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self.motors, self._stopped, strict=True)
         ]
-        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self._servos, self._travel, strict=True)]
+        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self.servos, self._travel, strict=True)]
         # Autopilots count nose up as positive pitch, the CoaX nose down.
         return np.array([*motors, servos[0], -servos[1]])
 
@@ -142,8 +147,9 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
     except tomllib.TOMLDecodeError as error:
         raise LinkError(f"is not TOML: {error}.", where=where) from None
     table = Table(document, where)
-    if table.text("kind") != "servo-mapping" or table.number("schema") != 1:
-        raise table.error("kind", "is not a servo mapping of schema 1.")
+    if document.get("kind") != "servo-mapping" or document.get("schema") != 1:
+        raise table.error("kind", 'is no servo mapping: expected kind = "servo-mapping" and schema = 1.')
+    table.text("kind"), table.number("schema")
     table.text("title")
     meant = table.text("vehicle")
     if meant != vehicle.name or meant not in _KINDS:

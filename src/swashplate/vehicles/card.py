@@ -186,10 +186,12 @@ def parse_card(text: str, *, path: str = "") -> Card:
             f"is not TOML: {error}.", where=path, hint="A card is a TOML file; `swash vehicles new` writes one."
         ) from None
     if document.get("kind") != "vehicle":
+        linear = "A linear model holds near one flight and has no place, ground or rotor: `swash export` takes it."
+        hint = "A card begins with the line kind = 'vehicle'; `swash vehicles new` writes one."
         raise CardError(
             f"kind is {document.get('kind')!r}, expected 'vehicle'." if "kind" in document else "says no kind.",
             where=path,
-            hint="A card begins with the line kind = 'vehicle'; `swash vehicles new` writes one.",
+            hint=linear if document.get("kind") == "state-space" else hint,
         )
     schema = document.get("schema", 0)
     if not isinstance(schema, int) or schema > CARD_SCHEMA:

@@ -7,6 +7,9 @@ Importing this package registers `swashplate/Hover-v0`, `swashplate/Trajectory-v
     env = gymnasium.make("swashplate/Hover-v0", vehicle="raptor50")
     envs = gymnasium.make_vec("swashplate/Hover-v0", 256, "vector_entry_point", vehicle="raptor50")
 
+`gymnasium.make("swashplate.links.gym:swashplate/Hover-v0", vehicle="raptor50")` imports it by itself. (Gymnasium 1.0
+took the entry points away by which packages were registered without being named.)
+
 Needs the extra `rl` (Gymnasium: Towers et al. 2024).
 """
 

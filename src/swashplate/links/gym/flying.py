@@ -41,9 +41,12 @@ OBSERVED = (
     *("p", "q", "r"),
 )
 """What is observed: target minus actual of place [m], velocity [m/s] (body axes), roll, pitch and heading [rad]; body
-rates [rad/s]. Rotor, bar and inflow states stay hidden."""
+rates [rad/s]. Rotor, bar and inflow states stay hidden unless they are asked for."""
 LIMITS = np.array([50.0] * 3 + [50.0] * 3 + [np.pi] * 3 + [20.0] * 3)
 """Observations are clipped to these."""
+INNER_LIMIT = 1000.0
+"""The same for inner states, in their own units."""
+_BODY = len(OBSERVED)
 SPREAD = {"place": 0.3, "velocity": 0.2, "attitude": 0.05, "rates": 0.1}
 """Half width of the uniform distribution about the trim that episodes start from [m, m/s, rad, rad/s]."""
 CRASH = -10.0
@@ -65,6 +68,7 @@ class Flying:
         parameters: the card's numbers and the surroundings' constants.
         scatter: relative standard deviations of parameters, drawn anew for each episode; by place in the row.
         spread: scale of the start's distribution.
+        inner: whether states beyond the rigid body's are observed as well, less the trim's.
     """
 
     vehicle: Vehicle
@@ -79,6 +83,17 @@ class Flying:
     parameters: Array
     scatter: Mapping[int, float]
     spread: float
+    inner: bool = False
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """What an observation holds, by name."""
+        return (*OBSERVED, *(self.vehicle.state_names[_BODY:] if self.inner else ()))
+
+    @property
+    def edges(self) -> Array:
+        """The largest observation."""
+        return np.concatenate([LIMITS, np.full(len(self.observed) - _BODY, INNER_LIMIT)])
 
     def start(self, random: np.random.Generator) -> tuple[Array, Array]:
         """A state row and a parameter row of a new episode."""
@@ -92,7 +107,14 @@ class Flying:
 
     def observe(self, x: Array, k: NDArray[np.int64]) -> NDArray[np.float32]:
         """Observations of states (n, n_states) at steps (n,)."""
-        return np.asarray(_observed(jnp.asarray(x), jnp.asarray(self.table)[k], self._angles), dtype=np.float32)
+        found = np.asarray(_observed(jnp.asarray(x), jnp.asarray(self.table)[k], self._angles))
+        return self._with_inner(found, x)
+
+    def _with_inner(self, body: Array, x: Array) -> NDArray[np.float32]:
+        if self.inner:
+            beyond = np.nan_to_num(x[:, _BODY:] - self.trim.state[_BODY:])
+            body = np.concatenate([body, np.clip(beyond, -INNER_LIMIT, INNER_LIMIT)], axis=1)
+        return body.astype(np.float32)
 
     def advance(
         self, x: Array, k: NDArray[np.int64], actions: NDArray[Any], p: Array
@@ -118,7 +140,7 @@ class Flying:
             },
         )
         states, observations, rewards, lost = (np.asarray(part) for part in found)
-        return states, observations.astype(np.float32), rewards, lost
+        return states, self._with_inner(observations, states), rewards, lost
 
     @property
     def _angles(self) -> Array:
@@ -135,6 +157,7 @@ def flying(
     spread: float = 1.0,
     randomize: Mapping[str, float] | None = None,
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    inner: bool = False,
 ) -> Flying:
     """A vehicle with a task, ready to step.
 
@@ -147,6 +170,7 @@ def flying(
         spread: scale of `SPREAD`; 0 starts every episode at the trim.
         randomize: relative standard deviation by parameter name, drawn anew for each episode, cut at three.
         wind: north, east and down [m/s].
+        inner: observe the states of rotors, bar and inflow too.
 
     Raises:
         SwashError: for numbers that make no sense, or a parameter that the vehicle does not have.
@@ -183,6 +207,7 @@ def flying(
         parameter_row(chosen, surroundings),
         {chosen.parameter_names.index(name): float(sigma) for name, sigma in (randomize or {}).items()},
         spread,
+        inner,
     )
 
 

@@ -21,7 +21,8 @@ Observations = NDArray[np.float32]
 class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """`num_envs` copies of `HelicopterEnv`, the same numbers to 1e-9; an ended one is reset by the next step.
 
-    `reset(seed=s)` seeds copy i with s + i, as Gymnasium's own vector environments do. Arguments as `HelicopterEnv`.
+    Every info holds the state rows as "state", (num_envs, states). `reset(seed=s)` seeds copy i with s + i, as
+    Gymnasium's own vector environments do. Arguments as `HelicopterEnv`.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -40,7 +41,7 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
             raise SwashError(f"is {num_envs}, expected at least 1.", channel="num_envs")
         self.num_envs, self.render_mode = num_envs, render_mode
         self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
-        self.single_observation_space, self.single_action_space = spaces(len(self.flying.free))
+        self.single_observation_space, self.single_action_space = spaces(self.flying)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._randoms = [np.random.default_rng() for _ in range(num_envs)]
@@ -61,7 +62,11 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
                 if own is not None:
                     self._randoms[i] = np.random.default_rng(own)
         self._begin(np.ones(self.num_envs, dtype=np.bool_))
-        return self.flying.observe(self._x, self._k), {}
+        return self.flying.observe(self._x, self._k), self._info()
+
+    def _info(self) -> dict[str, Any]:
+        """States, and (as Gymnasium's own vector environments say it) for which environments there are any: all."""
+        return {"state": self._x.copy(), "_state": np.ones(self.num_envs, dtype=np.bool_)}
 
     def _begin(self, which: NDArray[np.bool_]) -> None:
         """New episodes for some of them."""
@@ -82,4 +87,4 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
             rewards, lost = np.where(fresh, 0.0, rewards), lost & ~fresh
         truncated = (self._k >= self.flying.steps) & ~lost & ~fresh
         self._ended = lost | truncated
-        return observations, rewards, lost, truncated, {}
+        return observations, rewards, lost, truncated, self._info()

@@ -9,6 +9,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from swashplate.links.live.priority import come_first
+
 _GIVEN_UP = 0.25
 """Seconds behind after which lost time is not made up for."""
 
@@ -77,6 +79,7 @@ class Clock:
             self._thread.join(timeout=5.0)
 
     def _run(self) -> None:
+        come_first()
         try:
             while not self._over:
                 self._running.wait()

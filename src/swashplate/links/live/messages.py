@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from swashplate.errors import SwashError
+from swashplate.links.live.identifying import HOWS
 from swashplate.links.live.pilots import MODES, STICKS
 
 LONGEST = 2048
@@ -56,7 +57,7 @@ SCHEMA: Mapping[str, Mapping[str, Check]] = {
     "speed": {"value": _number(*SPEEDS)},
     "reset": {},
     "record": {"value": _switch},
-    "identify": {"recording": _whole(1, 10_000)},
+    "identify": {"recording": _whole(1, 10_000), "how": _one_of(*HOWS)},
     "stop_identifying": {},
 }
 """Fields and their checks by type; a message has exactly these and its `type`."""

@@ -94,6 +94,13 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
     enable_double_precision()
     if not ahead > 0.0:
         raise SwashError(f"is {ahead:g} s, expected more than zero.", channel="--ahead")
+    missing = [name for name in PREDICTED if name not in flight]
+    if missing:
+        raise FlightError(
+            f"lacks {', '.join(missing)}; it has {', '.join(flight.channels) or 'nothing'}.",
+            where=flight.provenance.source,
+            hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least.",
+        )
     vehicle = drawn_as(flight, model)
     rate = flight.rate("phi")
     stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))

@@ -30,6 +30,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from swashplate.errors import SwashError
 from swashplate.links.live.identifying import REPORT
 from swashplate.links.live.messages import LONGEST, MessageError, parse
+from swashplate.links.live.priority import come_first
 from swashplate.links.live.session import Session
 
 UPDATES = 30.0
@@ -258,5 +259,6 @@ def serve(app: ASGIApp, listening: socket.socket) -> None:
         ws_max_size=4 * LONGEST,
         timeout_graceful_shutdown=2,
     )
+    come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
     with contextlib.suppress(KeyboardInterrupt):
         uvicorn.Server(config).run(sockets=[listening])

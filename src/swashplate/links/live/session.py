@@ -13,7 +13,7 @@ from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.links.live.clock import Clock
-from swashplate.links.live.identifying import Identifying
+from swashplate.links.live.identifying import How, Identifying
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
 from swashplate.links.live.pilots import MODES, STICKS
 from swashplate.links.live.recording import save_recording
@@ -102,7 +102,7 @@ class Session:
         elif kind == "record":
             await self._record(message["value"])
         elif kind == "identify":
-            self._identify(message["recording"])
+            self._identify(message["recording"], message["how"])
         elif kind == "stop_identifying":
             self.identifying.stop()
         elif kind == "reset":
@@ -180,11 +180,11 @@ class Session:
         )
         self.recordings.append(Recording(number, len(rows) * self.world.period, vehicle))
 
-    def _identify(self, number: int) -> None:
+    def _identify(self, number: int, how: How) -> None:
         chosen = next((recording for recording in self.recordings if recording.number == number), None)
         if chosen is None:
             raise SwashError(f"There is no recording {number}.")
-        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number))
+        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number, how))
         self._jobs.add(task)
         task.add_done_callback(self._jobs.discard)
 

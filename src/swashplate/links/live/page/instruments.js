@@ -39,7 +39,8 @@ export class Instruments {
   }
   show(craft, around) {
     const [, , z, u, v, w, phi, theta, psi] = craft.x;
-    this.ball.setAttribute("transform", `rotate(${-DEG * phi}) translate(0 ${1.2 * DEG * theta})`);
+    const lean = `rotate(${(-DEG * phi).toFixed(1)}) translate(0 ${(1.2 * DEG * theta).toFixed(1)})`;
+    if (this.lean !== lean) this.ball.setAttribute("transform", (this.lean = lean));
     const climb = u * Math.sin(theta) - Math.cos(theta) * (v * Math.sin(phi) + w * Math.cos(phi));
     this.number("height", `${(-z).toFixed(2)} m`);
     this.number("climb", `${climb.toFixed(2)} m/s`);

@@ -2,6 +2,7 @@
 import { Connection } from "./connection.js";
 import { Charts } from "./charts.js";
 import { Instruments } from "./instruments.js";
+import { Pace } from "./pace.js";
 import { Panel } from "./panel.js";
 import { Scene } from "./scene.js";
 import { Sticks } from "./sticks.js";
@@ -17,9 +18,9 @@ try {
   $("trouble").hidden = false;
   $("trouble").textContent = "This browser draws no 3D (WebGL is off); charts, sticks and recordings work.";
 }
-const instruments = new Instruments($("instruments"));
+const instruments = new Instruments($("instruments")), pace = new Pace(Boolean(scene?.software));
 let charts = null, hello = null, now = null, before = null, arrived = 0, drawn = 0, drawnTime = 0, chartsAt = 0;
-let updates = 0, number = 0, sent = "", latency = null;
+let number = 0, sent = "", latency = null;
 const underway = new Map(); // stick messages by number and when they were sent
 
 const connection = new Connection({ heard, lost: () => ($("state").textContent = "connection lost, trying again …") });
@@ -31,7 +32,7 @@ function heard(message) {
     hello = message;
     $("title").textContent = hello.title;
     document.title = `${hello.title} · swash live`;
-    charts = new Charts($("charts"), hello.inputs);
+    charts = new Charts($("charts"), hello.inputs, { plain: Boolean(scene?.software) });
     scene?.show(hello.picture);
     panel.hello(hello);
     now = before = null;
@@ -54,9 +55,8 @@ function heard(message) {
     charts.add(now.t, now.own, now.ghost);
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
   }
-  panel.show(now, latency);
-  updates += 1;
-  if (scene?.software && updates % 3 === 0) draw();
+  panel.now = now; // what buttons act on is never older than what was heard
+  pace.told(now);
 }
 
 // Where a body state will be a few milliseconds after it was told, from its last two.
@@ -74,17 +74,18 @@ function draw() {
   const rows = {};
   for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
   scene?.draw(rows, now, elapsed);
+  panel.show(now, latency);
   instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "");
   document.documentElement.dataset.drawn = String(Number(document.documentElement.dataset.drawn ?? 0) + 1);
 }
 
 function frame(at) {
-  requestAnimationFrame(frame);
   steer(Math.min((at - drawn) / 1000, 0.1));
   drawn = at;
   if (!now || !hello) return;
-  if (!scene?.software) draw();
-  if (at - chartsAt > (scene?.software ? 2 : 1) * CHARTS_EVERY) {
+  if (!pace.due(at)) return;
+  draw();
+  if (at - chartsAt >= (scene?.software ? 2 : 1) * CHARTS_EVERY) {
     chartsAt = at;
     charts.draw();
   }
@@ -103,5 +104,5 @@ function steer(elapsed) {
   connection.say("stick", { ...axes, number });
 }
 
-window.swash = { sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; } };
-requestAnimationFrame(frame);
+window.swash = { sticks, scene, get now() { return now; }, get charts() { return charts; }, get latency() { return latency; }, pace };
+pace.run(frame);

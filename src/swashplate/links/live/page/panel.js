@@ -2,11 +2,21 @@
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
+// Only what differs is written: every change of the page is laid out and painted anew.
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function press(button, on) {
+  if (button.getAttribute("aria-pressed") !== String(on)) button.setAttribute("aria-pressed", on);
+}
+
 export class Panel {
   constructor(say, { view }) {
     this.say = say;
     this.now = null;
     this.touched = new Map(); // sliders that a hand holds are not moved by the server
+    this.slid = new Map();
     for (const button of document.querySelectorAll("[data-mode]"))
       button.onclick = () => say("mode", { value: button.dataset.mode });
     for (const name of ["decoupled", "ghost", "bar"]) $(name).onchange = () => say(name, { value: $(name).checked });
@@ -15,7 +25,7 @@ export class Panel {
     for (const button of document.querySelectorAll("[data-view]"))
       button.onclick = () => {
         view(button.dataset.view);
-        for (const other of document.querySelectorAll("[data-view]")) other.setAttribute("aria-pressed", other === button);
+        for (const other of document.querySelectorAll("[data-view]")) press(other, other === button);
       };
     const blow = () => say("wind", { north: Number($("north").value), east: Number($("east").value), down: 0 });
     this.#slider("north", " m/s", blow);
@@ -28,15 +38,16 @@ export class Panel {
     $("slower").onclick = () => this.#faster(-1);
     $("faster").onclick = () => this.#faster(1);
     $("record").onclick = () => say("record", { value: this.now?.recording === null });
-    $("identify").onclick = () => say("identify", { recording: Number($("which").value) });
+    $("identify").onclick = () => say("identify", { recording: Number($("which").value), how: $("how").value });
     $("stop-identifying").onclick = () => say("stop_identifying");
   }
 
   #slider(id, unit, changed) {
     const input = $(id);
-    const show = () => (input.nextElementSibling.textContent = Number(input.value).toFixed(1) + unit);
+    const show = () => write(input.nextElementSibling, Number(input.value).toFixed(1) + unit);
     input.oninput = () => {
       this.touched.set(id, performance.now());
+      this.slid.delete(id);
       show();
       changed(Number(input.value));
     };
@@ -79,36 +90,38 @@ export class Panel {
 
   gamepad(name) {
     const text = name ? `Gamepad: ${name}` : "No gamepad: keyboard and the sticks on the screen fly.";
-    if ($("gamepad").textContent !== text) $("gamepad").textContent = text;
+    write($("gamepad"), text);
   }
 
   show(now, latency) {
-    this.now = now;
     const { setting } = now;
     for (const button of document.querySelectorAll("[data-mode]"))
-      button.setAttribute("aria-pressed", button.dataset.mode === setting.mode);
-    for (const name of ["decoupled", "ghost", "bar"]) $(name).checked = setting[name];
+      press(button, button.dataset.mode === setting.mode);
+    for (const name of ["decoupled", "ghost", "bar"]) if ($(name).checked !== setting[name]) $(name).checked = setting[name];
     const values = { north: setting.wind[0], east: setting.wind[1], gusts: setting.gusts, voltage: setting.voltage };
     for (const [id, value] of Object.entries(values)) {
-      if (performance.now() - (this.touched.get(id) ?? -1e9) > 800) $(id).value = value;
+      if (performance.now() - (this.touched.get(id) ?? -1e9) > 800 && this.slid.get(id) !== value) {
+        $(id).value = value;
+        this.slid.set(id, value);
+      }
       $(id).show();
     }
-    $("pause").textContent = now.runs ? "Pause" : "Go on";
-    $("speed").textContent = `${now.speed}×`;
-    $("maneuver").textContent = now.maneuver > 0 ? `${now.maneuver.toFixed(0)} s left` : "";
-    $("record").textContent = now.recording === null ? "Record" : "Stop and save";
+    write($("pause"), now.runs ? "Pause" : "Go on");
+    write($("speed"), `${now.speed}×`);
+    write($("maneuver"), now.maneuver > 0 ? `${now.maneuver.toFixed(0)} s left` : "");
+    write($("record"), now.recording === null ? "Record" : "Stop and save");
     $("record").classList.toggle("on", now.recording !== null);
-    $("recorded").textContent = now.recording === null ? "" : `${now.recording.toFixed(0)} s`;
+    write($("recorded"), now.recording === null ? "" : `${now.recording.toFixed(0)} s`);
     this.#recordings(now);
     const words = now.trouble || now.notice;
     $("trouble").hidden = !words;
-    if ($("trouble").textContent !== words) $("trouble").textContent = words;
+    write($("trouble"), words);
     const share = now.steps ? (100 * now.late) / now.steps : 0;
     const state = [
       `${now.t.toFixed(1)} s`, now.runs ? "" : "paused", `late ${share.toFixed(2)} %`, `busy ${(100 * now.busy).toFixed(0)} %`,
       latency === null ? "" : `stick ${latency.toFixed(0)} ms`,
     ];
-    $("state").textContent = state.filter(Boolean).join(" · ");
+    write($("state"), state.filter(Boolean).join(" · "));
   }
 
   #recordings({ recordings, job }) {

@@ -110,7 +110,7 @@ window.addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-charts = new Charts($("charts"), flight.inputs, { whole: true });
+charts = new Charts($("charts"), flight.inputs, { whole: true, plain: Boolean(scene?.software) });
 scene?.show(flight.picture);
 const step = flight.time.length > 1 ? flight.time[Math.floor(flight.time.length / 2)] - flight.time[Math.floor(flight.time.length / 2) - 1] : 1;
 const broken = (k) => k > 0 && flight.time[k] - flight.time[k - 1] > 2.5 * step;

@@ -6,6 +6,16 @@ const TRAIL = 900;
 const COLORS = { own: 0xd55e00, ghost: 0x56b4e9 };
 const SOFTWARE = /swiftshader|llvmpipe|software/i;
 
+// Asked of a context of its own: whether edges are smoothed is settled when the page's is made.
+function drawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl) return false;
+  const told = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return SOFTWARE.test(name);
+}
+
 class Trail {
   constructor(color) {
     this.points = new Float32Array(3 * TRAIL);
@@ -35,10 +45,8 @@ class Trail {
 export class Scene {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
-    const gl = this.renderer.getContext(), told = gl.getExtension("WEBGL_debug_renderer_info");
-    const name = String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-    this.software = SOFTWARE.test(name); // drawn by the processor that also simulates: fewer and coarser pictures
+    this.software = drawnInSoftware(); // by the processor that also simulates: coarser pictures, edges unsmoothed
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.software, powerPreference: "high-performance" });
     this.renderer.setPixelRatio(this.software ? 0.6 : Math.min(window.devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0xdbe8f2);

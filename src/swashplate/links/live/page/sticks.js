@@ -46,6 +46,8 @@ class ScreenStick {
     this.show(across, along);
   }
   show(across, along) {
+    if (this.shown === `${across} ${along}`) return;
+    this.shown = `${across} ${along}`;
     this.knob.style.transform = `translate(${40 * across}%, ${-40 * along}%)`;
   }
 }

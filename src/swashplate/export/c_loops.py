@@ -1,0 +1,110 @@
+"""A traced function in C whose roots are found by Newton's method in loops that end when the guess no longer moves.
+
+Unrolled, as every other back end has it, the search always takes as many steps as its worst case. Roots that do not
+depend on each other are sought in one loop, so that a processor works on the one while the other waits for a quotient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from swashplate.export.c_expression import Statement, statements
+from swashplate.export.c_text import Precision, literal
+
+if TYPE_CHECKING:
+    from swashplate.export.traced import Looped
+
+_SETTLED: dict[Precision, float] = {"double": 1e-9, "single": 1e-4}
+"""Relative change of a step after which the error, of the order of its square, is below rounding."""
+
+
+def looped_body(made: Looped, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+    """Statements in C that compute a function with roots.
+
+    Args:
+        made: the function and its roots.
+        real, precision, inputs, outputs: as for `c_expression.body`, without those of the roots.
+
+    Raises:
+        ExportError: as `c_expression.statements`.
+    """
+    found = statements(made.function, precision=precision, inputs=[*inputs, "guess", "root"])
+    count, n = len(made.steps), len(outputs)
+    start, value, slope = ([found.outputs[n + k, i] for i in range(count)] for k in range(3))
+    needs = _needs(found.body, count)
+    rounds = _rounds([*zip(start, value, slope, strict=True)], needs, count)
+
+    def known_after(name: str) -> int:
+        """How many rounds of loops come before a text can be evaluated."""
+        roots, _ = needs.get(name, (frozenset(), frozenset()))
+        return max((rounds[r] for r in roots), default=0)
+
+    lines: list[str] = []
+    for number in range(max(rounds) + 1):
+        plain = [s for s in found.body if not needs[s.name][1] and known_after(s.name) == number]
+        lines += [f"  {_named(s).text(real, precision)}" for s in plain]
+        sought = [i for i in range(count) if rounds[i] == number + 1]
+        if sought:
+            inside = [s for s in found.body if needs[s.name][1] & set(sought)]
+            lines += _loop(sought, inside, made, (start, value, slope), real, precision)
+    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in found.outputs.items() if o < n]
+    head = [f"  {real} {', '.join(f'root{i}' for i in range(count))};", "  int step;"]
+    return "\n".join([*head, *lines, *stores]) + "\n"
+
+
+_Needs = dict[str, tuple[frozenset[int], frozenset[int]]]
+
+
+def _needs(body: Sequence[Statement], count: int) -> _Needs:
+    """Which roots and which guesses every statement depends on."""
+    nothing: frozenset[int] = frozenset()
+    known: _Needs = {f"root[{i}]": (frozenset({i}), nothing) for i in range(count)}
+    known |= {f"guess[{i}]": (nothing, frozenset({i})) for i in range(count)}
+    for s in body:
+        of = [known.get(name, (nothing, nothing)) for name in s.reads]
+        known[s.name] = (nothing.union(*(a for a, _ in of)), nothing.union(*(b for _, b in of)))
+    return known
+
+
+def _rounds(texts: Sequence[tuple[str, str, str]], needs: _Needs, count: int) -> list[int]:
+    """The loop, from 1, in which each root is sought: after those that it depends on."""
+    found: list[int] = []
+    for i in range(count):
+        before = frozenset().union(*(needs.get(text, (frozenset(), frozenset()))[0] for text in texts[i]))
+        found.append(1 + max((found[r] for r in before), default=0))
+    return found
+
+
+def _renamed(text: str) -> str:
+    for kind in ("root", "guess"):
+        if text.startswith(f"{kind}["):
+            return f"root{text[len(kind) + 1 : -1]}"
+    return text
+
+
+def _named(s: Statement) -> Statement:
+    return Statement(s.name, s.operation, tuple(map(_renamed, s.reads)))
+
+
+def _loop(
+    sought: Sequence[int],
+    inside: Sequence[Statement],
+    made: Looped,
+    texts: tuple[Sequence[str], Sequence[str], Sequence[str]],
+    real: str,
+    precision: Precision,
+) -> list[str]:
+    start, value, slope = texts
+    size = "fabsf" if precision == "single" else "fabs"
+    small = literal(_SETTLED[precision], precision)
+    settled = " && ".join(f"{size}(move{i}) <= {small} * {size}(root{i})" for i in sought)
+    return [
+        *(f"  root{i} = {_renamed(start[i])};" for i in sought),
+        f"  for (step = 0; step < {max(made.steps[i] for i in sought)}; ++step) {{",
+        *(f"    {_named(s).text(real, precision)}" for s in inside),
+        *(f"    const {real} move{i} = {_renamed(value[i])} / {_renamed(slope[i])};" for i in sought),
+        *(f"    root{i} -= move{i};" for i in sought),
+        f"    if ({settled}) break;",
+        "  }",
+    ]
