@@ -20,7 +20,8 @@ def validate(
     published: Annotated[
         str | None,
         typer.Option(
-            "--published", help="The card (or state-space model) to compare with; by default the vehicle's own."
+            "--published",
+            help="The card (or state-space model) to compare with; by default the one that it was identified from.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
