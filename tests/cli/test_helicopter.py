@@ -95,9 +95,19 @@ def test_a_sweep_in_hover_is_flown_and_saved(tmp_path: Path) -> None:
     out = tmp_path / "sweep.nc"
     outcome = swash("simulate", "--vehicle", "raptor50", "--maneuver", "doublet:pitch,0.5s,0.03", "--out", out)
     assert outcome.code == 0, outcome.err
+    assert "Careful" not in outcome.err
     flight = Flight.load(out)
     assert np.ptp(flight.values("B1")) > 0.05
     assert np.ptp(flight.values("q")) > np.ptp(flight.values("p"))
+
+
+def test_a_simulation_says_when_it_leaves_what_its_equations_hold_for(tmp_path: Path) -> None:
+    """A rotor at little more than half its speed would stall in hover."""
+    card = tmp_path / "slow.toml"
+    vehicle("raptor50").with_values({"rotor_speed": 90.0, "collective_high": 0.4, "tail_high": 0.8}).save(card)
+    outcome = swash("simulate", "--vehicle", card, "--maneuver", "doublet:pitch,0.5s,0.01", "--out", tmp_path / "x.nc")
+    assert outcome.code == 0
+    assert outcome.err.startswith("Careful: At 0.0 s C_T / sigma is 0.")
 
 
 def test_a_new_card_is_commented_and_flies(tmp_path: Path) -> None:

@@ -157,15 +157,28 @@ def simulate(
             rate=rate,
             wind=blowing,
         )
+        remarks = _doubts(aircraft, flight)
         if sensors is not SensorSet.NONE:
             from swashplate.simulation.sensors import QUIET, Sensors
 
             chosen = QUIET if sensors is SensorSet.CLEAN else Sensors()
             flight = sp.observe(flight, aircraft, sensors=chosen, seed=seed)
         paths = _save(flight, out)
+    for words in remarks:
+        typer.echo(f"Careful: {words}.", err=True)
     if not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
+    """Where a simulated flight leaves what its equations hold for."""
+    from swashplate.vehicles.helicopter_limits import doubts_along
+
+    if vehicle.name != "conventional":
+        return ()
+    rows = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
+    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), *rows)
 
 
 def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:
