@@ -30,6 +30,8 @@ from swashplate.vehicles.vehicle import Vehicle
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 _T = TypeVar("_T", Noise, Nuisance)
 _EXAMPLES = 6
+_STARTS = 1.0
+"""Seconds over which starts are spread at least."""
 _EDGE = 0.1
 """Seconds at a record's end whose measured rates have too few samples around them to be a truth."""
 
@@ -83,15 +85,15 @@ def validate(
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
-    shortest = calibration + min(horizons) + 1.0
+    shortest = calibration + _STARTS + min(horizons)
     all_pieces = records(flights, vehicle)
     pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
     if not pieces:
-        longest = max(piece.time[-1] - piece.time[0] for piece in all_pieces)
+        longest = max(all_pieces, key=lambda piece: float(piece.time[-1] - piece.time[0]))
         raise FlightError(
-            f"the longest unbroken piece has {longest:.1f} s, expected more than {shortest:g} s "
-            f"({calibration:g} s to calibrate, then the shortest horizon).",
-            where=all_pieces[0].name,
+            f"the longest unbroken piece has {longest.time[-1] - longest.time[0]:.1f} s, expected more than "
+            f"{shortest:g} s ({calibration:g} s to calibrate, {_STARTS:g} s of starts and {min(horizons):g} s ahead).",
+            where=longest.name,
             hint="Use a longer flight, or a shorter calibration.",
         )
     parts: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
