@@ -67,11 +67,11 @@ class Recovery:
         return np.asarray(self.error / self.sigma)
 
 
-def recover(flight: Flight, *, seed: int, method: str = "output-error") -> Recovery:
+def recover(flight: Flight, *, seed: int, method: str = "output-error", wind: bool = False) -> Recovery:
     """What one seed of the usual sensors (noise, gaps, outliers, jitter, battery) makes of a flight."""
     vehicle = truth()
     logged = sp.observe(flight, vehicle, seed=seed, sensors=sp.Sensors()).condition(rate=100.0, cutoff=0.0)
-    fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method=method)
+    fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method=method, wind=wind)
     free = [estimate for estimate in fit.parameters if not estimate.tie]
     known = vehicle.card.values()
     return Recovery(

@@ -124,6 +124,29 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     assert not C[:, n:].any()
 
 
+def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
+    """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
+    model, noise = stochastic_model(COAX, POSE, DT, windy=True), Noise(wind=0.4, tau_wind=0.5, speed=0.1)
+    x, u = hover(COAX, COAX.values(), jnp.asarray(VOLTAGE))
+    A, C, Q, _ = jax.jit(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
+    n = x.size
+    assert A.shape == (n + 8 + 6, n + 8 + 6)
+    assert C.shape == (6, n + 8 + 6)
+    np.testing.assert_allclose(np.diag(A)[n + 6 : n + 8], np.exp(-DT / 0.5))
+    np.testing.assert_allclose(np.diag(Q)[n + 6 : n + 8], 0.4**2 * DT)
+    volts = jnp.asarray(VOLTAGE)
+    air = jax.jit(jax.vmap(lambda x, w: model.step(x, jnp.append(jnp.zeros(6), w), (u, u, u), COAX.values(), volts)))
+    sigma, tiny = np.sqrt(0.1**2 + 0.4**2 * 0.5 / 2.0), 1e-4
+    drawn = np.tile(np.asarray(x), (4000, 1))
+    drawn[:, [COAX.index("u"), COAX.index("v")]] += sigma * np.random.default_rng(5).standard_normal((4000, 2))
+    rows = np.array([COAX.index(name) for name in ("u", "v", "p", "q")])
+    for i in range(2):
+        away = np.tile(tiny * np.eye(2)[i], (4000, 1))
+        slope = np.mean((air(drawn, away) - air(drawn, -away)) / (2.0 * tiny), axis=0)[rows]
+        # Four points stand for a bell: |speed| has a kink, and their mean of it is 1.13 times that of the bell.
+        np.testing.assert_allclose(A[rows, n + 6 + i], slope, rtol=0.2, atol=0.05 * np.abs(slope).max())
+
+
 def test_the_noise_has_its_units() -> None:
     """Per square root of hertz: over one second a white push of w leaves a velocity of scatter w, a walk of d, d."""
     _, _, Q, R = _linear()

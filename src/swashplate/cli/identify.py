@@ -39,7 +39,7 @@ class Question:
 
     Attributes:
         free: a ready choice or parameter names.
-        method, ties, fixed, priors, prior_card, iterations, keep_unexcited: as in `swashplate.identify`.
+        method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as in `swashplate.identify`.
     """
 
     free: str | Sequence[str] = "full"
@@ -50,6 +50,7 @@ class Question:
     prior_card: Card | None = None
     iterations: int = 60
     keep_unexcited: bool = False
+    wind: bool = False
 
 
 def identify(
@@ -79,6 +80,9 @@ def identify(
     keep_unexcited: Annotated[
         bool, typer.Option("--keep-unexcited", help="Also fit parameters of axes that no flight moves independently.")
     ] = False,
+    wind: Annotated[
+        bool, typer.Option("--wind", help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
+    ] = False,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -106,6 +110,7 @@ def identify(
         prior_card=None if card is None else find(card).card,
         iterations=iterations,
         keep_unexcited=keep_unexcited,
+        wind=wind,
     )
     aircraft = find(vehicle)
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
@@ -162,6 +167,7 @@ def run(
             prior_card=question.prior_card,
             iterations=question.iterations,
             keep_unexcited=question.keep_unexcited,
+            wind=question.wind,
             progress=lambda i, cost: line.say(
                 "fitting", done=i, total=question.iterations, note=f"iteration {i}, cost {cost:.6g}"
             ),

@@ -15,7 +15,7 @@ from swashplate.identification.fit import APART, AxisExcitation, Comparison, Est
 from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.output_error import OutputError
 from swashplate.identification.parameters import FROM_CARD, Free, Parameterization, parameterize
-from swashplate.identification.prediction_error import PredictionError
+from swashplate.identification.prediction_error import PredictionError, in_wind
 from swashplate.identification.records import POSE, Record, records
 from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.stochastic import Noise, Nuisance
@@ -45,6 +45,7 @@ def identify(
     outputs: Sequence[str] = POSE,
     iterations: int = 60,
     keep_unexcited: bool = False,
+    wind: bool = False,
     progress: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Identify a vehicle's parameters from one or more conditioned flights.
@@ -62,6 +63,8 @@ def identify(
         outputs: measured channels.
         iterations: at most this many.
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
+        wind: True estimates a horizontal wind that acts through the equations (prediction error only): for flights
+            outdoors or in strong gusts.
         progress: called with the iteration's number and cost.
 
     Returns:
@@ -85,7 +88,16 @@ def identify(
     notes: list[str] = []
     if method == "prediction-error" and not keep_unexcited:
         table, notes = _hold_unexcited(table, axes)
-    likelihood = PredictionError(table, pieces) if method == "prediction-error" else OutputError(table, pieces)
+    if wind and method != "prediction-error":
+        raise IdentificationError(
+            f"a wind was asked for, and method is '{method}'.",
+            hint="Only prediction error estimates a wind: leave --wind away, or use --method prediction-error.",
+        )
+    likelihood = (
+        PredictionError(table, pieces, noise=in_wind(pieces) if wind else None)
+        if method == "prediction-error"
+        else OutputError(table, pieces)
+    )
     where = ", ".join(piece.name for piece in pieces)
     likelihood.refresh(likelihood.row.starts())
     accuracy.refuse_unseen(likelihood.row, likelihood.scores(likelihood.row.starts())[2], where=where)
@@ -132,6 +144,7 @@ def identify(
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
             "held at the prior card": list(table.held),
             "outputs": list(outputs),
+            "wind": wind,
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
             "voltage": "logged" if all(piece.voltage_known for piece in pieces) else "not logged: card's nominal",

@@ -39,6 +39,8 @@ SETTLING = 1.5
 _NOISE_SPREAD = {"tau_gust_moment": 0.5, "tau_gust_force": 0.5, "drift_moment": 0.5, "drift_force": 0.5}
 """Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
 
+_WIND = ("wind", "tau_wind")
+
 _NUISANCE = {
     # name: start, scale, prior sigma
     "delay_servo": (0.05, 0.05, 0.05),
@@ -72,6 +74,20 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
         )
         for free, start, lower, upper in zip(table.free, table.starts(), low, high, strict=True)
     ]
+
+
+def in_wind(pieces: Sequence[Record]) -> Noise:
+    """First guesses of the noise for flights in horizontal wind, with the speed that the records were flown at."""
+    return Noise(wind=0.1, speed=_typical_speed(pieces))
+
+
+def _typical_speed(pieces: Sequence[Record]) -> float:
+    """Root mean square of each horizontal velocity [m/s]; zero where no positions were measured."""
+    if not {"x", "y"} <= set(pieces[0].output_names):
+        return 0.0
+    columns = [pieces[0].output_names.index(name) for name in ("x", "y")]
+    velocities = [slopes(piece, np.arange(0.0, piece.time.size, 10.0))[1][:, columns] for piece in pieces]
+    return float(np.sqrt(np.mean(np.concatenate(velocities) ** 2)))
 
 
 def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
@@ -112,8 +128,9 @@ class PredictionError:
         self.table = table
         self.pieces = tuple(pieces)
         self.noise = noise or Noise()
+        windy = float(self.noise.wind) > 0.0
         self.estimate_noise = estimate_noise
-        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, windy=windy)
         self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
         for number in range(len(self.logs)):
@@ -125,7 +142,8 @@ class PredictionError:
                     Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
                 )
         if estimate_noise:
-            for name, value in self.noise._asdict().items():
+            for name in _estimated(self.model):
+                value = getattr(self.noise, name)
                 log = float(np.log(value))
                 entries.append(
                     Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
@@ -240,6 +258,11 @@ def _by_covariance(dM: Array, n: int) -> Array:
     return np.asarray(0.5 * n * flat @ flat.T)
 
 
+def _estimated(model: StochasticModel) -> tuple[str, ...]:
+    """The noise numbers that are estimated: the speed is given, and the wind's only where there is one."""
+    return tuple(name for name in Noise._fields if name != "speed" and (model.windy or name not in _WIND))
+
+
 @dataclass(frozen=True)
 class _Plan:
     """What compiled code depends on: everything but numbers."""
@@ -257,8 +280,11 @@ def _unpack(plan: _Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
     nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
         **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
     )
-    noise = Noise(*(jnp.exp(numbers[k + n * m :]) if plan.estimate_noise else data["noise"]))
-    return plan.layout.values(data["card"], numbers[:k]), nuisance, noise
+    noise = data["noise"]
+    if plan.estimate_noise:
+        estimated = jnp.array([Noise._fields.index(name) for name in _estimated(plan.model)])
+        noise = noise.at[estimated].set(jnp.exp(numbers[k + n * m :]))
+    return plan.layout.values(data["card"], numbers[:k]), nuisance, Noise(*noise)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -318,6 +344,6 @@ def filter_record(
         inputs=jnp.mean(reaching[0][:settled], axis=0),
         voltage=voltage[0],
     )
-    start = FilterState(x, jnp.zeros(N_DISTURBANCES), jnp.zeros(N_DISTURBANCES))
+    start = FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
     innovations, states = model.run(start, y, reaching, parameters, voltage, noise, nuisance, gain)
     return innovations, gain.covariance, states

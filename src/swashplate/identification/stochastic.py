@@ -1,9 +1,11 @@
 """A vehicle in disturbed air, seen by sensors: the model whose one-step predictions prediction error compares.
 
 The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
-it fades) and a drift (random walk: trims, battery, servo zeros). Both are held over a sample. The measurement update
-has a constant gain from the Riccati equation at hover (Jategaonkar 2015, sec. 5.4); horizontal position errors are
-turned into the heading first, so that the gain does not depend on where the nose points.
+it fades) and a drift (random walk: trims, battery, servo zeros). Where asked, a horizontal wind (Ornstein-Uhlenbeck
+too) acts through the equations themselves: what moving air does to the rotors depends on the very parameters that are
+sought. All are held over a sample. The measurement update has a constant gain from the Riccati equation around hover
+(Jategaonkar 2015, sec. 5.4); horizontal position errors are turned into the heading first, so that the gain does not
+depend on where the nose points.
 """
 
 from __future__ import annotations
@@ -27,16 +29,18 @@ from swashplate.simulation.dynamics import (
 )
 from swashplate.vehicles.vehicle import Vehicle
 
-N_DISTURBANCES = 6
 DISTURBED = ("p", "q", "r", "u", "v", "w")
 """The states whose rates are disturbed, in the order of the disturbances."""
+
+N_DISTURBANCES = len(DISTURBED)
 
 
 class Noise(NamedTuple):
     """Intensities of the process noise and standard deviations of the measurement noise.
 
-    `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)],
-    `tau_gust_*` [s], `sensor_*` per sample [m, rad].
+    `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
+    [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
+    velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
     """
 
     white_tilt: Any = 0.5
@@ -53,6 +57,9 @@ class Noise(NamedTuple):
     drift_force: Any = 0.03
     sensor_position: Any = 3e-4
     sensor_angle: Any = 1.5e-3
+    wind: Any = 0.0
+    tau_wind: Any = 1.0
+    speed: Any = 0.0
 
 
 class Nuisance(NamedTuple):
@@ -78,7 +85,7 @@ class Nuisance(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """Constant measurement update of states, gusts and drifts, and the innovations' covariance."""
+    """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance."""
 
     state: Any
     gust: Any
@@ -87,7 +94,7 @@ class Gain(NamedTuple):
 
 
 class FilterState(NamedTuple):
-    """Estimated vehicle states and disturbances."""
+    """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts."""
 
     x: Any
     gust: Any
@@ -104,12 +111,14 @@ class StochasticModel:
         equations: whose equations.
         output_names: measured channels.
         dt: sample time [s].
+        windy: a horizontal wind is among the disturbances.
         held: commands are kept through each sample (a flight computer's outputs); otherwise a smooth curve joins them.
     """
 
     equations: Equations
     output_names: tuple[str, ...]
     dt: float
+    windy: bool = False
     held: bool = True
 
     @property
@@ -117,13 +126,19 @@ class StochasticModel:
         """For names only: its card is any card of these equations."""
         return self.equations.vehicle
 
+    @property
+    def n_gusts(self) -> int:
+        """What fades: a gust on each disturbed acceleration, and perhaps the wind to north and east."""
+        return N_DISTURBANCES + 2 * self.windy
+
     # ---- one sample --------------------------------------------------------------------------------------------
-    def step(self, x: Any, accelerations: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
-        """The state one sample later, with disturbing accelerations held (in the order of `DISTURBED`)."""
+    def step(self, x: Any, gust: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
+        """The state one sample later, with held disturbances: accelerations as in `DISTURBED`, and perhaps the wind."""
         rates = row_rates(self.equations, padded=False)
-        push = jnp.zeros(x.shape[0]).at[self._disturbed].set(accelerations)
-        calm = jnp.zeros(3)
-        driving = jnp.stack([jnp.concatenate([row, calm, voltage[None]]) for row in u])
+        push = jnp.zeros(x.shape[0]).at[self._disturbed].set(gust[:N_DISTURBANCES])
+        wind = jnp.zeros(3).at[: 2 * self.windy].set(gust[N_DISTURBANCES:])
+        air = jnp.append(wind, voltage)
+        driving = jnp.stack([jnp.concatenate([row, air]) for row in u])
         constants = [getattr(Environment(), name) for name in CONSTANTS]
         numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
         return rk4_step_looped(
@@ -158,24 +173,34 @@ class StochasticModel:
     def linear(
         self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance
     ) -> tuple[Any, Any, Any, Any]:
-        """A, C, Q, R of the joined system (states, gusts, drifts) around an equilibrium with the nose north."""
-        n, m = x.shape[0], N_DISTURBANCES
-        zero = jnp.zeros(m)
-        by_x, by_push = jax.jacfwd(lambda x, d: self.step(x, d, (u, u, u), parameters, voltage), argnums=(0, 1))(
-            x, zero
-        )
+        """A, C, Q, R of the joined system (states, gusts, drifts) around an equilibrium with the nose north.
+
+        Wind acts through terms that grow with the square of the speed and have no slope at rest; with wind, slopes are
+        averaged over a normal distribution of the horizontal air speed by four points (statistical linearisation,
+        Gelb 1974, sec. 6.2; cubature of the third degree).
+        """
+        n, g, d = x.shape[0], self.n_gusts, N_DISTURBANCES
+        places = x[None]
+        if self.windy:
+            sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
+            along = jnp.zeros((2, n)).at[jnp.arange(2), self._disturbed[3:5]].set(jnp.sqrt(2.0) * sigma)
+            places = jnp.concatenate([x + along, x - along])
+        slopes = jax.jacfwd(lambda x, w: self.step(x, w, (u, u, u), parameters, voltage), argnums=(0, 1))
+        by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(lambda x: slopes(x, jnp.zeros(g)))(places))
+        by_push = by_gust[:, :d]
         A = jnp.block(
             [
-                [by_x, by_push, by_push],
-                [jnp.zeros((m, n)), jnp.diag(self._fade(noise)), jnp.zeros((m, m))],
-                [jnp.zeros((m, n + m)), jnp.eye(m)],
+                [by_x, by_gust, by_push],
+                [jnp.zeros((g, n)), jnp.diag(self._fade(noise)), jnp.zeros((g, d))],
+                [jnp.zeros((d, n + g)), jnp.eye(d)],
             ]
         )
-        C = jnp.concatenate([jax.jacfwd(lambda x: self.measure(x, nuisance))(x), jnp.zeros((self.n_outputs, 2 * m))], 1)
+        by_state = jax.jacfwd(lambda x: self.measure(x, nuisance))(x)
+        C = jnp.concatenate([by_state, jnp.zeros((self.n_outputs, g + d))], 1)
         tilt, yaw, horizontal, vertical = noise[:4]
         white = jnp.stack([tilt, tilt, yaw, horizontal, horizontal, vertical])
         tilt, yaw, horizontal, vertical = noise[4:8]
-        gust = jnp.stack([tilt, tilt, yaw, horizontal, horizontal, vertical])
+        gust = jnp.stack([tilt, tilt, yaw, horizontal, horizontal, vertical, noise.wind, noise.wind])[:g]
         drift = jnp.stack([noise.drift_moment] * 3 + [noise.drift_force] * 3)
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
         spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T
@@ -186,13 +211,14 @@ class StochasticModel:
 
     def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> Gain:
         """Steady gain at an equilibrium with the nose north."""
-        n, m = x.shape[0], N_DISTURBANCES
+        n, g = x.shape[0], self.n_gusts
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
-        return Gain(K[:n], K[n : n + m], K[n + m :], S)
+        return Gain(K[:n], K[n : n + g], K[n + g :], S)
 
     def _fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
-        return jnp.exp(-self.dt / jnp.stack([noise.tau_gust_moment] * 3 + [noise.tau_gust_force] * 3))
+        taus = [noise.tau_gust_moment] * 3 + [noise.tau_gust_force] * 3 + [noise.tau_wind] * 2
+        return jnp.exp(-self.dt / jnp.stack(taus[: self.n_gusts]))
 
     def _floor(self, n: int) -> Any:
         """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
@@ -210,18 +236,17 @@ class StochasticModel:
     def correct(self, state: FilterState, y: Any, gain: Gain, nuisance: Nuisance) -> tuple[FilterState, Any]:
         """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
-        innovation = self._turn_outputs(y - self.measure(state.x, nuisance), -psi)
-        moved = self._turn_states(gain.state @ innovation, psi)
-        return (
-            FilterState(state.x + moved, state.gust + gain.gust @ innovation, state.drift + gain.drift @ innovation),
-            innovation,
-        )
+        innovation = _turn(y - self.measure(state.x, nuisance), self.output_names, -psi)
+        x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
+        x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift), innovation
 
     def predict(
         self, state: FilterState, u: tuple[Any, Any, Any], parameters: Any, voltage: Any, noise: Noise
     ) -> FilterState:
         """The state one sample later."""
-        x = self.step(state.x, state.gust + state.drift, u, parameters, voltage)
+        acting = state.gust.at[:N_DISTURBANCES].add(state.drift)
+        x = self.step(state.x, acting, u, parameters, voltage)
         return FilterState(x, self._fade(noise) * state.gust, state.drift)
 
     def run(
@@ -252,16 +277,13 @@ class StochasticModel:
         _, (innovations, states) = jax.lax.scan(sample, start, (y, u, voltage))
         return innovations, states
 
-    # ---- heading -----------------------------------------------------------------------------------------------
-    def _turn_outputs(self, row: Any, angle: Any) -> Any:
-        return _turn(row, self.output_names, angle)
 
-    def _turn_states(self, row: Any, angle: Any) -> Any:
-        return _turn(row, self.vehicle.state_names, angle)
+_GUST_NAMES = (*DISTURBED, "x", "y")
+"""The gusts, the wind by the axes that it blows along."""
 
 
 def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
-    """The horizontal position in a row turned by an angle about the vertical."""
+    """The part of a row that lies along x and y, turned by an angle about the vertical."""
     if "x" not in names or "y" not in names:
         return row
     i, j = names.index("x"), names.index("y")
@@ -269,9 +291,11 @@ def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
     return row.at[i].set(c * row[i] - s * row[j]).at[j].set(s * row[i] + c * row[j])
 
 
-def stochastic_model(vehicle: Vehicle, output_names: tuple[str, ...], dt: float) -> StochasticModel:
+def stochastic_model(
+    vehicle: Vehicle, output_names: tuple[str, ...], dt: float, *, windy: bool = False
+) -> StochasticModel:
     """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds."""
-    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9))
+    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9), windy)
 
 
 def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, held: bool) -> tuple[Any, Any, Any]:

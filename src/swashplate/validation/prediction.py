@@ -67,7 +67,7 @@ def predict(
     At each start the observer has seen the record up to that sample and nothing after it. From there on the equations
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt)
+    model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
     parameters = jax.tree.map(jnp.asarray, vehicle.values())
     value, rate = slopes(record, np.array([0]))
     n, ahead = record.time.size, round(horizon / record.dt)
@@ -156,7 +156,7 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
 
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt)
+    model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
     parameters = vehicle.values()
     voltage = jnp.asarray(float(np.mean(record.voltage)))
     x, u = hover(vehicle, parameters, voltage)
