@@ -85,7 +85,7 @@ class Command:
     @property
     def slow(self) -> bool:
         """Minutes long: real flights are identified from, or predicted; a helicopter's derivatives are compiled."""
-        long = _REAL in self.line or self.words[1] == "demo" or (self.words[1] == "identify" and "raptor" in self.line)
+        long = _REAL in self.line or self.words[1] == "demo" or "raptor" in self.line
         return self.words[0] == "swash" and self.words[1] in _SLOW and long
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -55,12 +56,24 @@ def test_hub_spring_blades_and_wake_distortion_come_back_by_output_error(tmp_pat
 
 
 @pytest.mark.proof
-def test_they_come_back_by_prediction_error(tmp_path: Path) -> None:
-    """The default method; compiling its derivatives for a helicopter takes minutes."""
+def test_they_come_back_by_prediction_error_and_the_model_predicts_another_flight(tmp_path: Path) -> None:
+    """The default method; compiling its derivatives for a helicopter takes minutes.
+
+    The rival of the validation is the card that the model came from, without being named.
+    """
     found = _recovered(tmp_path, "prediction-error", free="rotor", seconds=15)
     assert found["hub_stiffness"] == pytest.approx(35.0, rel=0.02)
     assert found["blade_inertia"] == pytest.approx(0.023, rel=0.02)
     assert found["wake_distortion"] == pytest.approx(1.0, abs=0.05)
+    _swash("simulate", "--vehicle", tmp_path / "true.toml", "--maneuver", "multisine:roll+pitch,0.6-5Hz,9s,0.02",
+           "--sensors", "clean", "--seed", 2, "--out", tmp_path / "again.nc", "-q")  # fmt: skip
+    _swash("validate", "--model", tmp_path / "fit" / "model.toml", "--flight", tmp_path / "again.nc",
+           "--horizons", "0.5,1", "--out", tmp_path / "check", "-q")  # fmt: skip
+    document = json.loads((tmp_path / "check" / "validation.json").read_text(encoding="utf-8"))
+    fits = {(s["predictor"], s["channel"]): s["fit"] for s in document["scores"] if s["horizon"] == 1.0}
+    for channel in ("phi", "theta", "p", "q"):
+        assert fits["model", channel] > max(90.0, fits["published card", channel]), channel
+    assert (tmp_path / "check" / "report.html").is_file()
 
 
 def test_ready_choices_follow_the_card_and_its_options() -> None:

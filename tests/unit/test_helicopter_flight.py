@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from swashplate.control.state_hold import state_hold
 from swashplate.errors import CardError, TrimError
 from swashplate.flights.flight import Flight
-from swashplate.physics import actuators
+from swashplate.physics import actuators, engine
 from swashplate.physics.atmosphere import air_density
+from swashplate.physics.backend import FloatBackend
+from swashplate.physics.engine import RotorSpeed
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
 from swashplate.simulation.integrate import simulate
@@ -177,3 +181,43 @@ def test_delay_and_engine_lag_change_no_steady_flight_and_show_among_the_states(
 def test_an_engine_that_lags_needs_a_rotor_that_turns_freely() -> None:
     with pytest.raises(CardError, match="engine_lag: needs a rotor speed that the engine can change"):
         vehicle("raptor50", engine_lag=True)
+
+
+def _spun_up(throttle: Callable[[float], float], load: Callable[[float], float], seconds: float) -> list[RotorSpeed]:
+    """A Raptor's rotor and governor alone, from rest, in steps of 2 ms; `load` is a torque by rotor speed."""
+    c, xp = RAPTOR.card.values(), FloatBackend()
+    state, passed = RotorSpeed(0.0, 0.0), []
+    for k in range(round(seconds / 0.002)):
+        opened = throttle(0.002 * k)
+        share = opened * engine.wanted_share(state, wanted=c["rotor_speed"], gain=c["governor_gain"], xp=xp)
+        torque = engine.engine_torque(state, share, wanted=c["rotor_speed"], power=c["engine_power"], xp=xp)
+        rates = engine.rotor_speed_rates(
+            state, torque, load(state.omega), opened, wanted=c["rotor_speed"], inertia=c["rotor_inertia"],
+            gain=c["governor_gain"], integral_gain=c["governor_integral"], xp=xp,
+        )  # fmt: skip
+        state = RotorSpeed(state.omega + 0.002 * rates.omega, state.governor + 0.002 * rates.governor)
+        passed.append(state)
+    return passed
+
+
+def test_a_governor_does_not_wind_up_while_the_engine_gives_all_or_nothing() -> None:
+    """From rest at full power the speed passes the wanted one by less than 1 %; a closed throttle is not remembered."""
+    wanted, torque = RAPTOR.card.values()["rotor_speed"], 3.0
+    drag = torque / wanted**2
+    spun = _spun_up(lambda t: 1.0, lambda omega: drag * omega**2, 10.0)
+    assert max(state.omega for state in spun) < 1.01 * wanted
+    assert spun[-1].omega == pytest.approx(wanted, rel=1e-3)
+    cut = _spun_up(lambda t: 0.0 if 10.0 < t < 13.0 else 1.0, lambda omega: drag * omega**2, 25.0)
+    before, during, after = (cut[round(t / 0.002)] for t in (9.9, 12.9, 24.0))
+    assert during.omega < 0.7 * before.omega
+    assert during.governor == pytest.approx(before.governor, rel=0.02)
+    assert max(state.omega for state in cut) < 1.01 * wanted
+    assert after.omega == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_flight_far_out_of_reach_still_names_the_limit() -> None:
+    """Where Newton's method finds no way from hover in one go, it walks: the limit that stops it is known."""
+    with pytest.raises(TrimError, match=r"60 m/s ahead.* needs theta0 = 1.068, but its limit is 0.2618"):
+        trim(RAPTOR, speed=60.0)
+    with pytest.raises(TrimError, match=r"1000 m/s ahead.* is out of reach: 25% of the way there needs theta0 = "):
+        trim(RAPTOR, speed=1000.0)

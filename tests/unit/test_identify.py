@@ -51,6 +51,9 @@ def test_the_card_says_what_was_identified_from_what() -> None:
         assert "simulated coax" in card[name].source
     assert card["mass"] == fit.published.card.parameters["mass"]
     assert "identified from" in fit.vehicle.card.title
+    before = fit.vehicle.card.started_from()
+    assert before is not None
+    assert before.values() == fit.published.card.values()
     assert "nuisance" in fit.vehicle.card.observer
 
 

@@ -158,6 +158,7 @@ def simulate(
             rate=rate,
             wind=blowing,
         )
+        remarks = _doubts(aircraft, flight)
         if sensors is not SensorSet.NONE:
             from swashplate.simulation.sensors import QUIET, Sensors
 
@@ -166,9 +167,21 @@ def simulate(
         paths = _save(flight, out)
     for words in _at_limits(aircraft, flight):
         typer.echo(f"Careful: {words}", err=True)
+    for words in remarks:
+        typer.echo(f"Careful: {words}.", err=True)
     if not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
+    """Where a simulated flight leaves what its equations hold for."""
+    from swashplate.vehicles.helicopter_limits import doubts_along
+
+    if vehicle.name != "conventional":
+        return ()
+    rows = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
+    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), *rows)
 
 
 def from_file(path: Path, *, seed: int = 0) -> Callable[[Vehicle, Trim], Controller]:

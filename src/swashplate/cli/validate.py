@@ -24,7 +24,8 @@ def validate(
         str | None,
         typer.Option(
             "--published",
-            help="The card to compare with (by default the vehicle's own); for a state-space model also a model.",
+            help="The card to compare with (by default the one that it was identified from); for a state-space model "
+            "also a model.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",

@@ -360,6 +360,15 @@ def _identified(
         and parameter.value != vehicle.card.parameters[name].value
     }
     card = card.with_values(changed, status="assumed", source="held during the identification")
+    started = vehicle.card.parameters
+    moved = {name for name, entry in card.parameters.items() if entry.value != started[name].value}
+    card = replace(
+        card,
+        parameters={
+            name: replace(entry, before=started[name].value if name in moved else None)
+            for name, entry in card.parameters.items()
+        },
+    )
     noise, nuisance = _noise(found), _mean_nuisance(found)
     observer = {"nuisance": {k: float(v) for k, v in nuisance._asdict().items()}}
     if noise is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
@@ -34,6 +35,8 @@ _BODY = len(RigidBody._fields)
 _ACCELERATIONS = slice(3, 6)
 _ANGULAR_ACCELERATIONS = slice(9, 12)
 _STEPS = 60
+_MOVING = np.array([True, True, True, False, True, False])
+"""What of a course is motion: velocities and the rate of turn."""
 _TOLERANCE = 1e-10
 """m/s^2 and rad/s^2 (and inner rates): far below any sensor, far above rounding."""
 
@@ -135,12 +138,15 @@ def trim(
     if strange:
         raise TrimError("is not a finite number.", where=vehicle.card.where, channel=", ".join(strange))
 
-    def residual(z: Array) -> tuple[Array, Array]:
-        value, slope = _unrest(equations, z, course, row, p)
+    def residual(z: Array, share: float = 1.0) -> tuple[Array, Array]:
+        value, slope = _unrest(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
         return np.asarray(value), np.asarray(slope)
 
     z = _first_guess(vehicle, residual) if near is None else _unknowns(vehicle, near)
     z, value = _newton(z, residual)
+    share = 1.0
+    if not _at_rest(value) and near is None:
+        z, value, share = _on_the_way(vehicle, residual)
     state, inputs = (np.asarray(part) for part in assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
     where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
@@ -149,7 +155,11 @@ def trim(
         where += f" at {float(surroundings.voltage):g} V"
     if turn:
         where += f", turning {np.degrees(turn):g} deg/s"
-    if not largest < _TOLERANCE:
+    if share < 1.0 and largest < _TOLERANCE:
+        _check_limits(vehicle, inputs, f"{where} is out of reach: {share:.0%} of the way there")
+    if share < 1.0 or not largest < _TOLERANCE:
+        _, value = _newton(z, residual)
+        largest = float(np.max(np.nan_to_num(np.abs(value), nan=np.inf)))
         worst = _residual_names(vehicle)[int(np.argmax(np.nan_to_num(np.abs(value), nan=np.inf)))]
         raise TrimError(
             f"no equilibrium was found for {where}: {worst} keeps changing at {largest:.2g} per second.",
@@ -250,6 +260,27 @@ def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
             break
         z, value, slope = z + fraction * step, tried, tried_slope
     return z, value
+
+
+def _at_rest(value: Array) -> bool:
+    return bool(np.all(np.isfinite(value)) and np.max(np.abs(value)) < _TOLERANCE)
+
+
+def _on_the_way(vehicle: Vehicle, residual: Any) -> tuple[Array, Array, float]:
+    """The last equilibrium on the way from no motion to the wanted one, found in steps, and its share of the way."""
+    z, value = _newton(_first_guess(vehicle, partial(residual, share=0.0)), partial(residual, share=0.0))
+    share, step = 0.0, 0.25
+    while _at_rest(value) and share < 1.0 and step > _SHORTEST:
+        tried, left = _newton(z, partial(residual, share=share + step))
+        if _at_rest(left):
+            z, value, share = tried, left, min(1.0, share + step)
+        else:
+            step *= 0.5
+    return z, value, share
+
+
+_SHORTEST = 0.01
+"""Share of the way to a course below which steps are no longer halved."""
 
 
 def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:

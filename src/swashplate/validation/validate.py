@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from swashplate.errors import FlightError, SwashError
+from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.feedback import excitation
 from swashplate.identification.fit import AxisExcitation, Fit
@@ -23,12 +23,15 @@ from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import THRESHOLDS, verdict
-from swashplate.vehicles.catalogue import vehicle as named_vehicle
+from swashplate.vehicles.card import packaged_cards
+from swashplate.vehicles.catalogue import from_card
 from swashplate.vehicles.vehicle import Vehicle
 
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 _T = TypeVar("_T", Noise, Nuisance)
 _EXAMPLES = 6
+_STARTS = 1.0
+"""Seconds over which starts are spread at least."""
 _EDGE = 0.1
 """Seconds at a record's end whose measured rates have too few samples around them to be a truth."""
 
@@ -59,7 +62,8 @@ def validate(
     Args:
         model: a fit, or a vehicle (a model file's observer section is used where there is one).
         flights: conditioned flights that the fit has not seen.
-        published: the card to compare with (None: the packaged card of the same vehicle).
+        published: the card to compare with (None: the card that the model was identified from). Where that is the model
+            itself, it is no rival in the verdict.
         horizons: seconds ahead.
         every: seconds between starts.
         calibration: seconds at the start of each record.
@@ -68,26 +72,28 @@ def validate(
     Raises:
         FlightError: where no record is long enough for calibration and the shortest horizon.
         SwashError: for a calibration that is too short to tell anything.
+        CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     enable_double_precision()
     enable_compilation_cache()
     if isinstance(model, Fit):
         vehicle, published = model.vehicle, published or model.published
     else:
-        vehicle, published = model, published or named_vehicle(model.name)
+        vehicle, published = model, published or started_from(model)
+    alone = _same_numbers(vehicle, published)
     noise, prior = observer_of(vehicle)
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
-    shortest = calibration + min(horizons) + 1.0
+    shortest = calibration + _STARTS + min(horizons)
     all_pieces = records(flights, vehicle)
     pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
     if not pieces:
-        longest = max(piece.time[-1] - piece.time[0] for piece in all_pieces)
+        longest = max(all_pieces, key=lambda piece: float(piece.time[-1] - piece.time[0]))
         raise FlightError(
-            f"the longest unbroken piece has {longest:.1f} s, expected more than {shortest:g} s "
-            f"({calibration:g} s to calibrate, then the shortest horizon).",
-            where=all_pieces[0].name,
+            f"the longest unbroken piece has {longest.time[-1] - longest.time[0]:.1f} s, expected more than "
+            f"{shortest:g} s ({calibration:g} s to calibrate, {_STARTS:g} s of starts and {min(horizons):g} s ahead).",
+            where=longest.name,
             hint="Use a longer flight, or a shorter calibration.",
         )
     parts: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
@@ -98,8 +104,11 @@ def validate(
     likelihoods: list[dict[str, float]] = []
     for number, piece in enumerate(pieces):
         ahead = max(h for h in horizons if h < piece.time[-1] - piece.time[0] - calibration)
-        rivals = {}
+        rivals: dict[str, _Rival] = {}
         for name, flown in (("model", vehicle), ("published card", published)):
+            if rivals and alone:
+                rivals[name] = rivals["model"]
+                continue
             nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration)
             rivals[name] = _Rival(
                 flown,
@@ -137,7 +146,7 @@ def validate(
         log_likelihood={
             name: float(np.mean([item[name] for item in likelihoods])) for name in ("model", "published card")
         },
-        verdict=verdict(scores, judged),
+        verdict=verdict([s for s in scores if not (alone and s.predictor == "published card")], judged),
         thresholds=THRESHOLDS,
         examples=tuple(examples),
         records=tuple(pieces),
@@ -151,6 +160,27 @@ def validate(
             "noise": {k: float(v) for k, v in noise._asdict().items()},
         },
     )
+
+
+def started_from(vehicle: Vehicle) -> Vehicle:
+    """What a model is compared with: the card that it was identified from, or itself where it never was."""
+    before = vehicle.card.started_from()
+    if before is not None:
+        return vehicle.with_card(before)
+    packaged = packaged_cards()
+    if vehicle.name in packaged:
+        return from_card(packaged[vehicle.name])
+    if any(entry.status == "identified" for entry in vehicle.card.parameters.values()):
+        raise CardError(
+            "does not say from which card it was identified.",
+            where=vehicle.card.path or vehicle.card.title,
+            hint="Name that card with --published CARD, or identify the model anew.",
+        )
+    return vehicle
+
+
+def _same_numbers(one: Vehicle, other: Vehicle) -> bool:
+    return one.card.values() == other.card.values() and dict(one.card.options) == dict(other.card.options)
 
 
 def observer_of(vehicle: Vehicle) -> tuple[Noise, Nuisance]:

@@ -17,7 +17,8 @@ from swashplate.errors import CardError
 CARD_SCHEMA = 1
 STATUSES = ("measured", "published", "identified", "derived", "assumed")
 _TABLES = {"kind", "schema", "vehicle", "title", "trust", "options", "parameters", "observer", "correlations"}
-_FIELDS = {"value", "unit", "source", "status", "sigma", "lower", "upper", "note"}
+_NUMBERS = ("value", "sigma", "lower", "upper", "before")
+_FIELDS = {*_NUMBERS, "unit", "source", "status", "note"}
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Parameter:
         sigma: standard deviation, where known.
         lower, upper: what physics allows, where known.
         note: anything a reader must know.
+        before: the value on the card that an identification started from, where it moved this one.
     """
 
     value: float
@@ -42,6 +44,7 @@ class Parameter:
     lower: float | None = None
     upper: float | None = None
     note: str = ""
+    before: float | None = None
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,14 @@ class Card:
             correlations={first: row for first, row in correlations.items() if row},
         )
 
+    def started_from(self) -> Card | None:
+        """The card that an identification started from, or None for one that was never identified."""
+        before = {name: entry.before for name, entry in self.parameters.items() if entry.before is not None}
+        if not before:
+            return None
+        card = self.with_values(before, source="before the identification", status="assumed", sigma=None, before=None)
+        return replace(card, title=self.title.split(", identified from ")[0], observer={}, path="")
+
     def covariance(self, names: Sequence[str]) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Covariance of parameters that have a sigma, shape (n, n), from the sigmas and the correlations."""
         matrix = np.eye(len(names))
@@ -123,7 +134,12 @@ class Card:
         where = self.where
         for name in units:
             if name not in self.parameters:
-                raise CardError("is missing.", where=where, channel=name, hint=f"Add [parameters.{name}].")
+                raise CardError(
+                    "is missing.",
+                    where=where,
+                    channel=name,
+                    hint=f'Add [parameters.{name}] with value, unit = "{units[name]}", source and status.',
+                )
         for name, parameter in self.parameters.items():
             if name not in units:
                 raise CardError(
@@ -238,7 +254,7 @@ def _parameter(name: str, entry: Any, path: str) -> Parameter:
             channel=name,
             hint="It needs value, unit, source and status, and may have sigma, lower, upper and note.",
         )
-    for key in ("value", "sigma", "lower", "upper"):
+    for key in _NUMBERS:
         if key in entry and (isinstance(entry[key], bool) or not isinstance(entry[key], int | float)):
             raise CardError(f"{key} is {entry[key]!r}, expected a number.", where=path, channel=name)
     if not float("-inf") < float(entry["value"]) < float("inf"):
@@ -255,7 +271,7 @@ def _parameter(name: str, entry: Any, path: str) -> Parameter:
         raise CardError(
             f"status is {entry['status']!r}, expected one of {', '.join(STATUSES)}.", where=path, channel=name
         )
-    numbers = {key: float(entry[key]) for key in ("value", "sigma", "lower", "upper") if key in entry}
+    numbers = {key: float(entry[key]) for key in _NUMBERS if key in entry}
     texts = {key: str(entry[key]) for key in ("unit", "source", "status", "note") if key in entry}
     return Parameter(**numbers, **texts)  # type: ignore[arg-type]
 

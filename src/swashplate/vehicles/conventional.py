@@ -20,7 +20,7 @@ from swashplate.physics.frames import Vector, local_to_body
 from swashplate.physics.inflow import Inflow
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.vehicles.card import Card
-from swashplate.vehicles.helicopter_checks import check_numbers
+from swashplate.vehicles.helicopter_checks import check_numbers, with_added
 from swashplate.vehicles.helicopter_options import HelicopterOptions, helicopter_options
 from swashplate.vehicles.helicopter_parameters import UNITS, HelicopterParameters
 from swashplate.vehicles.main_rotor import Contribution, main_rotor
@@ -251,8 +251,10 @@ def loads(
             state.rotor,
             torque,
             load,
+            throttle,
             wanted=par.rotor_speed,
             inertia=par.rotor_inertia,
+            gain=par.governor_gain,
             integral_gain=par.governor_integral,
             xp=xp,
         )
@@ -339,7 +341,7 @@ def conventional(card: Card) -> Vehicle:
         CardError: for a number that is missing, unknown, in another unit or impossible, or an unknown option.
     """
     options = helicopter_options(card)
-    card.checked_against(UNITS)
+    card = with_added(card, options).checked_against(UNITS)
     check_numbers(card)
     speed = card.values()["rotor_speed"]
     nothing = HelicopterState(

@@ -1,4 +1,4 @@
-"""Where a single-rotor helicopter's equations stop being true, said of one flight state."""
+"""Where a single-rotor helicopter's equations stop being true, said of a flight state or along a flight."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from swashplate.vehicles.helicopter_options import HelicopterOptions
 from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
+_LOOKS = 200
+_TURNING = 0.5
+"""Share of the governed speed below which a rotor carries nothing that could be doubted."""
 _ADVANCE = 0.35
 _LOADING = 0.13
 _FLAPPING = 0.21
@@ -27,9 +30,28 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
 
     Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large flapping angles.
     """
+    return tuple(_doubts(vehicle, x, u, environment).values())
+
+
+def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array) -> tuple[str, ...]:
+    """What of the equations does not hold somewhere along a flight, each with when that is first seen.
+
+    Args:
+        time: stamps [s], shape (n,); at most `_LOOKS` of them are looked at.
+        x, u, wind: states (n, n_states), inputs (n, n_inputs) and wind (n, 3) by sample.
+    """
+    first: dict[str, str] = {}
+    for k in np.unique(np.linspace(0, len(time) - 1, min(_LOOKS, len(time))).astype(int)):
+        for kind, words in _doubts(vehicle, x[k], u[k], Environment(*(float(v) for v in wind[k]))).items():
+            first.setdefault(kind, f"At {time[k]:.1f} s {words}")
+    return tuple(first.values())
+
+
+def _doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
+    """The same by kind."""
     options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
     if not isinstance(options, HelicopterOptions):
-        return ()
+        return {}
     xp, par = FloatBackend(), vehicle.values()
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
     inputs: Any = vehicle.inputs(*(float(value) for value in u))
@@ -37,6 +59,8 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
+    if omega < _TURNING * par.rotor_speed:
+        return {}
     tip = omega * par.rotor_radius
     solidity = par.rotor_blades * par.rotor_chord / (np.pi * par.rotor_radius)
     force = acting.main_rotor.force
@@ -44,17 +68,19 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
     loading = thrust / (environment.air_density * np.pi * par.rotor_radius**2 * tip**2) / solidity
     hover = float(np.sqrt(thrust / (2.0 * environment.air_density * np.pi * par.rotor_radius**2)))
     across = float(np.hypot(air.x, air.y))
-    found = []
+    found: dict[str, str] = {}
     if 0.5 * hover < air.z < 2.0 * hover and across < hover:
-        found.append(
+        found["vortex ring"] = (
             f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({0.5 * hover:.1f} to "
             f"{2.0 * hover:.1f} m/s below {hover:.1f} m/s of speed), where momentum theory is only a mean"
         )
     if across / tip > _ADVANCE:
-        found.append(f"the advance ratio is {across / tip:.2f}, above {_ADVANCE}: reversed flow and stall are left out")
+        found["advance"] = (
+            f"the advance ratio is {across / tip:.2f}, above {_ADVANCE}: reversed flow and stall are left out"
+        )
     if loading > _LOADING:
-        found.append(f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear")
+        found["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
     flap = max(abs(float(state.disc.a1)), abs(float(state.disc.b1)))
     if flap > _FLAPPING:
-        found.append(f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small")
-    return tuple(found)
+        found["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"
+    return found

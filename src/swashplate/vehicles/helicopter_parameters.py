@@ -94,6 +94,9 @@ MEANING: Mapping[str, str] = {name: text for name, _, text in _TABLE}
 
 HelicopterParameters = NamedTuple("HelicopterParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
 
+ADDED: Mapping[str, tuple[str, float]] = {"servo_delay": ("delay", 0.02), "engine_time": ("engine_lag", 0.1)}
+"""What the first cards lack: the option without which it has no effect, and what stands for it while that is off."""
+
 POSITIVE = (
     "mass",
     "inertia_xx",
@@ -105,6 +108,7 @@ POSITIVE = (
     "rotor_lift_slope",
     "rotor_speed",
     "blade_inertia",
+    "hub_height",
     "wake_distortion_fade",
     "tail_radius",
     "tail_chord",
@@ -122,6 +126,9 @@ POSITIVE = (
     "servo_delay",
     "servo_speed",
     "cyclic_limit",
+    "skid_length",
+    "skid_width",
+    "skid_depth",
 )
 """What is greater than zero on every helicopter."""
 NOT_NEGATIVE = (
@@ -129,7 +136,10 @@ NOT_NEGATIVE = (
     "rotor_drag_thrust",
     "hub_stiffness",
     "hinge_offset",
+    "wake_distortion",
     "tail_drag",
+    "governor_gain",
+    "governor_integral",
     "fin_blockage",
     "tailplane_area",
     "tailplane_lift_slope",
@@ -138,8 +148,24 @@ NOT_NEGATIVE = (
     "fuselage_area_x",
     "fuselage_area_y",
     "fuselage_area_z",
+    "bar_gain",
     "bar_chord",
+    "bar_lift_slope",
+    "gyro_gain",
     "skid_stiffness",
     "skid_damping",
     "skid_friction",
 )
+ANGLES = (
+    "rotor_twist",
+    "shaft_tilt",
+    "precone",
+    "phase_lag",
+    "cyclic_phase",
+    "cyclic_limit",
+    "collective_low",
+    "collective_high",
+    "tail_low",
+    "tail_high",
+)
+"""What is an angle of much less than a radian on every helicopter."""

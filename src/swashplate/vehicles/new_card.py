@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -41,8 +42,8 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
     pattern = packaged_cards().get(like)
     if pattern is None or pattern.vehicle != "conventional":
         raise CardError("is no packaged single-rotor helicopter.", where=like)
-    if not (mass > 0.0 and radius > 0.0):
-        raise CardError(f"mass {mass:g} kg and radius {radius:g} m, expected both above 0.", where=title)
+    if not (0.0 < mass < math.inf and 0.0 < radius < math.inf):
+        raise CardError(f"mass {mass:g} kg and radius {radius:g} m, expected both finite and above 0.", where=title)
     known = pattern.values()
     size, weight = radius / known["rotor_radius"], mass / known["mass"]
     given = {"mass": mass, "rotor_radius": radius}
