@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from swashplate.identification.riccati import kalman_gain
 from swashplate.physics.environment import Environment
@@ -135,8 +136,8 @@ class StochasticModel:
     def step(self, x: Any, gust: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
         """The state one sample later, with held disturbances: accelerations as in `DISTURBED`, and perhaps the wind."""
         rates = row_rates(self.equations, padded=False)
-        push = jnp.zeros(x.shape[0]).at[self._disturbed].set(gust[:N_DISTURBANCES])
-        wind = jnp.zeros(3).at[: 2 * self.windy].set(gust[N_DISTURBANCES:])
+        push = sum(gust[i] * unit for i, unit in enumerate(np.eye(x.shape[0])[self._disturbed]))
+        wind = jnp.concatenate([gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy)])
         air = jnp.append(wind, voltage)
         driving = jnp.stack([jnp.concatenate([row, air]) for row in u])
         constants = [getattr(Environment(), name) for name in CONSTANTS]
@@ -166,8 +167,8 @@ class StochasticModel:
         return jnp.stack([seen.get(name, here[name]) for name in self.output_names])
 
     @property
-    def _disturbed(self) -> Any:
-        return jnp.array([self.vehicle.index(name) for name in DISTURBED])
+    def _disturbed(self) -> list[int]:
+        return [self.vehicle.index(name) for name in DISTURBED]
 
     # ---- the filter --------------------------------------------------------------------------------------------
     def linear(
@@ -183,7 +184,7 @@ class StochasticModel:
         places = x[None]
         if self.windy:
             sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
-            along = jnp.zeros((2, n)).at[jnp.arange(2), self._disturbed[3:5]].set(jnp.sqrt(2.0) * sigma)
+            along = jnp.sqrt(2.0) * sigma * np.eye(n)[self._disturbed[3:5]]
             places = jnp.concatenate([x + along, x - along])
         slopes = jax.jacfwd(lambda x, w: self.step(x, w, (u, u, u), parameters, voltage), argnums=(0, 1))
         by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(lambda x: slopes(x, jnp.zeros(g)))(places))
@@ -245,7 +246,7 @@ class StochasticModel:
         self, state: FilterState, u: tuple[Any, Any, Any], parameters: Any, voltage: Any, noise: Noise
     ) -> FilterState:
         """The state one sample later."""
-        acting = state.gust.at[:N_DISTURBANCES].add(state.drift)
+        acting = state.gust + jnp.concatenate([state.drift, jnp.zeros(2 * self.windy)])
         x = self.step(state.x, acting, u, parameters, voltage)
         return FilterState(x, self._fade(noise) * state.gust, state.drift)
 
@@ -283,12 +284,16 @@ _GUST_NAMES = (*DISTURBED, "x", "y")
 
 
 def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
-    """The part of a row that lies along x and y, turned by an angle about the vertical."""
+    """The part of a row that lies along x and y, turned by an angle about the vertical.
+
+    Sums of unit rows instead of setting entries: a loop that scatters is not compiled as one function.
+    """
     if "x" not in names or "y" not in names:
         return row
     i, j = names.index("x"), names.index("y")
-    c, s = jnp.cos(angle), jnp.sin(angle)
-    return row.at[i].set(c * row[i] - s * row[j]).at[j].set(s * row[i] + c * row[j])
+    along, across = np.eye(len(names))[[i, j]]
+    c, s = jnp.cos(angle) - 1.0, jnp.sin(angle)
+    return row + along * (c * row[i] - s * row[j]) + across * (s * row[i] + c * row[j])
 
 
 def stochastic_model(
