@@ -53,13 +53,26 @@ def test_live_refuses_what_cannot_fly(tmp_path: Path) -> None:
     assert "is for 'coax', not for 'conventional'" in told
 
 
-def test_a_linear_model_cannot_be_flown_and_is_told_where_to_go(tmp_path: Path) -> None:
+def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for system in ("ardupilot", "px4"):
+        told = one_message(swash("link", system, "--vehicle", "thirteen_state", "--port", "0"))
+        assert "without ground, rotors or a battery" in told
+        assert "swash live" in told
     file = tmp_path / "linear.toml"
     file.write_text('kind = "state-space"\nschema = 1\n')
     for command in (["live", file], ["link", "ardupilot", "--vehicle", file]):
         told = one_message(swash(*command, "--port", "0"))
-        assert "no place, ground or rotor" in told
-        assert "swash export" in told
+        assert "linear.toml" in told
+        assert "lacks equations, inputs" in told
+    assert "no equation for u, v, w" in one_message(swash("live", "rotor_body", "--port", "0"))
+    monkeypatch.setattr(server, "serve", lambda *_: None)
+    outcome = swash("live", "thirteen_state", "--port", "0", "--out", tmp_path / "live")
+    assert outcome.code == 0, outcome.err
+    assert "http://" in outcome.out
+    assert "A linear model: deviations from one trim" in outcome.err
+    assert "range of lateral, longitudinal, pedal, collective: assumed" in outcome.err
 
 
 def test_what_is_misspelt_is_told_before_what_a_checkout_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

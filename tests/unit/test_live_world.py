@@ -15,9 +15,10 @@ from swashplate.control.linear_decoupling import static_decoupling
 from swashplate.errors import ControllerError, FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers import Maneuver
+from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
-from swashplate.links.live.pilots import MODES, STICKS
+from swashplate.links.live.pilots import MODES
 from swashplate.links.live.priority import come_first
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World

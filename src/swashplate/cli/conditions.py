@@ -17,6 +17,7 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from swashplate.identification.state_space import StateSpaceModel
     from swashplate.physics.environment import Environment
     from swashplate.simulation.trim import Trim
     from swashplate.vehicles.vehicle import Vehicle
@@ -109,17 +110,22 @@ def _switch(text: str) -> Any:
     return {"true": True, "false": False}.get(text.lower(), text)
 
 
-def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
-    """The vehicle of a state-space file or a ready structure."""
+def linear_model(name: str) -> StateSpaceModel | None:
+    """The model of a state-space file or a ready structure; None for anything else."""
     from swashplate.identification.state_space_file import is_state_space, structure, structure_names
 
-    if name not in structure_names() and not (Path(name).is_file() and is_state_space(name)):
+    is_one = name in structure_names() or (Path(name).is_file() and is_state_space(name))
+    return structure(name) if is_one else None
+
+
+def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
+    """The vehicle of a linear model."""
+    if (model := linear_model(name)) is None:
         return None
     if switches:
         raise SwashError("has no options: it is a linear model.", where=name, channel="--option")
     from swashplate.control.linear_vehicle import linear_vehicle, unlimited
 
-    model = structure(name)
     made = linear_vehicle(model)
     if usual := unlimited(model):
         ranges = dict(zip(made.input_names, made.input_limits, strict=True))

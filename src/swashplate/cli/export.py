@@ -154,7 +154,7 @@ def _model(
     from swashplate.export.matlab import read_matlab
 
     ending = Path(model).suffix.lower()
-    if ending in (".json", ".mat") or _kind(model) == "state-space":
+    if ending in (".json", ".mat") or given.linear_model(model) is not None:
         if speed is not None or mass is not None or changed or switched:
             raise SwashError(
                 "is a linear model: it has no speed, card or options to change.",

@@ -88,6 +88,7 @@ def ardupilot(
 
     if write_parameters is None:
         listen_udp(listen, port).close()  # told before anything is compiled
+    _refuse_linear(vehicle)
     where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
     if write_parameters is not None:
         _write_parameters(write_parameters, vehicle, where, servos, quiet=quiet)
@@ -137,6 +138,7 @@ def px4(
     from swashplate.links.sockets import listen_tcp
 
     listen_tcp(listen, port).close()  # told before anything is compiled
+    _refuse_linear(vehicle)
     where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
     plant = _plant(vehicle, where, servos, suffix="_px4", voltage=voltage, sag=sag, rate=record_rate if record else 0)
     sensing = _sensing(plant, sensors, seed)
@@ -162,6 +164,14 @@ def _write_parameters(file: Path, name: str, where: given.Conditions, servos: st
     write_text(file, parameter_file(found, title=where.vehicle.card.title))
     if not quiet:
         _say(f"written: {file}")
+
+
+def _refuse_linear(name: str) -> None:
+    """Told before anything is assumed about its inputs; `standing` tells it of a linear vehicle's card."""
+    if given.linear_model(name) is not None:
+        from swashplate.simulation.standing import no_ground
+
+        raise no_ground(name)
 
 
 def _say(words: str) -> None:

@@ -49,6 +49,8 @@ def live(
     if out.exists() and not out.is_dir():
         raise SwashError("is a file, expected a folder.", where=out, channel="--out")
     vehicle = given.vehicle_of(model, None, switched)
+    if vehicle.name == "linear" and not quiet:
+        typer.echo("A linear model: deviations from one trim, without ground, wind, battery or input delays.", err=True)
     from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
 
     enable_compilation_cache()

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from swashplate.cli import conditions as given
 from swashplate.cli import live, options
 from swashplate.cli.reading import Reading
 from swashplate.errors import SwashError
@@ -46,7 +47,6 @@ def replay(
     """Replay a flight: scrub through it in the browser, or film it."""
     from swashplate.cli.console import progress
     from swashplate.cli.reading import read
-    from swashplate.vehicles.catalogue import vehicle as find
 
     filming = video is not None or frames is not None
     if video is not None and frames is not None:
@@ -55,7 +55,7 @@ def replay(
         raise SwashError("the folder does not exist.", where=video.parent, channel="--video", hint="Make it first.")
     if frames is not None and frames.exists() and not frames.is_dir():
         raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
-    chosen = None if model is None else find(model)
+    chosen = None if model is None else given.vehicle_of(model, None, None)
     listening = None
     if not filming:
         live.need_live_extra()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from swashplate.identification.state_space import StateSpaceModel
 from swashplate.simulation.trim import Trim
 from swashplate.vehicles.card import Card, Parameter
 from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.linear import NAME, entry_name, entry_unit
+from swashplate.vehicles.linear import NAME, SIZE, entry_name, entry_unit
 from swashplate.vehicles.vehicle import Vehicle
 
 DELAYS = "input_delays"
@@ -55,7 +56,7 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
         unit = model.units.get(name, "1") or "1"
         parameters[f"trim_{name}"] = Parameter(0.0, unit, "derived: the model counts deviations", "derived")
     ranges = _ranges(model, limits or {})
-    options = {
+    options: dict[str, Any] = {
         "states": list(model.states),
         "state_units": [model.units.get(name, "1") or "1" for name in model.states],
         "inputs": list(model.inputs),
@@ -63,6 +64,8 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
         "low": [ranges[name][0] for name in model.inputs],
         "high": [ranges[name][1] for name in model.inputs],
     }
+    if (size := model.document.get("shape", {}).get(SIZE)) is not None:
+        options[SIZE] = float(size)
     card = Card(NAME, model.title, model.trust, options, parameters, observer={DELAYS: delays}, path=model.name)
     return from_card(card)
 

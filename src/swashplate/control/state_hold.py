@@ -44,7 +44,15 @@ class StateHold:
     step: Step
 
 
-def state_hold(vehicle: Vehicle, trim: Trim, *, rate: float = 50.0, effort: float = 0.1) -> StateHold:
+def state_hold(
+    vehicle: Vehicle,
+    trim: Trim,
+    *,
+    rate: float = 50.0,
+    effort: float = 0.1,
+    along: Array | None = None,
+    spans: Array | None = None,
+) -> StateHold:
     """A hold of the trim's attitude, velocity, height, heading and (at rest) place.
 
     Args:
@@ -52,6 +60,8 @@ def state_hold(vehicle: Vehicle, trim: Trim, *, rate: float = 50.0, effort: floa
         trim: what to hold; inputs that it held itself (a throttle) stay.
         rate: how often it runs [Hz].
         effort: share of an input's range that weighs as much as the allowed deviations.
+        along: combinations of inputs that it moves, shape (n_inputs, k); each input alone if not given.
+        spans: their ranges [unit of the inputs], shape (k,); those of the inputs' limits if not given.
 
     Raises:
         SwashError: where no gain exists that holds it.
@@ -59,23 +69,25 @@ def state_hold(vehicle: Vehicle, trim: Trim, *, rate: float = 50.0, effort: floa
     model = linearize(vehicle, trim)
     held = {name for name, _ in vehicle.trim_held}
     moved = [i for i, name in enumerate(vehicle.input_names) if name not in held]
-    ranges = np.array([high - low for low, high in vehicle.input_limits])[moved]
+    if along is None or spans is None:
+        along = np.eye(len(vehicle.input_names))[:, moved]
+        spans = np.array([high - low for low, high in vehicle.input_limits])[moved]
+    B = model.B @ along
     weights = np.array([1.0 / _ALLOWED[name] ** 2 if name in _ALLOWED else 0.0 for name in model.states])
     if trim.speed or trim.lateral or trim.climb or trim.turn:
         weights[:3] = 1e-6  # the place moves on
     try:
         cost = scipy.linalg.solve_continuous_are(
             model.A - 1e-6 * np.eye(len(weights)),
-            model.B[:, moved],
+            B,
             np.diag(weights),
-            np.diag(1.0 / (effort * ranges) ** 2),
+            np.diag(1.0 / (effort * spans) ** 2),
         )
     except np.linalg.LinAlgError:
         raise SwashError(
             "no state feedback holds this trim.", where=vehicle.name, hint="Check its controls with `swash linearize`."
         ) from None
-    K = np.zeros((len(vehicle.input_names), len(weights)))
-    K[moved] = ((effort * ranges) ** 2)[:, None] * model.B[:, moved].T @ cost
+    K = along @ (((effort * spans) ** 2)[:, None] * B.T @ cost)
     if trim.speed or trim.lateral or trim.climb or trim.turn:
         K[:, :2] = 0.0
     step = partial(state_hold_step, inputs=len(vehicle.input_names), states=len(weights))

@@ -18,12 +18,14 @@ from swashplate.flights import multisine
 Array = NDArray[np.float64]
 
 AXES: Mapping[str, tuple[Mapping[str, float], ...]] = {
-    "roll": ({"servo_roll": 1.0}, {"A1": 1.0}),
-    "pitch": ({"servo_pitch": 1.0}, {"B1": 1.0}),
-    "yaw": ({"motor_upper": 1.0, "motor_lower": -1.0}, {"theta0T": 1.0}),
-    "heave": ({"motor_upper": 1.0, "motor_lower": 1.0}, {"theta0": 1.0}),
+    "roll": ({"servo_roll": 1.0}, {"A1": 1.0}, {"lateral": 1.0}),
+    "pitch": ({"servo_pitch": 1.0}, {"B1": 1.0}, {"longitudinal": 1.0}),
+    "yaw": ({"motor_upper": 1.0, "motor_lower": -1.0}, {"theta0T": 1.0}, {"pedal": 1.0}),
+    "heave": ({"motor_upper": 1.0, "motor_lower": 1.0}, {"theta0": 1.0}, {"collective": 1.0}),
 }
-"""Which inputs an axis moves, in the sense of the commands, coaxial or single rotor: the first set that a vehicle has.
+"""Which inputs an axis moves, in the sense of the commands: the first set that a vehicle has.
+
+They are a coaxial helicopter's, a single rotor's and those of the ready linear models.
 
 servo_pitch and B1 positive are nose down; yaw is nose right, of theta0T with a clockwise rotor.
 """

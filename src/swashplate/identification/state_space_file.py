@@ -23,6 +23,8 @@ rates = {w = "1"}                            # coefficients of the states' deriv
 collective = "tau"                           # by input, or by "output/input"
 [limits]                                     # of inputs, from the trim; only a controller needs them
 collective = [-1.0, 1.0]
+[shape]
+rotor_radius = 1.535                         # m: how large pages draw it, 1 if not given
 
 [parameters]
 Zw = {value = -0.6, unit = "1/s", upper = 0.0}
@@ -62,6 +64,7 @@ _SECTIONS = {
     "delays",
     "parameters",
     "limits",
+    "shape",
     "fit",
 }
 _PARAMETER = {
@@ -275,6 +278,15 @@ class _Reader:
             if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) for v in ends):
                 raise CardError(f"is {ends!r}, expected [low, high].", where=self.path, channel=f"limits.{name}")
 
+    def _check_shape(self) -> None:
+        for name, size in self._table("shape").items():
+            if name != "rotor_radius":
+                raise CardError(
+                    "is no part of a shape.", where=self.path, channel=f"shape.{name}", hint="It has rotor_radius."
+                )
+            if isinstance(size, bool) or not isinstance(size, int | float) or not 0.0 < size < 100.0:
+                raise CardError(f"is {size!r}, expected 0 to 100 m.", where=self.path, channel=f"shape.{name}")
+
     def model(self) -> StateSpaceModel:
         for name, table in self._table("left").items():
             row = self._state(name, f"left.{name}")
@@ -307,6 +319,7 @@ class _Reader:
             delays[name] = self._expression(text, f"delays.{name}")
             self.used |= delays[name].names
         self._check_limits()
+        self._check_shape()
         idle = sorted(set(self.parameters) - self.used)
         if idle:
             raise CardError(

@@ -21,6 +21,7 @@ from swashplate.physics.frames import Vector
 from swashplate.physics.ground_contact import Skids, skid_loads
 from swashplate.physics.rigid_body import Inertia, RigidBody, rigid_body_rates
 from swashplate.vehicles.catalogue import from_card
+from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.vehicle import Vehicle
 
 _SINK = 0.002
@@ -37,11 +38,13 @@ def standing(vehicle: Vehicle) -> Vehicle:
         vehicle: of any equations with a rigid body; a conventional helicopter keeps its card's other options.
 
     Raises:
-        SwashError: where its states hold no rigid body.
+        SwashError: where its states hold no rigid body, or it is a linear model.
     """
     if vehicle.name == "conventional":
         options = {**vehicle.card.options, "ground": True, "rotor_speed": "throttle"}
         return from_card(replace(vehicle.card, options=options))
+    if vehicle.name == LINEAR:
+        raise no_ground(vehicle.card.where)
     if vehicle.state_names[: len(RigidBody._fields)] != RigidBody._fields:
         raise SwashError("has no position and attitude to stand with.", where=vehicle.name)
     whole: Any = vehicle.derivatives
@@ -51,6 +54,17 @@ def standing(vehicle: Vehicle) -> Vehicle:
         vehicle,
         derivatives=partial(_derivatives, whole.func, skids, **whole.keywords),
         specific_force=partial(_specific_force, felt.func, skids, **felt.keywords),
+    )
+
+
+def no_ground(where: str) -> SwashError:
+    """That a linear model cannot stand, as an error to be raised."""
+    return SwashError(
+        "is a linear model: deviations from one trim in flight, without ground, rotors or a battery, so it cannot "
+        "start from the ground as an autopilot expects.",
+        where=where,
+        hint="Fly it with `swash live`, or give the autopilot a vehicle, e.g. raptor50. ArduPilot's own state-space "
+        "model is written by `swash export --format ardupilot-statespace`.",
     )
 
 

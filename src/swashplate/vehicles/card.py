@@ -202,7 +202,7 @@ def parse_card(text: str, *, path: str = "") -> Card:
             f"is not TOML: {error}.", where=path, hint="A card is a TOML file; `swash vehicles new` writes one."
         ) from None
     if document.get("kind") != "vehicle":
-        linear = "A linear model holds near one flight and has no place, ground or rotor: `swash export` takes it."
+        linear = "A linear model: `swash live`, trim, simulate, replay, control design and export take it."
         hint = "A card begins with the line kind = 'vehicle'; `swash vehicles new` writes one."
         raise CardError(
             f"kind is {document.get('kind')!r}, expected 'vehicle'." if "kind" in document else "says no kind.",

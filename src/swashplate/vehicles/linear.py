@@ -27,6 +27,10 @@ NEEDED = ("u", "v", "w", "phi", "theta", "p", "q", "r")
 """States without which a model does not say how it flies."""
 _BODY_UNITS = ("m",) * 3 + ("m/s",) * 3 + ("rad",) * 3 + ("rad/s",) * 3
 _OPTIONS = ("states", "state_units", "inputs", "input_units", "low", "high")
+SIZE = "rotor_radius"
+"""Option that a card may have: how large it is drawn [m]."""
+DEFAULT_SIZE = 1.0
+"""m: where nothing says it."""
 
 
 class Structure(NamedTuple):
@@ -75,9 +79,11 @@ def linear(card: Card) -> Vehicle:
     """
     where = card.where
     absent = sorted(set(_OPTIONS) - set(card.options))
-    if absent or set(card.options) - set(_OPTIONS):
+    if absent or set(card.options) - {*_OPTIONS, SIZE}:
         raise CardError(
-            f"has {', '.join(card.options)}; expected {', '.join(_OPTIONS)}.", where=where, channel="options"
+            f"has {', '.join(card.options)}; expected {', '.join(_OPTIONS)}, and perhaps {SIZE}.",
+            where=where,
+            channel="options",
         )
     states, inputs = tuple(card.options["states"]), tuple(card.options["inputs"])
     units = dict(zip(states, card.options["state_units"], strict=True))
@@ -122,6 +128,11 @@ def linear(card: Card) -> Vehicle:
         derivatives=partial(derivatives, structure=own),
         specific_force=partial(specific_force, structure=own),
     )
+
+
+def size_of(vehicle: Vehicle) -> float:
+    """Rotor radius with which a linear vehicle is drawn [m]: what its card says, otherwise `DEFAULT_SIZE`."""
+    return float(vehicle.card.options.get(SIZE, DEFAULT_SIZE))
 
 
 def _named(state: LinearState) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
 
-from swashplate.vehicles.coax import CoaxInputs
+from swashplate.links.live.picture import is_coaxial
+from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.vehicle import Vehicle
 
 How = Literal["model", "responses"]
@@ -41,16 +42,16 @@ def commands(vehicle: Vehicle, flight: Path, *, card: Path, out: Path, how: How 
     """Command lines to try in this order until one leaves a report, as lists that no shell ever sees.
 
     A single rotor frees what turns its answer to a stick; where a short flight gives no model, its frequency responses
-    are left, which can also be asked for at once.
+    are left, which can also be asked for at once. Of a linear model they are all there is: it has no card to fit.
     """
     python = [sys.executable, "-m", "swashplate"]
     identify = [*python, "identify", "--vehicle", str(card), "--flight", str(flight), "--out", str(out), "--quiet"]
     inputs = ",".join(name for name in vehicle.input_names if name != "throttle")
     channels = ["--inputs", inputs, "--outputs", "p,q,r,w"]
     respond = [*python, "respond", str(flight), *channels, "--out", str(out), "--quiet"]
-    if how == "responses":
+    if how == "responses" or vehicle.name == LINEAR:
         return (respond,)
-    if vehicle.input_names == CoaxInputs._fields:
+    if is_coaxial(vehicle):
         return (identify,)
     return ([*identify, "--free", "rotor"], respond)
 

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from swashplate.errors import SwashError
+from swashplate.links.live.axes import STICKS
 from swashplate.links.live.identifying import HOWS
-from swashplate.links.live.pilots import MODES, STICKS
+from swashplate.links.live.pilots import MODES
 
 LONGEST = 2048
 """Characters of a message."""

@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from swashplate.links.live import linear_picture
 from swashplate.physics import rotor, stabilizer_bar
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.vehicles import coax, conventional
+from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -22,11 +24,15 @@ _XP = FloatBackend()
 def picture(vehicle: Vehicle) -> dict[str, Any]:
     """Shapes in body axes (forward, right, down) [m]: rotors, bar, tail, fin and skids; size [m] and weight [N].
 
-    What a card does not say (the fuselage's outline) is a plain shape of the rotor's size.
+    What a card does not say (the fuselage's outline) is a plain shape of the rotor's size. `ground` is whether there is
+    one, `rpm` whether rotor speeds are known.
     """
+    if vehicle.name == LINEAR:
+        return linear_picture.picture(vehicle)
     card = vehicle.card.values()
     radius, weight = card["rotor_radius"], card["mass"] * LABORATORY_GRAVITY
-    if _is_coaxial(vehicle):
+    known = {"ground": True, "rpm": True}
+    if is_coaxial(vehicle):
         hubs = {"upper": (-1, card["hub_height_upper"]), "lower": (1, card["hub_height_lower"])}
         rotors = [
             {"name": name, "hub": [0.0, 0.0, -height], "radius": radius, "blades": 2, "sense": sense, "tilt": 0.0}
@@ -36,7 +42,7 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
         bar = {"hub": [0.0, 0.0, -height], "radius": 0.55 * radius} if vehicle.card.options.get("bar", True) else None
         skids = {"length": 0.45 * radius, "width": 0.35 * radius, "depth": 0.55 * radius}
         parts = {"rotors": rotors, "bar": bar, "tail": None, "skids": skids, "fin": None}
-        return {"size": radius, "weight": weight, **parts}
+        return {"size": radius, "weight": weight, **parts, **known}
     hub = [card["hub_x"], card["hub_y"], -card["hub_height"]]
     sense = 1 if vehicle.card.options.get("rotation", "ccw") == "cw" else -1
     main = {"name": "main", "hub": hub, "radius": radius, "blades": round(card["rotor_blades"]), "sense": sense}
@@ -54,15 +60,14 @@ def picture(vehicle: Vehicle) -> dict[str, Any]:
         skids = {"length": 0.3 * radius, "width": 0.2 * radius, "depth": 0.3 * radius}
     fin = {"x": -card["fin_arm"], "z": -card["fin_height"], "side": math.sqrt(max(card["fin_area"], 0.0))}
     parts = {"rotors": [main], "bar": bar, "tail": tail, "skids": skids, "fin": fin}
-    return {"size": radius, "weight": weight, **parts}
+    return {"size": radius, "weight": weight, **parts, **known}
 
 
 def inputs_of(vehicle: Vehicle) -> list[dict[str, Any]]:
     """Name, unit and limits of each input: commands of a coaxial helicopter are pure numbers, blade pitch is in rad."""
-    plain = (*coax.CoaxInputs._fields, "throttle")
     return [
-        {"name": name, "unit": "1" if name in plain else "rad", "low": low, "high": high}
-        for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True)
+        {"name": name, "unit": unit, "low": low, "high": high}
+        for name, unit, (low, high) in zip(vehicle.input_names, vehicle.input_units, vehicle.input_limits, strict=True)
     ]
 
 
@@ -72,6 +77,8 @@ def pose_of(vehicle: Vehicle) -> Pose:
     It returns per rotor [alpha, beta, omega, fx, fy, fz] (tilt right and aft [rad], speed [rad/s], force [N] in body
     axes), the bar's tilt [alpha, beta] (None without) and the tail rotor's [omega, force to the right].
     """
+    if vehicle.name == LINEAR:
+        return linear_picture.pose_of(vehicle)
     parameters = vehicle.values()
 
     def coaxial(x: Sequence[float], u: Sequence[float], around: Environment) -> dict[str, Any]:
@@ -108,8 +115,9 @@ def pose_of(vehicle: Vehicle) -> Pose:
         bar = None if state.bar is None else [state.bar.d, state.bar.c]
         return {"rotors": [main], "bar": bar, "tail": [parameters.tail_gear * omega, acting.tail_rotor.force.y]}
 
-    return coaxial if _is_coaxial(vehicle) else single
+    return coaxial if is_coaxial(vehicle) else single
 
 
-def _is_coaxial(vehicle: Vehicle) -> bool:
-    return vehicle.input_names == coax.CoaxInputs._fields
+def is_coaxial(vehicle: Vehicle) -> bool:
+    """Whether it has the coaxial helicopter's own equations (a linear model with its inputs has not)."""
+    return vehicle.name == "coax"

@@ -18,20 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control.autopilot import Autopilot, autopilot, row_step
-from swashplate.control.linear_decoupling import static_decoupling
 from swashplate.control.state_hold import state_hold, state_hold_step
 from swashplate.errors import ControllerError
-from swashplate.flights.maneuvers import AXES, DEFAULT_AMPLITUDE
+from swashplate.flights.maneuvers import DEFAULT_AMPLITUDE
+from swashplate.links.live.axes import STICKS, axes_of
+from swashplate.links.live.picture import is_coaxial, picture
 from swashplate.simulation.closed_loop import REFERENCES, Step
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.coax import CoaxInputs
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Mode = Literal["raw", "held", "velocity", "position"]
 MODES: tuple[Mode, ...] = get_args(Mode)
-STICKS = ("roll", "pitch", "yaw", "heave")
 WANTED = (*REFERENCES, "yaw", "heave")
 """The reference row here: that of every controller, then the sticks of raw yaw and heave."""
 
@@ -45,6 +44,7 @@ class Pilot:
         memory: at the start.
         gains: rows by mode and decoupling.
         amplitude: of maneuvers by axis [unit of the inputs].
+        excited: what a maneuver of an axis moves, as `Maneuver` names it: the axis, or an input.
         speed, climb, turn: what a full stick asks for where something is held [m/s], [m/s], [rad/s].
         rate: of the controller [Hz].
         title: what it is, in words.
@@ -54,6 +54,7 @@ class Pilot:
     memory: Array
     gains: Mapping[tuple[Mode, bool], Array]
     amplitude: Mapping[str, float]
+    excited: Mapping[str, str]
     speed: float
     climb: float
     turn: float
@@ -65,7 +66,7 @@ def pilot(vehicle: Vehicle, trim: Trim, *, controller: Autopilot | None = None) 
     """The law for a vehicle, from its own equations and hover.
 
     Args:
-        vehicle: coaxial or single rotor.
+        vehicle: coaxial, single rotor or linear.
         trim: its hover.
         controller: a designed controller of a coaxial helicopter instead of the default one.
 
@@ -74,9 +75,9 @@ def pilot(vehicle: Vehicle, trim: Trim, *, controller: Autopilot | None = None) 
     """
     if controller is not None and controller.vehicle != vehicle.name:
         raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-    if vehicle.input_names == CoaxInputs._fields:
+    if is_coaxial(vehicle):
         return _coaxial(vehicle, trim, controller)
-    return _single_rotor(vehicle, trim)
+    return _state_feedback(vehicle, trim)
 
 
 # ---- coaxial ---------------------------------------------------------------------------------------------------------
@@ -104,6 +105,7 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
         base.memory,
         gains,
         DEFAULT_AMPLITUDE,
+        excited={axis: axis for axis in STICKS},
         speed=1.0,
         climb=0.5,
         turn=1.0,
@@ -122,39 +124,19 @@ def coaxial_step(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any)
     return jnp.where(raw > 0.5, memory, after), jnp.where(raw > 0.5, by_hand, commands)
 
 
-# ---- single rotor ----------------------------------------------------------------------------------------------------
-_OUTPUTS = {"roll": "p", "pitch": "q", "yaw": "r", "heave": "w"}
+# ---- any other -------------------------------------------------------------------------------------------------------
 _HELD = ("z", "w", "psi", "r")
 
 
-def _single_rotor(vehicle: Vehicle, trim: Trim) -> Pilot:
-    hold, model = state_hold(vehicle, trim, rate=100.0), linearize(vehicle, trim)
+def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
+    axes = axes_of(vehicle, linearize(vehicle, trim))
+    hold = state_hold(vehicle, trim, rate=100.0, along=axes.directions, spans=axes.spans)
     n, m = len(vehicle.state_names), len(vehicle.input_names)
-    limits = np.array(vehicle.input_limits)
-    moved = {axis: next(iter(next(s for s in AXES[axis] if s.keys() <= set(vehicle.input_names)))) for axis in STICKS}
-    half = {axis: 0.5 * float(np.ptp(limits[vehicle.input_names.index(name)])) for axis, name in moved.items()}
-    travel = {axis: share * half[axis] for axis, share in zip(STICKS, (0.2, 0.2, 0.4, 0.25), strict=True)}
-
-    # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
-    places = [vehicle.input_names.index(moved[axis]) for axis in STICKS]
-    linear = model.to_control()
-    outputs = tuple(_OUTPUTS[axis] for axis in STICKS)
-    matrix = static_decoupling(linear, inputs=[moved[a] for a in STICKS], outputs=outputs).matrix
-    signs = np.array(
-        [
-            np.sign(model.B[vehicle.index(out), place]) * sense
-            for out, place, sense in zip(outputs, places, (1.0, -1.0, 1.0, -1.0), strict=True)
-        ]
-    )
-    scale = np.diag(signs * np.array([travel[axis] for axis in STICKS]))
-    mixing = {True: np.zeros((m, 4)), False: np.zeros((m, 4))}
-    mixing[True][places], mixing[False][places] = matrix @ scale, scale
-
     K = hold.gains[: m * n].reshape(m, n)
     rest = hold.gains[m * n :]
     keeping = np.zeros((m, n))
-    rows = [vehicle.input_names.index(moved[axis]) for axis in ("yaw", "heave")]
-    columns = [vehicle.index(name) for name in _HELD]
+    rows = np.flatnonzero(np.any(axes.directions[:, [STICKS.index("yaw"), STICKS.index("heave")]], axis=1))
+    columns = np.array([vehicle.index(name) for name in _HELD])
     keeping[np.ix_(rows, columns)] = K[np.ix_(rows, columns)]
     by_mode: dict[Mode, tuple[Array, float]] = {
         "raw": (np.zeros((m, n)), 0.0),
@@ -163,17 +145,17 @@ def _single_rotor(vehicle: Vehicle, trim: Trim) -> Pilot:
         "position": (K, 1.0),
     }
     gains = {
-        (mode, on): np.array([place, *mixing[on].ravel(), *feedback.ravel(), *rest])
+        (mode, on): np.array([place, *axes.mixing[on].ravel(), *feedback.ravel(), *rest])
         for mode, (feedback, place) in by_mode.items()
         for on in (True, False)
     }
-    size = float(vehicle.card.values()["rotor_radius"])
     return Pilot(
         _step_of(m, n),
         np.zeros(1),
         gains,
-        {axis: 0.15 * half[axis] for axis in STICKS},
-        speed=3.0 * max(1.0, size**0.5),
+        axes.amplitude,
+        excited=axes.excited,
+        speed=3.0 * max(1.0, float(picture(vehicle)["size"]) ** 0.5),
         climb=1.0,
         turn=0.8,
         title="linear-quadratic hold about hover",
@@ -185,10 +167,10 @@ _STEPS: dict[tuple[int, int], Step] = {}
 
 def _step_of(inputs: int, states: int) -> Step:
     """One function per size, so that other gains compile nothing anew."""
-    return _STEPS.setdefault((inputs, states), partial(single_rotor_step, inputs=inputs, states=states))
+    return _STEPS.setdefault((inputs, states), partial(state_feedback_step, inputs=inputs, states=states))
 
 
-def single_rotor_step(
+def state_feedback_step(
     memory: Any, time: Any, measured: Any, wanted: Any, gains: Any, *, inputs: int, states: int
 ) -> tuple[Any, Any]:
     """A state hold whose place follows the aircraft unless a place is held, with the sticks mixed on top."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.records import records
-from swashplate.links.live.picture import inputs_of, picture, pose_of
+from swashplate.links.live.picture import inputs_of, is_coaxial, picture, pose_of
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.integrate import simulate
@@ -20,8 +20,9 @@ from swashplate.simulation.trim import trim
 from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
 from swashplate.validation.prediction import predict
 from swashplate.validation.validate import observer_of
+from swashplate.vehicles.catalogue import from_card
 from swashplate.vehicles.catalogue import vehicle as named_vehicle
-from swashplate.vehicles.coax import CoaxInputs
+from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -89,7 +90,8 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
         ahead: how long each prediction runs [s]; then the next one starts from what an observer knew by then.
 
     Raises:
-        FlightError: where a channel of the motion is missing, or the flight is too short to be predicted.
+        FlightError: where a channel of the motion or an input of a linear model is missing, or the flight is too short
+            to be predicted.
     """
     enable_double_precision()
     if not ahead > 0.0:
@@ -102,6 +104,8 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
             hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least.",
         )
     vehicle = drawn_as(flight, model)
+    if model is not None and model.name == LINEAR:
+        vehicle = model = _about_the_flight(model, flight)
     rate = flight.rate("phi")
     stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))
     body, time = flight.array(PREDICTED)[::stride], flight.time("phi")[::stride]
@@ -117,8 +121,10 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
             inputs[:, i] = np.interp(time, flight.time(name), flight.values(name))
     predicted = None
     if model is not None:
-        observed = model.input_names == CoaxInputs._fields
-        predicted = _predicted(flight, model, ahead, time) if observed else _flown(model, time, states, inputs, ahead)
+        if is_coaxial(model):
+            predicted = _predicted(flight, model, ahead, time)
+        else:
+            predicted = _flown(model, time, states, inputs, ahead)
     return Replay(
         vehicle,
         flight.provenance.source or "flight",
@@ -129,6 +135,29 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
         ahead,
         flight.provenance.simulated,
     )
+
+
+def _about_the_flight(model: Vehicle, flight: Flight) -> Vehicle:
+    """A linear model whose deviations count from the flight's mean roll, pitch and inputs: a log has absolute ones.
+
+    What a linear model itself flew is in deviations already.
+    """
+    missing = [name for name in model.input_names if name not in flight]
+    if missing:
+        raise FlightError(
+            f"lacks {', '.join(missing)}, which the linear model {model.card.where or model.card.title} is driven by.",
+            where=flight.provenance.source,
+            hint=f"It has {', '.join(flight.channels)}; fit the model to channels that the log has.",
+        )
+    if flight.provenance.vehicle == LINEAR:
+        return model
+    means = {f"trim_{name}": float(np.mean(flight.values(name))) for name in ("phi", "theta", *model.input_names)}
+    card = model.card.with_values(means, source="derived: mean of the flight", status="derived")
+    middle = [means[f"trim_{name}"] for name in model.input_names]
+    ranges = {
+        end: [value + shift for value, shift in zip(card.options[end], middle, strict=True)] for end in ("low", "high")
+    }
+    return from_card(replace(card, options={**card.options, **ranges}))
 
 
 def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Array:

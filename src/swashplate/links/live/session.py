@@ -12,10 +12,12 @@ from typing import Any
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
+from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
-from swashplate.links.live.identifying import How, Identifying
+from swashplate.links.live.identifying import HOWS, How, Identifying
+from swashplate.links.live.linear_picture import ABOUT
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
-from swashplate.links.live.pilots import MODES, STICKS
+from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
 from swashplate.physics.rigid_body import RigidBody
@@ -132,6 +134,8 @@ class Session:
             world.setting.decoupled = bool(value)
         elif kind == "ghost":
             world.set_ghost(bool(value))
+        elif world.linear and kind in ("wind", "gusts"):
+            raise SwashError("A linear model has no wind in its equations.")
         elif kind == "wind":
             world.setting.wind = tuple(float(message[name]) for name in ("north", "east", "down"))  # type: ignore[assignment]
         elif kind == "gusts":
@@ -147,12 +151,14 @@ class Session:
             raise AssertionError(kind)
 
     def _maneuver(self, kind: str, axis: str, size: float) -> Maneuver:
-        amplitude = size * self.world.pilot.amplitude[axis]
+        amplitude, moved = size * self.world.pilot.amplitude[axis], self.world.pilot.excited[axis]
         if kind == "sweep":
-            return Maneuver("sweep", (axis,), _SWEEP_SECONDS, amplitude, _SWEEP_BAND)
-        return Maneuver(kind, (axis,), _UNIT_SECONDS * {"doublet": 2, "3211": 7}[kind], amplitude)
+            return Maneuver("sweep", (moved,), _SWEEP_SECONDS, amplitude, _SWEEP_BAND)
+        return Maneuver(kind, (moved,), _UNIT_SECONDS * {"doublet": 2, "3211": 7}[kind], amplitude)
 
     async def _set_bar(self, on: bool) -> None:
+        if self.world.linear:
+            raise SwashError("A linear model has no bar to put on or off.")
         card = self.world.vehicle.card
         if card.options.get("bar", _has_bar(self.world.vehicle)) == on:
             return
@@ -197,6 +203,10 @@ class Session:
             "version": self.version,
             "title": vehicle.card.title,
             "trust": vehicle.card.trust,
+            "about": ABOUT if world.linear else "",
+            "wind": not world.linear,
+            "bar": not world.linear,
+            "hows": ["responses"] if world.linear else list(HOWS),
             "controller": world.pilot.title,
             "picture": picture(vehicle),
             "inputs": inputs_of(vehicle),

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
-from swashplate.links.live.pilots import STICKS, WANTED, Mode, Pilot, pilot
+from swashplate.links.live.axes import STICKS
+from swashplate.links.live.picture import picture
+from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
 from swashplate.links.live.recording import LONGEST
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Step
@@ -31,6 +33,7 @@ from swashplate.simulation.record import check_divergence
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
 from swashplate.simulation.wind import Gusts, Turbulence
+from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -38,6 +41,8 @@ Array = NDArray[np.float64]
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz]."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
+_LEAN = np.radians(60.0)
+"""Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2))
@@ -128,11 +133,11 @@ class World:
     def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None = None, seed: int = 0) -> None:
         enable_double_precision()
         self.vehicle = vehicle
-        card = vehicle.card.values()
-        battery = card.get("voltage_nominal")
+        self.linear = vehicle.name == LINEAR
+        battery = vehicle.card.values().get("voltage_nominal")
         self.nominal_voltage = battery
         around = Environment() if battery is None else Environment(voltage=battery)
-        self.start_height = max(2.0, 8.0 * card["rotor_radius"])
+        self.start_height = max(2.0, 8.0 * picture(vehicle)["size"])
         self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
         self.pilot: Pilot = pilot(vehicle, self.trim, controller=controller)
         self.setting = Setting(voltage=float(around.voltage))
@@ -232,9 +237,15 @@ class World:
         if self.rows is not None and len(self.rows) * self.period < LONGEST:
             self.rows.append(np.concatenate([before, own.inputs, around]))
         ghost = self._crafts.get("ghost")
-        if ghost is not None and not (np.all(np.isfinite(ghost.x)) and ghost.x[2] < 0.5 + self.start_height):
+        if ghost is not None and self._lost(ghost.x):
             self.set_ghost(False)
         self.ticks += 1
+
+    def _lost(self, x: Array) -> bool:
+        """Whether a ghost has flown to where it shows nothing any more."""
+        if not np.all(np.isfinite(x)):
+            return True
+        return _leans_too_far(x) if self.linear else bool(x[2] >= 0.5 + self.start_height)
 
     def _check(self, own: Craft, before: Array) -> None:
         try:
@@ -242,6 +253,11 @@ class World:
         except SwashError:
             self.trouble = "The simulation left the range in which the equations hold. Reset to fly again."
             own.x = before
+            return
+        if self.linear:
+            if _leans_too_far(own.x):
+                self.trouble = "Leans 60 deg, where a linear model tells nothing any more. Reset to fly again."
+                own.x = before
             return
         grounded = bool(self.vehicle.card.options.get("ground"))
         if own.x[2] > 0.0 and not grounded:
@@ -257,7 +273,8 @@ class World:
             self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
             row.update(yaw=s["yaw"], heave=s["heave"])
         else:
-            self._target[2] = min(self._target[2] - self.period * law.climb * s["heave"], -0.2)
+            height = self._target[2] - self.period * law.climb * s["heave"]
+            self._target[2] = height if self.linear else min(height, -0.2)
             self._target[3] += self.period * law.turn * s["yaw"]
         if setting.mode in ("raw", "held"):
             row.update(roll=s["roll"], pitch=s["pitch"])
@@ -304,3 +321,7 @@ class World:
         """Take over the switches of another world (a bar was put on or off)."""
         self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
         self.reset()
+
+
+def _leans_too_far(x: Array) -> bool:
+    return bool(np.max(np.abs(x[6:8])) > _LEAN)

@@ -37,7 +37,7 @@ export class Instruments {
     }
     if (cell.textContent !== text) cell.textContent = text;
   }
-  show(craft, around) {
+  show(craft, around, rpm = true) {
     const [, , z, u, v, w, phi, theta, psi] = craft.x;
     const lean = `rotate(${(-DEG * phi).toFixed(1)}) translate(0 ${(1.2 * DEG * theta).toFixed(1)})`;
     if (this.lean !== lean) this.ball.setAttribute("transform", (this.lean = lean));
@@ -46,7 +46,7 @@ export class Instruments {
     this.number("climb", `${climb.toFixed(2)} m/s`);
     this.number("speed", `${Math.hypot(u, v, w).toFixed(2)} m/s`);
     this.number("heading", `${((Math.round(DEG * psi) % 360) + 360) % 360}°`);
-    this.number("rotor", craft.rotors.map((rotor) => `${((30 / Math.PI) * rotor[2]).toFixed(0)}`).join(" / ") + " rpm");
+    if (rpm) this.number("rotor", craft.rotors.map((rotor) => `${((30 / Math.PI) * rotor[2]).toFixed(0)}`).join(" / ") + " rpm");
     if (around) this.number("battery", around);
   }
 }

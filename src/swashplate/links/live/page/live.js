@@ -75,7 +75,7 @@ function draw() {
   for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
   scene?.draw(rows, now, elapsed);
   panel.show(now, latency);
-  instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "");
+  instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "", hello.picture.rpm);
   document.documentElement.dataset.drawn = String(Number(document.documentElement.dataset.drawn ?? 0) + 1);
 }
 

@@ -82,6 +82,13 @@ export class Panel {
 
   hello(hello) {
     $("voltage-row").hidden = !hello.voltages;
+    for (const row of document.querySelectorAll(".wind")) row.hidden = !hello.wind; // what the equations do not have
+    $("air").hidden = !hello.wind && !hello.voltages;
+    $("bar").parentElement.hidden = !hello.bar;
+    for (const option of $("how").options) option.hidden = option.disabled = !hello.hows.includes(option.value);
+    if (!hello.hows.includes($("how").value)) $("how").value = hello.hows[0];
+    $("about").hidden = !hello.about;
+    $("about").textContent = hello.about;
     if (hello.voltages) [$("voltage").min, $("voltage").max] = hello.voltages;
     $("controller").textContent = `Controller: ${hello.controller}, ${hello.rate.toFixed(0)} Hz.`;
     $("trust").textContent = `Where the card may be trusted: ${hello.trust}`;

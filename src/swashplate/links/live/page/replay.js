@@ -64,7 +64,7 @@ function draw(now) {
   }
   draw.time = time;
   index = k;
-  instruments.show(own, "");
+  instruments.show(own, "", flight.picture.rpm);
   if (now - chartsAt > CHARTS_EVERY || !playing) {
     chartsAt = now;
     charts.mark(time, own);

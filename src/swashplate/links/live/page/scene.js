@@ -111,6 +111,8 @@ export class Scene {
     this.floor = picture.floor ?? 0; // down [m]: a log whose origin is the hover began on its ground, not in it
     this.ground.rotation.x = -Math.PI / 2;
     this.ground.position.y = -this.floor - 0.004 * this.cell;
+    this.grounded = picture.ground ?? true; // without one the grid is a level to look at, and may be flown through
+    this.ground.visible = this.grounded;
     this.scene.add(this.ground, this.grid);
     this.scene.fog.near = 12 * this.cell;
     this.scene.fog.far = 34 * this.cell;
@@ -180,7 +182,7 @@ export class Scene {
       this.heading += 0.08 * gap;
       const distance = 9 * this.size * zoom, around = this.heading + turn, flat = distance * Math.cos(lift);
       this.camera.position.set(
-        at.x - flat * Math.cos(around), Math.max(at.y + distance * Math.sin(lift), 0.1 * this.size - this.floor), at.z - flat * Math.sin(around),
+        at.x - flat * Math.cos(around), Math.max(at.y + distance * Math.sin(lift), this.grounded ? 0.1 * this.size - this.floor : -Infinity), at.z - flat * Math.sin(around),
       );
       this.camera.up.set(0, 1, 0);
     }

@@ -1,0 +1,132 @@
+"""Which inputs the four sticks move, which way and how far, for vehicles that are flown by state feedback."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from swashplate.control.linear_decoupling import static_decoupling
+from swashplate.errors import SwashError
+from swashplate.flights.maneuvers import AXES
+from swashplate.simulation.linearize import LinearModel
+from swashplate.vehicles.linear import NAME as LINEAR
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+STICKS = ("roll", "pitch", "yaw", "heave")
+_OUTPUTS = ("p", "q", "r", "w")
+_MOVED = ("phi", "theta", "psi", "z")
+_SENSE = np.array([1.0, -1.0, 1.0, -1.0])
+"""A stick's way in these: right, nose down (ahead), nose right, up."""
+_SHARES = np.array([0.2, 0.2, 0.4, 0.25])
+"""Of half an input's range that a full stick moves."""
+_EXCITED = 0.15
+"""Of half an input's range that a maneuver moves."""
+_SOON = 0.5
+"""s: an axis goes where a step of its inputs has moved the aircraft by then."""
+_ENOUGH = np.array([0.2, 0.2, 0.35, 0.5])
+"""rad, m: how far a full stick turns or lifts a linear model by then at most; its inputs' ranges are often assumed."""
+_SINGULAR = 1e-6
+"""Condition (inverse) below which the axes cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """What sticks do to inputs.
+
+    Attributes:
+        directions: inputs that an axis moves, shape (n_inputs, 4) in the order of `STICKS`.
+        spans: how far inputs go along them, from end to end [unit of the inputs], shape (4,).
+        mixing: full sticks to inputs, with and without decoupling, shape (n_inputs, 4).
+        amplitude: of maneuvers by axis [unit of the inputs].
+        excited: what a maneuver moves, as it is called in one: the axis, or an input.
+    """
+
+    directions: Array
+    spans: Array
+    mixing: Mapping[bool, Array]
+    amplitude: Mapping[str, float]
+    excited: Mapping[str, str]
+
+
+def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
+    """The axes of a vehicle whose linear model about hover is known.
+
+    Raises:
+        SwashError: where the inputs are fewer than four or move too little.
+    """
+    soon = _step_response(model.A, model.B, [vehicle.index(name) for name in _MOVED])
+    directions, excited = _directions(vehicle, soon)
+    moved = soon @ directions
+    reached = np.diag(moved)
+    if not np.all(reached):
+        lost = ", ".join(out for out, value in zip(_MOVED, reached, strict=True) if not value)
+        raise SwashError(
+            f"has no input that moves {lost}: it cannot be flown by four sticks.", where=vehicle.card.where
+        )
+    ranges = np.ptp(np.array(vehicle.input_limits), axis=1)
+    half = np.array([0.5 * np.min(ranges[column != 0.0]) for column in directions.T])
+    travel = _SHARES * half
+    if vehicle.name == LINEAR:
+        travel = np.minimum(travel, _ENOUGH / np.abs(reached))
+    scale = np.sign(reached) * _SENSE * travel
+    # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
+    matrix = _soon_decoupled(moved, vehicle) if vehicle.name == LINEAR else _at_once_decoupled(model, directions)
+    mixing = {True: directions @ matrix @ np.diag(scale), False: directions @ np.diag(scale)}
+    amplitude = dict(zip(STICKS, (_EXCITED / _SHARES * travel).tolist(), strict=True))
+    return Axes(directions, 2.0 / _SHARES * travel, mixing, amplitude, excited)
+
+
+def _at_once_decoupled(model: LinearModel, directions: Array) -> Array:
+    """Axes that leave each other's rates alone at first, shape (4, 4)."""
+    names = list(model.states)
+    by_axis = control.ss(model.A, model.B @ directions, np.eye(len(names)), 0.0, inputs=list(STICKS), outputs=names)
+    return static_decoupling(by_axis, inputs=STICKS, outputs=_OUTPUTS).matrix
+
+
+def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
+    """Axes whose steps have not turned or lifted each other after `_SOON`, shape (4, 4).
+
+    Identified inputs often reach a rate by several ways (pitch at once by a small Mcol, by flapping a moment later), of
+    which the first says little.
+    """
+    ratio = moved / np.diag(moved)[:, None]
+    if np.linalg.cond(ratio) * _SINGULAR > 1.0:
+        raise SwashError("has inputs that move two axes alike: four sticks cannot fly it.", where=vehicle.card.where)
+    return np.asarray(np.linalg.inv(ratio), dtype=np.float64)
+
+
+def _step_response(A: Array, B: Array, states: list[int]) -> Array:
+    """Some states' answer to a step of each input after `_SOON`, shape (4, n_inputs)."""
+    n, m = B.shape
+    whole = scipy.linalg.expm(_SOON * np.block([[A, B], [np.zeros((m, n + m))]]))
+    return np.asarray(whole[states, n:], dtype=np.float64)
+
+
+def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:
+    """Inputs by axis: those whose names say it, otherwise those that move the axes most."""
+    names = vehicle.input_names
+    found: dict[str, Any] = {a: next((s for s in AXES[a] if s.keys() <= set(names)), None) for a in STICKS}
+    excited = {axis: axis for axis in STICKS}
+    if None in found.values():
+        if len(names) < len(STICKS):
+            raise SwashError(
+                f"has the inputs {', '.join(names)}: too few for four sticks.",
+                where=vehicle.card.where,
+                hint="A model that is flown by hand needs four: roll, pitch, yaw and heave.",
+            )
+        ranges = np.ptp(np.array(vehicle.input_limits), axis=1)
+        strength = np.abs(soon) * ranges
+        strength = strength / np.maximum(np.max(strength, axis=1, keepdims=True), 1e-300)
+        _, columns = linear_sum_assignment(strength, maximize=True)
+        excited = {axis: names[column] for axis, column in zip(STICKS, columns, strict=True)}
+        found = {axis: {name: 1.0} for axis, name in excited.items()}
+    return np.array([[found[axis].get(name, 0.0) for axis in STICKS] for name in names]), excited

@@ -1,0 +1,224 @@
+"""Linear models on the live page: sticks that mean what they say, what is drawn, and what they do not have."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate.control.linear_vehicle import linear_vehicle
+from swashplate.errors import CardError, FlightError, SwashError
+from swashplate.flights.flight import Flight
+from swashplate.identification.state_space import StateSpaceModel
+from swashplate.identification.state_space_file import parse, structure, to_toml
+from swashplate.links.live.axes import STICKS, axes_of
+from swashplate.links.live.identifying import commands
+from swashplate.links.live.picture import picture, pose_of
+from swashplate.links.live.pilots import MODES
+from swashplate.links.live.recording import save_recording
+from swashplate.links.live.replay import Replay, as_json, replay
+from swashplate.links.live.session import Session
+from swashplate.links.live.world import World
+from swashplate.physics.environment import Environment
+from swashplate.simulation.linearize import linearize
+from swashplate.vehicles.vehicle import Vehicle
+
+X, Y, Z, U, V, PHI, PSI = 0, 1, 2, 3, 4, 6, 8
+RAISED = {"roll": (Y, 1.0), "pitch": (X, 1.0), "yaw": (PSI, 1.0), "heave": (Z, -1.0)}
+
+
+@pytest.fixture(scope="module")
+def model() -> StateSpaceModel:
+    return structure("thirteen_state")
+
+
+@pytest.fixture(scope="module")
+def session(model: StateSpaceModel, tmp_path_factory: pytest.TempPathFactory) -> Session:
+    return Session(linear_vehicle(model), controller=None, folder=tmp_path_factory.mktemp("live"))
+
+
+@pytest.fixture(scope="module", params=["thirteen_state", "coaxial"])
+def world(request: pytest.FixtureRequest, session: Session) -> World:
+    return session.world if request.param == "thirteen_state" else World(linear_vehicle(structure(request.param)))
+
+
+def fly(world: World, seconds: float, **sticks: float) -> np.ndarray:
+    world.setting.sticks = {axis: sticks.get(axis, 0.0) for axis in STICKS}
+    for _ in range(round(seconds / world.period)):
+        world.step()
+    return world.moment().crafts["own"][0]
+
+
+def fresh(world: World, mode: str, *, ghost: bool = False) -> World:
+    world.set_ghost(ghost)
+    world.set_mode(mode)  # type: ignore[arg-type]
+    world.rows = None
+    world.reset()
+    return world
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("axis", STICKS)
+def test_a_stick_moves_the_aircraft_its_way(world: World, mode: str, axis: str) -> None:
+    fresh(world, mode)
+    start = fly(world, 0.1).copy()
+    moved = fly(world, 1.2, **{axis: 0.25})
+    state, sense = RAISED[axis]
+    assert not world.trouble
+    assert sense * (moved[state] - start[state]) > 0.02
+
+
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_what_is_held_is_held(world: World, mode: str) -> None:
+    fresh(world, mode)
+    fly(world, 1.5, pitch=0.6, heave=0.5, yaw=0.4)
+    settled = fly(world, 12.0).copy()
+    after = fly(world, 3.0)
+    assert np.max(np.abs(after[[Z, PSI]] - settled[[Z, PSI]])) < 0.05
+    assert np.hypot(after[U], after[V]) < 0.1
+    assert settled[Z] < world.trim.state[Z] - 0.1
+
+
+def test_there_is_no_ground_and_a_flight_ends_where_angles_are_no_small_ones(session: Session) -> None:
+    world = fresh(session.world, "velocity")
+    assert fly(world, 15.0, heave=-1.0)[Z] > 1.0, "it sinks through the level that is drawn"
+    assert not world.trouble
+    fresh(world, "raw")
+    last = fly(world, 20.0, roll=1.0)
+    assert world.trouble.startswith("Leans 60 deg")
+    assert np.radians(50.0) < abs(last[PHI]) < np.radians(60.0)
+    world.reset()
+    assert not world.trouble
+
+
+def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(session: Session) -> None:
+    world = fresh(session.world, "raw", ghost=True)
+    own = fly(world, 0.5, pitch=0.4).copy()
+    ghost = world.moment().crafts["ghost"][0].copy()
+    fresh(world, "raw")
+    world.setting.decoupled = False
+    alone = fly(world, 0.5, pitch=0.4).copy()
+    world.setting.decoupled = True
+    assert np.max(np.abs(ghost - alone)) < 1e-12
+    assert abs(ghost[PHI]) > 1e-3
+    assert abs(own[PHI]) < 0.1 * abs(ghost[PHI]), "half a second after the stick, pitch has left roll alone"
+
+
+@pytest.fixture(scope="module")
+def recording(session: Session, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[np.ndarray]]:
+    world = fresh(session.world, "position")
+    world.rows = []
+    fly(world, 4.0, pitch=0.3, heave=0.2)
+    rows, world.rows = world.rows, None
+    folder = tmp_path_factory.mktemp("recorded")
+    save_recording(world.vehicle, rows, period=world.period, folder=folder, number=1)
+    return folder, rows
+
+
+def far_off(shown: Replay, channels: slice = slice(0, 12)) -> float:
+    assert shown.predicted is not None
+    there = np.isfinite(shown.predicted[:, 0])
+    assert np.mean(there) > 0.7
+    return float(np.max(np.abs(shown.predicted - shown.states[:, :12])[there][:, channels]))
+
+
+def test_a_recording_is_a_flight_and_replays_with_its_own_model(
+    session: Session, recording: tuple[Path, list[np.ndarray]]
+) -> None:
+    folder, rows = recording
+    vehicle = session.world.vehicle
+    assert {"x", "lateral", "collective"} <= set(Flight.load(folder / "recording-1.nc").channels)
+    truth = Flight.load(folder / "recording-1-truth.nc")
+    names = (*vehicle.state_names, *vehicle.input_names)
+    assert np.array_equal(truth.array(names), np.array(rows)[:, : len(names)])
+    shown = replay(truth, model=vehicle, ahead=1.0)
+    assert far_off(shown) < 0.02
+    assert not as_json(shown)["picture"]["ground"]
+
+
+def test_a_log_of_absolute_inputs_is_replayed_about_its_mean(
+    session: Session, recording: tuple[Path, list[np.ndarray]]
+) -> None:
+    truth, model = Flight.load(recording[0] / "recording-1-truth.nc"), session.world.vehicle
+    moved = {home: data.assign(collective=data.collective + 5.0) for home, data in truth.streams.items()}
+    log = replace(truth.with_streams(moved), provenance=replace(truth.provenance, vehicle="X8"))
+    shown = replay(log, model=model, ahead=1.0)
+    trims = shown.vehicle.card.values()
+    assert trims["trim_collective"] == pytest.approx(5.0 + np.mean(truth.values("collective")))
+    assert trims["trim_theta"] == pytest.approx(np.mean(truth.values("theta")))
+    assert far_off(shown, slice(2, 3)) < 0.2, "five units of collective are no deviation: it does not shoot up"
+    bare = log.with_streams({home: data.drop_vars("pedal") for home, data in log.streams.items()})
+    with pytest.raises(FlightError, match="lacks pedal, which the linear model"):
+        replay(bare, model=model)
+
+
+def test_flapping_is_drawn_and_thrust_is_the_weight(model: StateSpaceModel) -> None:
+    vehicle = linear_vehicle(model)
+    shape, pose = picture(vehicle), pose_of(vehicle)
+    at = dict.fromkeys(vehicle.state_names, 0.0)
+    row = [0.0] * 4
+    told = pose(list(at.values()), row, Environment())
+    assert told["rotors"][0][3:] == pytest.approx([0.0, 0.0, -shape["weight"]])
+    assert not shape["ground"]
+    assert not shape["rpm"]
+    tilted = pose(list((at | {"a": 0.02, "b": 0.05, "c": -0.1, "d": 0.2}).values()), row, Environment())
+    assert tilted["rotors"][0][:2] == [0.05, 0.02]
+    assert tilted["bar"] == [0.2, -0.1]
+    assert tilted["rotors"][0][3] < 0.0 < tilted["rotors"][0][4], "aft and right, as the disc"
+    rigid = linear_vehicle(structure("six_dof"))
+    assert pose_of(rigid)([0.0] * 12, row, Environment())["bar"] is None
+    coax = linear_vehicle(structure("coaxial"))
+    two = pose_of(coax)([0.0] * len(coax.state_names), row, Environment())
+    assert len(two["rotors"]) == len(picture(coax)["rotors"]) == 2
+
+
+def test_a_file_may_say_how_large_it_is(model: StateSpaceModel) -> None:
+    text = to_toml(model)
+    assert picture(linear_vehicle(model))["size"] == 1.0
+    large = parse(text + "\n[shape]\nrotor_radius = 1.535\n")
+    assert picture(linear_vehicle(parse(to_toml(large))))["size"] == 1.535, "kept when the file is written"
+    with pytest.raises(CardError, match=r"shape\.rotor_radius.* expected 0 to 100 m"):
+        parse(text + '\n[shape]\nrotor_radius = "large"\n')
+    with pytest.raises(CardError, match=r"shape\.colour"):
+        parse(text + "\n[shape]\ncolour = 3\n")
+
+
+def test_inputs_of_other_names_are_found_by_what_they_move(model: StateSpaceModel, session: Session) -> None:
+    text = to_toml(model)
+    for old, new in (("lateral", "k2"), ("longitudinal", "k0"), ("pedal", "k3"), ("collective", "k1")):
+        text = text.replace(f"{old} =", f"{new} =")
+    matrices = linearize(session.world.vehicle, session.world.trim)  # the names are all that differs
+    found = axes_of(linear_vehicle(parse(text)), matrices)
+    expected = axes_of(session.world.vehicle, matrices)
+    assert dict(found.excited) == {"roll": "k2", "pitch": "k0", "yaw": "k3", "heave": "k1"}
+    assert np.allclose(found.mixing[True], expected.mixing[True])
+    still = replace(matrices, B=np.where(np.arange(4) == 3, 0.0, matrices.B))
+    with pytest.raises(SwashError, match="no input that moves z"):
+        axes_of(session.world.vehicle, still)
+
+
+def test_what_it_does_not_have_is_hidden_and_refused(session: Session) -> None:
+    told = session.hello()
+    assert (told["wind"], told["bar"], told["voltages"], told["hows"]) == (False, False, None, ["responses"])
+    assert told["about"].startswith("A linear model: deviations from one trim")
+    for message in (
+        {"type": "wind", "north": 1, "east": 0, "down": 0},
+        {"type": "gusts", "value": 1.0},
+        {"type": "bar", "value": True},
+        {"type": "voltage", "value": 12.0},
+    ):
+        with pytest.raises(SwashError, match="has no"):
+            asyncio.run(session.obey(message))
+    asyncio.run(session.obey({"type": "maneuver", "kind": "doublet", "axis": "heave", "size": 1}))
+    fresh(session.world, "held")
+
+
+def test_identify_leads_to_its_responses_only(session: Session) -> None:
+    vehicle: Vehicle = session.world.vehicle
+    found = commands(vehicle, Path("f.nc"), card=Path("c.toml"), out=Path("out"), how="model")
+    assert len(found) == 1
+    assert "respond" in found[0]
+    assert "lateral,longitudinal,pedal,collective" in found[0]
