@@ -59,6 +59,10 @@ def test_a_linear_model_and_a_controller(tmp_path: Path) -> None:
     assert "Delays are not in these equations" in outcome.err
     assert "one flight" not in outcome.err
     assert "no speed" in one_message(swash("export", tmp_path / "linear.toml", "--format", "c", "--speed", "3"))
+    for name, folder in (("hybrid", "by-name"), (tmp_path / "linear.toml", "by-file")):
+        swash("export", name, "--format", "control", "--name", "model", "--out", tmp_path / folder)
+    named, filed = ((tmp_path / f / "model_control.json").read_text() for f in ("by-name", "by-file"))
+    assert named == filed, "a ready structure's name is its file"
 
     controller = tmp_path / "hold.toml"
     coax = sp.vehicle("coax")

@@ -15,6 +15,7 @@ from swashplate.control.lqg_design import design
 from swashplate.control.lqg_transfer import flown_on
 from swashplate.control.sensor_suite import suite
 from swashplate.errors import CardError, ControllerError
+from swashplate.export.linear import logged_delays, of_vehicle
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import parse, structure, to_toml
 from swashplate.physics.backend import FloatBackend
@@ -169,3 +170,9 @@ def vehicle_with_bar() -> Vehicle:
     from swashplate.vehicles.catalogue import vehicle
 
     return vehicle("raptor50", bar=True, gyro=True)
+
+
+def test_it_is_exported_with_the_files_units_and_delays(flying: Vehicle) -> None:
+    out = of_vehicle(flying, trim(flying), name="m", delays=logged_delays(flying))
+    assert {name: out.units[name] for name in flying.input_names} == dict.fromkeys(flying.input_names, "1")
+    assert out.delays == dict.fromkeys(flying.input_names, 0.02)

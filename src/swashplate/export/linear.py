@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.control.linear_vehicle import delays_of
 from swashplate.errors import ExportError
-from swashplate.flights.schema import channel, is_known
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
@@ -70,11 +70,13 @@ def logged_delays(vehicle: Vehicle) -> dict[str, float]:
     """By how much the motion lagged each logged input when a vehicle was identified [s].
 
     Latency of the radio, the servo pulses and the logger's clock: the equations do not have it, the card's observer
-    section remembers it (`delay_motor` for motors, `delay_servo` for all else).
+    section remembers it (`delay_motor` for motors, `delay_servo` for all else; a linear model's card by input).
 
     Raises:
         ExportError: where the card remembers none.
     """
+    if own := delays_of(vehicle):
+        return own
     found = vehicle.card.observer.get("nuisance", {})
     names = {i: "delay_motor" if i.startswith("motor") else "delay_servo" for i in vehicle.input_names}
     if not found.keys() & set(names.values()):
@@ -91,7 +93,7 @@ def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, 
     """A vehicle about a trim, exactly differentiated; the outputs are the states. Delays of inputs [s] where given."""
     found = linearize(vehicle, trim)
     units = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
-    units |= {i: input_unit(i) for i in vehicle.input_names}
+    units |= dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
     return Linear(
         name,
         vehicle.card.title,
@@ -127,8 +129,3 @@ def of_state_space(model: StateSpaceModel, *, name: str) -> Linear:
         dict(model.units),
         {name: float(expression(numbers)) for name, expression in model.delays.items()},
     )
-
-
-def input_unit(name: str) -> str:
-    """Unit of a vehicle's input: commands of motors, servos and throttle have none, blade angles are in radians."""
-    return channel(name).unit if is_known(name) else "1" if name == "throttle" else "rad"

@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.errors import ExportError
 from swashplate.export.c_text import identifier
-from swashplate.export.linear import Linear, input_unit
+from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment
@@ -214,8 +214,10 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[st
             for a, unit, start in zip(vehicle.state_names, vehicle.state_units, trim.state, strict=True)
         ),
         inputs=tuple(
-            Variable(a, input_unit(a), float(start), limits, _meaning(a))
-            for a, start, limits in zip(vehicle.input_names, trim.inputs, vehicle.input_limits, strict=True)
+            Variable(a, unit, float(start), limits, _meaning(a))
+            for a, unit, start, limits in zip(
+                vehicle.input_names, vehicle.input_units, trim.inputs, vehicle.input_limits, strict=True
+            )
         ),
         surroundings=tuple(
             Variable(around[i], unit, float(getattr(trim.environment, around[i])), meaning=meaning)
