@@ -86,7 +86,7 @@ def test_json_says_what_the_table_says() -> None:
         (("decouple", "coax", "--lag", "wrong"), "lag: is 'wrong', expected hover, motor, battery or a number."),
         (("decouple", "coax", "--lag", "44", "--mixing", "as_printed"), "no inverse at 45 deg"),
         (("decouple", "coax", "--lag", "1e9"), "--lag: is 1e9 degrees, expected at most 180 either way"),
-        (("decouple", "coax", "--voltage", "nan"), "coax: voltage: is not a finite number"),
+        (("decouple", "coax", "--voltage", "nan"), "coax.toml: voltage: is not a finite number"),
         (("trim", "raptor50", "--climb", "nan"), "climb: is not a finite number"),
         (("decouple", "coax", "--out", "c.json"), "ends in '.json', expected .toml"),
         (("decouple", "coax", "--c", "c.h"), "ends in '.h', expected .c"),

@@ -98,7 +98,7 @@ def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.
         (("coax", "--format", "fmu", "--precision", "single"), "are double"),
         (("coax", "--format", "c", "--name", "///"), "gives no name"),
         (("coax", "--format", "c", "--speed", "0-2"), "takes one speed"),
-        (("raptor50", "--format", "c", "--speed", "60"), "no equilibrium was found"),
+        (("raptor50", "--format", "c", "--speed", "60"), "needs theta0 = 61.2 deg, but its limit is 15.0 deg"),
         (("nothing.toml", "--format", "c"), "neither a vehicle's name nor a file"),
     ],
 )

@@ -32,6 +32,7 @@ from swashplate.identification.stochastic import (
     commands,
     stochastic_model,
 )
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
@@ -301,14 +302,22 @@ def _innovations(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any, FilterStat
     )
 
 
-@partial(jax.jit, static_argnums=0)
-def _with_tangents(plan: _Plan, data: Any, row: Any) -> Any:
+def _tangents(plan: _Plan, data: Any, row: Any) -> Any:
     """Innovations and covariances with their derivatives by every entry of the row."""
 
     def residuals(row: Any) -> Any:
         return _innovations(plan, data, row)[:2]
 
     return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,)), out_axes=(None, 0))(jnp.eye(row.shape[0]))
+
+
+_swiftly = jax.jit(_tangents, static_argnums=0)
+_soon = jax.jit(_tangents, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+
+
+def _with_tangents(plan: _Plan, data: Any, row: Any) -> Any:
+    """`_tangents`, compiled for speed; a helicopter's many times as many operations, to be compiled soon."""
+    return (_soon if plan.model.vehicle.name == "conventional" else _swiftly)(plan, data, row)
 
 
 def filter_record(

@@ -135,19 +135,29 @@ class StochasticModel:
     # ---- one sample --------------------------------------------------------------------------------------------
     def step(self, x: Any, gust: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
         """The state one sample later, with held disturbances: accelerations as in `DISTURBED`, and perhaps the wind."""
-        rates = row_rates(self.equations, padded=False)
-        push = sum(gust[i] * unit for i, unit in enumerate(np.eye(x.shape[0])[self._disturbed]))
-        wind = jnp.concatenate([gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy)])
-        air = jnp.append(wind, voltage)
-        driving = jnp.stack([jnp.concatenate([row, air]) for row in u])
-        constants = [getattr(Environment(), name) for name in CONSTANTS]
-        numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
+        rates, push = self._rates(parameters), self._push(gust)
+        driving = jnp.stack([self._driving(gust, row, voltage) for row in u])
         return rk4_step_looped(
-            lambda x, w: rates(x, w, numbers) + push,
+            lambda x, w: rates(x, w) + push,
             x,
             lambda fraction: driving[jnp.round(2.0 * fraction).astype(int)],
             self.dt,
         )
+
+    def _rates(self, parameters: Any) -> Any:
+        rates = row_rates(self.equations, padded=False)
+        constants = [getattr(Environment(), name) for name in CONSTANTS]
+        numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
+        return lambda x, w: rates(x, w, numbers)
+
+    def _push(self, gust: Any) -> Any:
+        """The accelerations of a gust as rates of a whole state row."""
+        units = np.eye(len(self.vehicle.state_names))[self._disturbed]
+        return sum(gust[i] * unit for i, unit in enumerate(units))
+
+    def _driving(self, gust: Any, u: Any, voltage: Any) -> Any:
+        """Inputs, wind and voltage side by side."""
+        return jnp.concatenate([u, gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy), voltage[None]])
 
     def measure(self, x: Any, nuisance: Nuisance) -> Any:
         """The measured channels of a state row."""
@@ -186,8 +196,19 @@ class StochasticModel:
             sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
             along = jnp.sqrt(2.0) * sigma * np.eye(n)[self._disturbed[3:5]]
             places = jnp.concatenate([x + along, x - along])
-        slopes = jax.jacfwd(lambda x, w: self.step(x, w, (u, u, u), parameters, voltage), argnums=(0, 1))
-        by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(lambda x: slopes(x, jnp.zeros(g)))(places))
+        rates = self._rates(parameters)
+
+        def slopes(x: Any) -> Any:
+            return jax.jacfwd(lambda x, w: rates(x, self._driving(w, u, voltage)) + self._push(w), argnums=(0, 1))(
+                x, jnp.zeros(g)
+            )
+
+        by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(slopes)(places))
+        # What Runge and Kutta's four stages make of a linear system in one sample.
+        held, one = jnp.eye(n), jnp.eye(n)
+        for stage in (4, 3, 2):
+            held = one + self.dt / stage * by_x @ held
+        by_x, by_gust = one + self.dt * by_x @ held, self.dt * held @ by_gust
         by_push = by_gust[:, :d]
         A = jnp.block(
             [

@@ -63,7 +63,7 @@ def spread(
     values = np.linalg.eigvals(nominal.A).astype(complex)
     tables: list[Array] = []
     modes: list[NDArray[np.complexfloating[Any, Any]]] = []
-    refused = 0
+    refused, why = 0, ""
     names = list(derivative_table(vehicle, at).names())
     for _ in range(draws):
         drawn = {
@@ -87,13 +87,13 @@ def spread(
                 environment=around,
                 near=at,
             )
-        except (CardError, TrimError):
-            refused += 1
+        except (CardError, TrimError) as error:
+            refused, why = refused + 1, str(error)
             continue
         tables.append(derivative_table(other, there).total.ravel())
         modes.append(_matched(np.linalg.eigvals(linearize(other, there).A).astype(complex), values))
     if not tables:
-        raise SwashError("none of the samples could be trimmed.", where=card.where)
+        raise SwashError(f"none of the samples could be trimmed; the last: {why}", where=card.where)
     low, high = np.quantile(np.array(tables), [0.05, 0.95], axis=0)
     centre = derivative_table(vehicle, at).total.ravel()
     found = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}

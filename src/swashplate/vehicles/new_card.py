@@ -59,7 +59,9 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             value=value,
             source="given" if name in given else f"guess: {like} scaled to {radius:g} m and {mass:g} kg",
             status="measured" if name in given else "assumed",
-            sigma=None if name in given or not value else float(f"{_GUESS * abs(value):.3g}"),
+            sigma=None
+            if name in given or name.endswith("_blades") or not value
+            else float(f"{_GUESS * abs(value):.3g}"),
             lower=None if parameter.lower is None else parameter.lower * min(factor, 1.0),
             upper=None if parameter.upper is None else parameter.upper * max(factor, 1.0),
             note="",
