@@ -64,7 +64,7 @@ def decoupling_report(
         summary=(
             ("Axes", ", ".join(f"{i} moves {o}" for i, o in zip(inputs, outputs, strict=True)), "plain"),
             ("Coupling", f"largest off-axis over on-axis response at {frequency:g} rad/s: {told}.", "plain"),
-            ("Judged", "on the model that it was made from, where the filter is exact; flown, it is as good as that model.",
+            ("Judged", "on its own model, where the filter is exact; flown, it is as good as that model.",
              "caution"),
         ),
         picture=_ratio_figure(w, ratios, pairs, outputs),
