@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,10 @@ def _recovered(folder: Path, method: str, *, free: str, seconds: int) -> dict[st
     return card.values()
 
 
+def _fits(document: dict[str, Any]) -> dict[tuple[str, str], float]:
+    return {(score["predictor"], score["channel"]): score["fit"] for score in document["scores"]}
+
+
 def test_hub_spring_blades_and_wake_distortion_come_back_by_output_error(tmp_path: Path) -> None:
     """A card with estimates becomes a card with identified values."""
     found = _recovered(tmp_path, "output-error", free="hub_stiffness,blade_inertia,wake_distortion", seconds=9)
@@ -67,12 +72,22 @@ def test_they_come_back_by_prediction_error_and_the_model_predicts_another_fligh
     assert found["wake_distortion"] == pytest.approx(1.0, abs=0.05)
     _swash("simulate", "--vehicle", tmp_path / "true.toml", "--maneuver", "multisine:roll+pitch,0.6-5Hz,9s,0.02",
            "--sensors", "clean", "--seed", 2, "--out", tmp_path / "again.nc", "-q")  # fmt: skip
-    _swash("validate", "--model", tmp_path / "fit" / "model.toml", "--flight", tmp_path / "again.nc",
-           "--horizons", "0.5,1", "--out", tmp_path / "check", "-q")  # fmt: skip
-    document = json.loads((tmp_path / "check" / "validation.json").read_text(encoding="utf-8"))
-    fits = {(s["predictor"], s["channel"]): s["fit"] for s in document["scores"] if s["horizon"] == 1.0}
+    compare = (
+        "validate",
+        "--model",
+        tmp_path / "fit" / "model.toml",
+        "--flight",
+        tmp_path / "again.nc",
+        "--horizons",
+        1,
+    )
+    _swash(*compare, "--out", tmp_path / "check", "-q")
+    fits = _fits(json.loads((tmp_path / "check" / "validation.json").read_text(encoding="utf-8")))
+    against_truth = _fits(json.loads(_swash(*compare, "--published", tmp_path / "true.toml", "--json", "-q")))
     for channel in ("phi", "theta", "p", "q"):
-        assert fits["model", channel] > max(90.0, fits["published card", channel]), channel
+        assert fits["model", channel] > fits["published card", channel], channel
+        # What even the truth cannot predict is noise in the start: no better is to be had, and not much less.
+        assert against_truth["model", channel] > against_truth["published card", channel] - 2.0, channel
     assert (tmp_path / "check" / "report.html").is_file()
 
 
