@@ -49,7 +49,7 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
 
 speed: $(STAMP)
 	$(BIN)/python -m benchmarks.run --short

@@ -45,7 +45,8 @@ def test_many_seeds_scatter_as_predicted() -> None:
 @pytest.mark.proof
 def test_prediction_error_scatters_as_predicted_in_gusts() -> None:
     recoveries = [
-        recover(flown_in_gusts(seed, sigma=0.3), seed=seed, method="prediction-error") for seed in range(GUSTY)
+        recover(flown_in_gusts(seed, sigma=0.3), seed=seed, method="prediction-error", wind=True)
+        for seed in range(GUSTY)
     ]
     _judge(
         "recovery_gusts",

@@ -15,11 +15,15 @@ export class Panel {
   constructor(say, { view }) {
     this.say = say;
     this.now = null;
-    this.touched = new Map(); // sliders that a hand holds are not moved by the server
+    this.touched = new Map(); // controls that a hand has just moved are not moved back by the server
     this.slid = new Map();
     for (const button of document.querySelectorAll("[data-mode]"))
       button.onclick = () => say("mode", { value: button.dataset.mode });
-    for (const name of ["decoupled", "ghost", "bar"]) $(name).onchange = () => say(name, { value: $(name).checked });
+    for (const name of ["decoupled", "ghost", "bar"])
+      $(name).onchange = () => {
+        this.touched.set(name, performance.now());
+        say(name, { value: $(name).checked });
+      };
     for (const button of document.querySelectorAll("[data-maneuver]"))
       button.onclick = () => say("maneuver", { kind: button.dataset.maneuver, axis: $("axis").value, size: Number($("size").value) });
     for (const button of document.querySelectorAll("[data-view]"))
@@ -52,6 +56,11 @@ export class Panel {
       changed(Number(input.value));
     };
     input.show = show;
+  }
+
+  /** Nobody has moved this control lately: the server may. */
+  #still(id) {
+    return performance.now() - (this.touched.get(id) ?? -1e9) > 800;
   }
 
   #pause() {
@@ -104,10 +113,11 @@ export class Panel {
     const { setting } = now;
     for (const button of document.querySelectorAll("[data-mode]"))
       press(button, button.dataset.mode === setting.mode);
-    for (const name of ["decoupled", "ghost", "bar"]) if ($(name).checked !== setting[name]) $(name).checked = setting[name];
+    for (const name of ["decoupled", "ghost", "bar"])
+      if (this.#still(name) && $(name).checked !== setting[name]) $(name).checked = setting[name];
     const values = { north: setting.wind[0], east: setting.wind[1], gusts: setting.gusts, voltage: setting.voltage };
     for (const [id, value] of Object.entries(values)) {
-      if (performance.now() - (this.touched.get(id) ?? -1e9) > 800 && this.slid.get(id) !== value) {
+      if (this.#still(id) && this.slid.get(id) !== value) {
         $(id).value = value;
         this.slid.set(id, value);
       }
