@@ -51,7 +51,7 @@ def test_prediction_error_scatters_as_predicted_in_gusts() -> None:
     _judge(
         "recovery_gusts",
         f"Simulate, identify, recover in gusts, {GUSTY} seeds",
-        f"The usual sensors on '{MANEUVER}' in horizontal gusts of 0.3 m/s, prediction error at 100 Hz. The priors of "
+        f"The usual sensors on '{MANEUVER}' in horizontal gusts of 0.3 m/s; prediction error with a wind. Priors of "
         "trims and of the tracked body's heading stand at the truth: a scatter below its prediction is no fault here.",
         (0.90, 1.0),
         (0.0, 1.4),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flown_by_hand import PHI, Z, fly, fresh, holds_what_is_held, moves_its_way
 from swashplate.control.linear_vehicle import linear_vehicle
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.flights.flight import Flight
@@ -26,9 +27,6 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import linearize
 from swashplate.vehicles.vehicle import Vehicle
 
-X, Y, Z, U, V, PHI, PSI = 0, 1, 2, 3, 4, 6, 8
-RAISED = {"roll": (Y, 1.0), "pitch": (X, 1.0), "yaw": (PSI, 1.0), "heave": (Z, -1.0)}
-
 
 @pytest.fixture(scope="module")
 def model() -> StateSpaceModel:
@@ -45,41 +43,15 @@ def world(request: pytest.FixtureRequest, session: Session) -> World:
     return session.world if request.param == "thirteen_state" else World(linear_vehicle(structure(request.param)))
 
 
-def fly(world: World, seconds: float, **sticks: float) -> np.ndarray:
-    world.setting.sticks = {axis: sticks.get(axis, 0.0) for axis in STICKS}
-    for _ in range(round(seconds / world.period)):
-        world.step()
-    return world.moment().crafts["own"][0]
-
-
-def fresh(world: World, mode: str, *, ghost: bool = False) -> World:
-    world.set_ghost(ghost)
-    world.set_mode(mode)  # type: ignore[arg-type]
-    world.rows = None
-    world.reset()
-    return world
-
-
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("axis", STICKS)
 def test_a_stick_moves_the_aircraft_its_way(world: World, mode: str, axis: str) -> None:
-    fresh(world, mode)
-    start = fly(world, 0.1).copy()
-    moved = fly(world, 1.2, **{axis: 0.25})
-    state, sense = RAISED[axis]
-    assert not world.trouble
-    assert sense * (moved[state] - start[state]) > 0.02
+    moves_its_way(world, mode, axis)
 
 
 @pytest.mark.parametrize("mode", ["velocity", "position"])
 def test_what_is_held_is_held(world: World, mode: str) -> None:
-    fresh(world, mode)
-    fly(world, 1.5, pitch=0.6, heave=0.5, yaw=0.4)
-    settled = fly(world, 12.0).copy()
-    after = fly(world, 3.0)
-    assert np.max(np.abs(after[[Z, PSI]] - settled[[Z, PSI]])) < 0.05
-    assert np.hypot(after[U], after[V]) < 0.1
-    assert settled[Z] < world.trim.state[Z] - 0.1
+    holds_what_is_held(world, mode)
 
 
 def test_there_is_no_ground_and_a_flight_ends_where_angles_are_no_small_ones(session: Session) -> None:

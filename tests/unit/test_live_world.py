@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from flown_by_hand import U, X, Y, Z, fly, fresh, holds_what_is_held, moves_its_way
 from swashplate.control.linear_decoupling import static_decoupling
 from swashplate.errors import ControllerError, FlightError
 from swashplate.flights.flight import Flight
@@ -25,10 +26,6 @@ from swashplate.links.live.world import World
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
 from swashplate.vehicles.card import packaged_cards
 
-X, Y, Z, U, V, PSI = 0, 1, 2, 3, 4, 8
-RAISED = {"roll": (Y, 1.0), "pitch": (X, 1.0), "yaw": (PSI, 1.0), "heave": (Z, -1.0)}
-"""What each stick moves, and which way: right, ahead (north at first), nose right, up."""
-
 
 @pytest.fixture(scope="module", params=["coax", "raptor50"])
 def world(request: pytest.FixtureRequest) -> World:
@@ -38,24 +35,6 @@ def world(request: pytest.FixtureRequest) -> World:
 @pytest.fixture(scope="module")
 def coax() -> World:
     return World(sp.vehicle("coax"))
-
-
-def fly(world: World, seconds: float, **sticks: float) -> np.ndarray:
-    """States after some seconds with the sticks held."""
-    world.setting.sticks = {axis: sticks.get(axis, 0.0) for axis in STICKS}
-    for _ in range(round(seconds / world.period)):
-        world.step()
-    return world.moment().crafts["own"][0]
-
-
-def fresh(world: World, mode: str, *, ghost: bool = False) -> World:
-    world.setting.decoupled, world.setting.gusts, world.setting.wind = True, 0.0, (0.0, 0.0, 0.0)
-    world.set_ghost(ghost)
-    world.set_mode(mode)  # type: ignore[arg-type]
-    world.setting.sticks = dict.fromkeys(STICKS, 0.0)
-    world.rows = None
-    world.reset()
-    return world
 
 
 def test_flies_as_the_offline_closed_loop(coax: World) -> None:
@@ -72,23 +51,12 @@ def test_flies_as_the_offline_closed_loop(coax: World) -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("axis", STICKS)
 def test_a_stick_moves_the_aircraft_its_way(world: World, mode: str, axis: str) -> None:
-    fresh(world, mode)
-    start = fly(world, 0.1).copy()
-    moved = fly(world, 1.2, **{axis: 0.25})
-    state, sense = RAISED[axis]
-    assert not world.trouble
-    assert sense * (moved[state] - start[state]) > 0.02
+    moves_its_way(world, mode, axis)
 
 
 @pytest.mark.parametrize("mode", ["velocity", "position"])
 def test_what_is_held_is_held(world: World, mode: str) -> None:
-    fresh(world, mode)
-    fly(world, 1.5, pitch=0.6, heave=0.5, yaw=0.4)
-    settled = fly(world, 12.0).copy()
-    after = fly(world, 3.0)
-    assert np.max(np.abs(after[[Z, PSI]] - settled[[Z, PSI]])) < 0.05
-    assert np.hypot(after[U], after[V]) < 0.1
-    assert settled[Z] < world.trim.state[Z] - 0.1
+    holds_what_is_held(world, mode)
 
 
 def test_velocity_mode_flies_the_speed_that_the_stick_asks_for(coax: World) -> None:

@@ -6,6 +6,7 @@ import ctypes
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from swashplate.control import observer
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.linear_vehicle import linear_vehicle
 from swashplate.control.lqg import Lqg, carried_from, carried_row, lqg_step, numbers_from
@@ -26,6 +28,7 @@ from swashplate.control.sensor_suite import suite
 from swashplate.control.steady_observer import steady_gains, steady_sigmas, with_steady_gain
 from swashplate.errors import ControllerError
 from swashplate.identification.state_space_file import structure
+from swashplate.identification.stochastic import Noise
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.linearize import linearize
@@ -214,3 +217,10 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
         worst = max(worst, float(np.max(np.abs(rows[0] - after) / scale)), float(np.max(np.abs(rows[3] - commands))))
         memory = after
     assert worst < tolerance
+
+
+def test_gusts_beside_an_estimated_wind_are_not_all_that_disturbs() -> None:
+    card = vehicle("coax").card
+    calm = {name: float(value) for name, value in Noise(gust_horizontal=1e-3)._asdict().items()}
+    assert observer.unrest_of(replace(card, observer={"noise": calm})).force < 1e-3
+    assert observer.unrest_of(replace(card, observer={"noise": {**calm, "wind": 0.5}})) == observer.Unrest()

@@ -71,9 +71,10 @@ def unrest_of(card: Card) -> Unrest:
     """What an identification learnt of the disturbances beside the parameters; the usual numbers where it did not.
 
     A gust that fades with T and is driven by white noise of intensity g has a standard deviation of g sqrt(T / 2).
+    Where a wind was estimated, the gusts beside it are what the wind left, and say too little: the usual numbers again.
     """
     noise = card.observer.get("noise", {})
-    if not noise:
+    if not noise or noise.get("wind", 0.0) > 0.0:
         return Unrest()
     force, moment = np.sqrt(0.5 * noise["tau_gust_force"]), np.sqrt(0.5 * noise["tau_gust_moment"])
     return Unrest(

@@ -57,11 +57,7 @@ def seen(plan: Plan, numbers: Numbers, model: LinearModel, *, without: Sequence[
     """
     n, nb = len(model.states), len(plan.biases)
     own = n + 6 + nb
-    A = np.zeros((own, own))
-    A[:n, :n] = model.A
-    for i, name in enumerate(DISTURBED):
-        A[model.states.index(name), n + i] = 1.0
-    A[n : n + 6, n : n + 6] = -np.diag(np.asarray(numbers.fade))
+    A = disturbed(numbers, model, own)
     B = np.zeros((own, plan.inputs))
     B[:n] = model.B
     F, G = sampled(A, B, plan.dt)
@@ -86,6 +82,17 @@ def seen(plan: Plan, numbers: Numbers, model: LinearModel, *, without: Sequence[
     unmoved = {f"disturbance {d}" for d in DISTURBED} | {f"bias {b}" for b in plan.biases}
     moved = tuple(i for i, name in enumerate(names) if name not in unmoved)
     return Seen(F[np.ix_(kept, kept)], G[kept], H[:, kept], np.diag(full[kept]), noise, tuple(names), vehicle, moved)
+
+
+def disturbed(numbers: Numbers, model: LinearModel, size: int) -> Array:
+    """A of the vehicle's states and the disturbances that fade behind them; the rest of `size` states stands still."""
+    n = len(model.states)
+    A = np.zeros((size, size))
+    A[:n, :n] = model.A
+    for i, name in enumerate(DISTURBED):
+        A[model.states.index(name), n + i] = 1.0
+    A[n : n + 6, n : n + 6] = -np.diag(np.asarray(numbers.fade))
+    return A
 
 
 def _late_readings(F: Array, H: Array, plan: Plan) -> tuple[Array, Array, list[str]]:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from swashplate.control import observer
 from swashplate.control.lqg import Lqg
-from swashplate.control.observer import DISTURBED, Numbers, Plan
+from swashplate.control.observer import Numbers, Plan
 from swashplate.control.optimal import sampled
-from swashplate.control.seen import outputs
+from swashplate.control.seen import disturbed, outputs
 from swashplate.errors import ControllerError
 from swashplate.simulation.linearize import LinearModel, linearize
 
@@ -139,13 +139,8 @@ def _first(plan: Plan, N: int) -> Array:
 
 
 def _transition(plan: Plan, numbers: Numbers, model: LinearModel) -> Array:
-    n, N = plan.n, len(plan.names)
-    A = np.zeros((N, N))
-    A[:n, :n] = model.A
-    for i, name in enumerate(DISTURBED):
-        A[model.states.index(name), n + i] = 1.0
-    A[n : n + 6, n : n + 6] = -np.diag(np.asarray(numbers.fade))
-    return sampled(A, np.zeros((N, 1)), plan.dt)[0]
+    N = len(plan.names)
+    return sampled(disturbed(numbers, model, N), np.zeros((N, 1)), plan.dt)[0]
 
 
 def _arriving(plan: Plan, shown: Array) -> Array:

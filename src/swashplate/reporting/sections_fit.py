@@ -77,12 +77,15 @@ def noise(fit: Fit) -> Section | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
+    calm = () if float(fit.noise.wind) > 0.0 else ("wind", "tau_wind", "speed")
+    told = {name: float(value) for name, value in fit.noise._asdict().items() if name not in calm}
     table = Table(
         "Noise that the method assumed or estimated",
         ("intensity", "value"),
-        tuple((Cell(k), Cell(value_words(float(v)), number=True)) for k, v in fit.noise._asdict().items()),
+        tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in told.items()),
         note="white_*: rad/s² or m/s² per √Hz; gust_* and drift_*: rad/s³ or m/s³ per √Hz; tau_*: s; sensor_*: "
-        "standard deviation per sample in m or rad.",
+        "standard deviation per sample in m or rad"
+        + ("." if calm else "; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s."),
     )
     return Section("noise", "Noise model", (table,), folded=True)
 

@@ -289,7 +289,10 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
     for name, unit, value, (low, high) in kinds:
         if not low <= value <= high:
             limit = high if value > high else low
-            told = [f"{v:.3g}" if unit == "1" else f"{np.degrees(v):.1f} deg" for v in (value, limit)]
+            told = [
+                f"{np.degrees(v):.1f} deg" if unit == "rad" else f"{v:.3g} {unit}".removesuffix(" 1")
+                for v in (value, limit)
+            ]
             raise TrimError(
                 f"{where} needs {name} = {told[0]}, but its limit is {told[1]}.",
                 where=vehicle.card.where,

@@ -123,7 +123,7 @@ def linear(card: Card) -> Vehicle:
         state_names=(*RigidBody._fields, *inner),
         state_units=(*_BODY_UNITS, *(units[name] for name in inner)),
         input_names=inputs,
-        input_units=tuple(card.parameters[f"trim_{name}"].unit for name in inputs),
+        input_units=tuple(card.options["input_units"]),
         input_limits=limits,
         derivatives=partial(derivatives, structure=own),
         specific_force=partial(specific_force, structure=own),
