@@ -68,7 +68,8 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             note="",
         )
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
-    return Card("conventional", title, trust, {"rotation": rotation, "yaw_at_blades": True}, parameters)
+    options = {**pattern.options, "rotation": rotation, "yaw_at_blades": True}
+    return Card("conventional", title, trust, options, parameters)
 
 
 def commented(card: Card) -> str:
