@@ -49,14 +49,15 @@ def inclined_force(
     """Forces [N] along and across the body of a surface that is set at an incidence [rad]; see `lifting_force`.
 
     Positive incidence is what air from the side of positive `across` would give: a leading edge that is up for a
-    horizontal tail (across is down), to the left for a fin (across is right). Small angles: its square is left out.
+    horizontal tail (across is down), to the left for a fin (across is right).
     """
+    ci, si = xp.cos(incidence), xp.sin(incidence)
     force = lifting_force(
-        along - across * incidence,
-        across + along * incidence,
+        along * ci - across * si,
+        across * ci + along * si,
         area=area,
         lift_slope=lift_slope,
         density=density,
         xp=xp,
     )
-    return force * incidence, force
+    return force * si, force * ci

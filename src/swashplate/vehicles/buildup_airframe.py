@@ -95,8 +95,8 @@ class _Surface:
     def __init__(
         self, along: float, across: float, incidence: float, *, area: float, slope: float, density: float
     ) -> None:
-        self._incidence = incidence
-        chordwise, normal = along - across * incidence, across + along * incidence
+        self._ci, self._si = float(np.cos(incidence)), float(np.sin(incidence))
+        chordwise, normal = along * self._ci - across * self._si, across * self._ci + along * self._si
         ahead = float(np.hypot(chordwise, tail_surfaces.ROUNDED))
         linear, most = (slope * ahead + abs(normal)) * normal, ahead**2 + normal**2
         pressure = -0.5 * density * area
@@ -108,9 +108,9 @@ class _Surface:
 
     def change(self, along: float, across: float) -> tuple[float, float]:
         """Changes of the forces along and across [N] for changes of these speeds."""
-        chordwise, normal = along - across * self._incidence, across + along * self._incidence
+        chordwise, normal = along * self._ci - across * self._si, across * self._ci + along * self._si
         force = self._by[0] * chordwise + self._by[1] * normal
-        return force * self._incidence, force
+        return force * self._si, force * self._ci
 
 
 def tailplane_slopes(air: Vector, rates: Vector, wake: Wake, par: Any, density: float) -> Array:
