@@ -20,11 +20,6 @@ class Airframe(NamedTuple):
     tail_torque: Scalar
 
 
-def at(position: Vector, force: Vector) -> Contribution:
-    """A force [N] that acts at a place [m] from the CG."""
-    return Contribution(force, position.cross(force))
-
-
 def airframe(
     air: Vector,
     rates: Vector,
@@ -50,8 +45,9 @@ def airframe(
         sense: +1 for a counter-clockwise main rotor.
     """
     blowing, fading = awake
-    tail_at = Vector(-par.tail_arm, 0.0, -par.tail_height)
-    there = air + rates.cross(tail_at)
+    p, q, r = rates
+    arm, height = par.tail_arm, par.tail_height
+    there = Vector(air.x - height * q, air.y - arm * r + height * p, air.z + arm * q)
     cc, sc = xp.cos(par.tail_cant), xp.sin(par.tail_cant)
     against, up = sense * there.y * cc - there.z * sc, there.z * cc + sense * there.y * sc
     tail = tail_rotor.tail_rotor_loads(
@@ -85,7 +81,7 @@ def airframe(
     )
     tailplane = tail_surfaces.inclined_force(
         air.x,
-        air.z + par.tailplane_arm * rates.y - downwash,
+        air.z + par.tailplane_arm * q - downwash,
         par.tailplane_incidence,
         area=par.tailplane_area,
         lift_slope=par.tailplane_lift_slope,
@@ -94,7 +90,7 @@ def airframe(
     )
     fin = tail_surfaces.inclined_force(
         air.x,
-        air.y - par.fin_arm * rates.z + par.fin_height * rates.x + sense * par.fin_wake * blowing * tail.induced,
+        air.y - par.fin_arm * r + par.fin_height * p + sense * par.fin_wake * blowing * tail.induced,
         -sense * par.fin_incidence,
         area=par.fin_area,
         lift_slope=par.fin_lift_slope,
@@ -110,10 +106,15 @@ def airframe(
         pitch_zero=par.fuselage_pitch_zero,
         density=density,
     )
+    side, lift = sense * cc * thrust, -sc * thrust
+    # Velocity and moments at these places are written out: products with their zeros would cost a tenth of a step.
     return Airframe(
-        at(tail_at, Vector(0.0, sense * cc * thrust, -sc * thrust)),
-        at(Vector(-par.tailplane_arm, 0.0, 0.0), Vector(tailplane[0], 0.0, tailplane[1])),
-        at(Vector(-par.fin_arm, 0.0, -par.fin_height), Vector(fin[0], fin[1], 0.0)),
+        Contribution(Vector(0.0, side, lift), Vector(height * side, arm * lift, -arm * side)),
+        Contribution(Vector(tailplane[0], 0.0, tailplane[1]), Vector(0.0, par.tailplane_arm * tailplane[1], 0.0)),
+        Contribution(
+            Vector(fin[0], fin[1], 0.0),
+            Vector(par.fin_height * fin[1], -par.fin_height * fin[0], -par.fin_arm * fin[1]),
+        ),
         Contribution(fuselage.flat_plate_drag(air, wake, areas=areas, density=density, xp=xp), turned),
         tail.torque,
     )
