@@ -9,8 +9,9 @@ derivative through the equations sample by sample).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, wraps
 from typing import Any
 
 import jax
@@ -155,11 +156,22 @@ def tangents(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any,
     Returns:
         Of the innovations (p, records, n, outputs) and of their covariances (p, records, outputs, outputs).
     """
-    # A helicopter has many times as many operations: they are compiled soon instead of for speed.
-    slopes = _slopes_soon if plan.model.vehicle.name == "conventional" else _slopes_swift
-    return _straightened(plan, data, row, slopes(plan, data, row, states))  # type: ignore[no-any-return]
+    return _straightened(plan, data, row, _slopes(plan, data, row, states))  # type: ignore[no-any-return]
 
 
+def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiled for speed; a helicopter's many times as many operations, to be compiled soon."""
+    swiftly = jax.jit(function, static_argnums=0)
+    soon = jax.jit(function, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+
+    @wraps(function)
+    def chosen(plan: Plan, *rest: Any) -> Any:
+        return (soon if plan.model.vehicle.name == "conventional" else swiftly)(plan, *rest)
+
+    return chosen
+
+
+@_compiled
 def _slopes(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any, Any, Any, Any]:
     """Each sample's tangent plane (records, n, ...).
 
@@ -190,11 +202,7 @@ def _slopes(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any, 
     return place, reaching, following.reshape(*shape, n), slopes.reshape(*shape, n, -1)
 
 
-_slopes_swift = jax.jit(_slopes, static_argnums=0)
-_slopes_soon = jax.jit(_slopes, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-
-
-@partial(jax.jit, static_argnums=0)
+@_compiled
 def _straightened(plan: Plan, data: Any, row: Any, planes: tuple[Any, Any, Any, Any]) -> Any:
     """Derivatives by the row of the filter that steps along tangent planes."""
     model = plan.model
