@@ -204,7 +204,8 @@ def test_take_off_hover_and_landing(flown: HeliAutopilot) -> None:
 
 
 def test_it_hovers_with_ardupilots_own_gains_and_noise() -> None:
-    pilot = hovering(bench("raptor50", unit=InertialUnit()), gains=SHIPPED)
+    # With an ILMI of 0.1 a roll error holds a third of the hover's cyclic, so that it comes back slowly.
+    pilot = hovering(bench("raptor50", unit=InertialUnit()), gains=SHIPPED, seconds=9.0)
     last = np.array([[*a["attitude"], *a["position"]] for a in pilot.answers[-FRAMES:]])
     assert np.ptp(last[:, :3], axis=0).max() < 0.05
     np.testing.assert_allclose(last[-1, 3:], [0.0, 0.0, -2.0], atol=2.5)
