@@ -17,6 +17,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from made_autopilot_logs import Row, dataflash
+from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
+
 MAGIC_16, MAGIC_32 = 18458, 29569
 Send = Callable[[bytes], bytes | None]
 
@@ -117,7 +120,7 @@ class HeliAutopilot:
         rate: frames per second [Hz] (SIM_RATE_HZ). every: the loops run in every so many of them.
         outputs: 16 or 32.
         sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
-        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep.
+        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
     """
 
     send: Send
@@ -167,6 +170,28 @@ class HeliAutopilot:
     def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
         self.sweep, self._since = (axis, signal), self.answers[-1]["timestamp"][0]
 
+    def dataflash(self, first: int, chirp: Chirp) -> bytes:
+        """The log from row `first` on, as the firmware writes a flight in System ID mode that begins there.
+
+        RATE has the filtered gyros that the loops use, SIDD those of the inertial sensor.
+        """
+        begun = self.log[first][0]
+        sids = (chirp.axis, chirp.magnitude, chirp.start_hz, chirp.stop_hz, chirp.fade_in, chirp.dwell)
+        rows: list[Row] = [
+            ("MSG", (0, "ArduCopter V4.5.7 (stand-in)")),
+            ("EV", (round(1e6 * begun) - 2, 10)),
+            ("MODE", (round(1e6 * begun) - 1, 25, 25, 2)),
+            ("SIDS", (round(1e6 * begun) - 1, *sids, chirp.record, chirp.fade_out)),
+        ]
+        for now, p, q, r, roll, pitch, yaw, collective, swept, *slow in self.log[first:]:
+            at, (pf, qf, rf) = round(1e6 * now), np.degrees(slow)
+            turned = np.degrees((p, q, r)).tolist()
+            frequency = float(chirp.frequency(np.array([now - begun - START_DELAY]))[0])
+            rows.append(("RATE", (at, 0.0, pf, roll, 0.0, qf, pitch, 0.0, rf, yaw, 0.0, 0.0, collective)))
+            rows.append(("SIDD", (at, now - begun, swept, frequency, *turned, 0.0, 0.0, 0.0)))
+        rows.append(("EV", (at + 1, 11)))
+        return dataflash(rows)
+
     def _control(self, state: dict[str, list[float]]) -> None:
         now, attitude, dt = state["timestamp"][0], state["attitude"], self.every / self.rate
         gyros, targets, errors = self._filters
@@ -200,7 +225,7 @@ class HeliAutopilot:
         mixer[:2] *= min(1.0, CYCLIC / max(1e-9, math.hypot(mixer[0], mixer[1])))
         self.collective = collective
         self._pulses = self._mixed(mixer, collective)
-        self.log.append((now, *measured, *mixer, collective, swept))
+        self.log.append((now, *measured, *mixer, collective, swept, *gyro))
 
     def _lean(self, state: dict[str, list[float]]) -> tuple[float, float]:
         c, s = math.cos(state["attitude"][2]), math.sin(state["attitude"][2])
