@@ -256,6 +256,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...], how: str
     visit.page.select_option("#how", how)
     visit.page.click("#identify")
     visit.until("swash.now.job && swash.now.job[1] === 'running'")
+    visit.until("document.querySelector('#job progress') && document.getElementById('job').innerText.includes(' s')")
     visit.until("swash.now.job[1] !== 'running'", seconds=900.0)
     assert visit.of("swash.now.job[1]") == "done", visit.of("swash.now.job[2]")
     with visit.page.context.expect_page() as opened:
