@@ -100,6 +100,18 @@ def test_the_rate_does_not_creep_away(line: Bench) -> None:
     assert line.plant.time == pytest.approx(2000 / 1200, rel=1e-3)
 
 
+@pytest.mark.parametrize(("wanted", "least", "most"), [(800.0, 800.0, 1180.0), (2000.0, 1198.0, 1202.0)])
+def test_sim_rate_is_followed_slowly_down_and_not_up(line: Bench, wanted: float, least: float, most: float) -> None:
+    """SIM_JSON starts at 1200 Hz and moves by one a frame from the step it got towards SIM_RATE_HZ."""
+    restarted(line)
+    rate, last = 1200.0, 0.0
+    for count in range(900):
+        stamp = json.loads(line.send(servo_packet(int(rate), count, IDLE)) or b"")["timestamp"]
+        got, last = float(np.float32(1.0 / (stamp - last))), stamp
+        rate = min(max(wanted, got - 1.0), got + 1.0)
+    assert least <= got <= most
+
+
 def test_restart_in_mid_flight(line: Bench) -> None:
     restarted(line)
     first = [line.send(servo_packet(400, k, RUNNING)) for k in range(1500)]
