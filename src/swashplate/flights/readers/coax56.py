@@ -105,7 +105,8 @@ def _in_inside_units(fields: dict[str, Array], source: Source, options: Options)
     ):
         typical = float(np.median(np.abs(converted[name])))
         if typical > largest:
-            problem = f"its median magnitude is {typical:.4g} {_UNITS[name]}, expected below {largest:g}: wrong units."
+            found = f"{typical:.4g} {_UNITS[name].replace('1', '')}".strip()
+            problem = f"its median magnitude is {found}, expected below {largest:g}: wrong units."
             raise UnitError(problem, where=source.name, channel=f"Data.{name}", hint=hint)
     return converted
 
