@@ -220,7 +220,13 @@ def validation(*, name: str = "hover.mat", simulated: bool = False) -> Validatio
         records=(piece,),
         measured=(states,),
         flights=(unseen,),
-        settings={"every": 0.1, "horizons": list(HORIZONS)},
+        settings={
+            "every": 0.1,
+            "horizons": list(HORIZONS),
+            "calibration": 5.0,
+            "noise": {"gust_tilt": 3.0, "wind": 0.0, "tau_wind": 1.0, "speed": 0.0},
+        },
+        calibrated=(Nuisance(delay_servo=0.092, lever_y=0.156),),
     )
 
 

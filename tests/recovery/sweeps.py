@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 import swashplate as sp
 from swashplate.flights.flight import Array, Flight
+from swashplate.simulation.sensors import MotionCapture
 from swashplate.vehicles.vehicle import Vehicle
 
 MANEUVER = "sweep:pitch,0.5-8Hz,34s"
@@ -67,10 +68,19 @@ class Recovery:
         return np.asarray(self.error / self.sigma)
 
 
-def recover(flight: Flight, *, seed: int, method: str = "output-error", wind: bool = False) -> Recovery:
-    """What one seed of the usual sensors (noise, gaps, outliers, jitter, battery) makes of a flight."""
+def recover(
+    flight: Flight, *, seed: int, method: str = "output-error", wind: bool = False, unbroken: bool = False
+) -> Recovery:
+    """What one seed of the usual sensors (noise, gaps, outliers, jitter, battery) makes of a flight.
+
+    Args:
+        unbroken: gaps short enough to be bridged, and records of one length: what is compiled serves every seed.
+    """
     vehicle = truth()
-    logged = sp.observe(flight, vehicle, seed=seed, sensors=sp.Sensors()).condition(rate=100.0, cutoff=0.0)
+    sensors = sp.Sensors(motion=MotionCapture(gap_length=0.01)) if unbroken else sp.Sensors()
+    logged = sp.observe(flight, vehicle, seed=seed, sensors=sensors).condition(rate=100.0, cutoff=0.0)
+    if unbroken:
+        logged = logged.between(logged.start, logged.start + 39.505)
     fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method=method, wind=wind)
     free = [estimate for estimate in fit.parameters if not estimate.tie]
     known = vehicle.card.values()

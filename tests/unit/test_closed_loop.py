@@ -103,3 +103,9 @@ def simulate_small(coax: Vehicle, inputs: np.ndarray) -> np.ndarray:
     from swashplate.simulation.integrate import simulate
 
     return simulate(coax, trim(coax).inputs + inputs.T, substeps=2).values("phi")
+
+
+def test_a_maneuver_beyond_half_the_sample_rate_is_refused(coax: Vehicle) -> None:
+    """It would fold back: 80 Hz sampled at 100 Hz flies as 20 Hz."""
+    with pytest.raises(SwashError, match=r"100 samples a second hold no more than 50 Hz.*--rate 2000"):
+        simulate_maneuver(coax, "sweep:pitch,0.5-80Hz,60s", controller=hover_hold)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from conditioning_flights import Motion, hover, sweep, tracked
+from conditioning_flights import Array, Motion, hover, sweep, tracked
 from swashplate.errors import FlightError
 from swashplate.flights.condition import condition, replay
 from swashplate.flights.flight import Flight, Step, stream
@@ -99,6 +99,52 @@ def test_waiting_on_the_ground_is_cut_but_a_steady_hover_is_not() -> None:
     steady = np.full(t.size, 0.55)
     hovering = replace(ground, streams={**ground.streams, "inputs": stream(t, {"motor_lower": steady})})
     assert flying_interval(hovering).start == hovering.start
+
+
+def taken_off_and_landed(duration: float = 40.0) -> tuple[Motion, Array, Array]:
+    """Rests until 6 s, its motors speeding up at 4 s; climbs 1 m in 3 s, hovers, lands the same way; motors by time."""
+    motion = hover(duration, 9, tilt=0.03)
+    t, end = motion.time, duration - 6.0
+    up = np.clip((t - 6.0) / 3.0, 0.0, 1.0) * np.clip((end - t) / 3.0, 0.0, 1.0)
+    flying = np.minimum(1.0, 20.0 * up)[:, None]
+    position = motion.position * flying
+    position[:, 2] -= up
+    motors = np.where((t > 4.0) & (t < end + 1.0), 0.55, 0.1)
+    return Motion(t, motion.euler * flying, position), t, motors
+
+
+def with_motors(motion: Motion, t: Array, motors: Array) -> Flight:
+    raw = tracked(motion, 9, noise=0.1)
+    stamps = raw.time("x")
+    inputs = stream(stamps, {"motor_lower": motors[np.searchsorted(t, stamps)]})
+    return raw.with_streams({**raw.streams, "inputs": inputs})
+
+
+def test_take_off_and_landing_are_cut_where_the_skids_are_free() -> None:
+    found = flying_interval(with_motors(*taken_off_and_landed()))
+    clear = 6.0 + 3.0 * GroundRule().clear  # it climbs at 1/3 m/s
+    assert found.start == pytest.approx(clear, abs=0.15)
+    assert found.stop == pytest.approx(40.0 - clear, abs=0.15)
+    assert [text.split()[3] for text in found.reasons] == ["until", "from"]
+
+
+def test_a_flight_that_stays_low_is_kept_from_the_end_of_its_rest() -> None:
+    motion, t, motors = taken_off_and_landed()
+    low = motion.position * [1.0, 1.0, 0.2]
+    found = flying_interval(with_motors(Motion(t, motion.euler, low), t, motors))
+    assert 5.8 < found.start < 6.5
+    assert 33.5 < found.stop < 34.2
+
+
+def test_carried_about_before_and_flown_twice_the_longest_flight_is_kept() -> None:
+    motion, t, motors = taken_off_and_landed()
+    euler = motion.euler.copy()
+    euler[:, 0] += 1.2 * np.clip(3.0 - t, 0.0, 1.0)  # turned on its side by hand before it is set down
+    again = motors.copy()
+    again[(t > 14.0) & (t < 16.0)] = 0.1
+    found = flying_interval(with_motors(Motion(t, euler, motion.position), t, again))
+    assert 16.0 <= found.start < 16.2
+    assert found.stop == pytest.approx(40.0 - 6.0 - 3.0 * GroundRule().clear, abs=0.15)
 
 
 def test_a_hand_that_holds_it_is_seen() -> None:

@@ -22,7 +22,7 @@ from swashplate.reporting.sections_validation import apart
 from swashplate.reporting.structure import Cell, Report, Section, Table
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
-from swashplate.reporting.words import plain_words, sigma_words, span_words, step_words, value_words
+from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
 
 
 @given(
@@ -255,6 +255,17 @@ def test_no_plot_may_be_drawn_over_a_section_of_its_name() -> None:
     section = Section("cost", "Cost", (cost_history([2.0, 1.0]),))
     with pytest.raises(ValueError, match="called cost"):
         Report(title="", banners=(), summary=(), picture=None, sections=(section,), made="")
+
+
+def test_what_the_first_seconds_told_is_shown_and_a_wind_nobody_asked_for_is_not() -> None:
+    report = compose(None, validation(), modes=modes())
+    tables = {b.caption: b for s in report.sections for b in s.blocks if isinstance(b, Table)}
+    told = tables["What belongs to the predicted flights and not to the vehicle"]
+    assert [[cell.words for cell in row][::2] for row in told.rows] == [["delay_servo", "s"], ["lever_y", "m"]]
+    assert [row[-1].words for row in told.rows] == ["0.092", "0.156"]
+    noise = next(row[-1].words for row in tables["Settings"].rows if row[0].words == "noise")
+    assert noise == "gust_tilt 3"
+    assert noise_told({"wind": 0.1, "speed": 0.2}) == {"wind": 0.1, "speed": 0.2}
 
 
 def test_theils_best_is_bold_by_itself_and_residuals_are_in_units_that_can_be_read() -> None:

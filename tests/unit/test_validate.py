@@ -140,6 +140,7 @@ def test_the_result_is_plain_json_and_prints() -> None:
     found = _validation()
     document = json.loads(json.dumps(found.as_dict()))
     assert document["kind"] == "validation"
+    assert [set(told) >= {"record", "delay_servo", "level_psi"} for told in document["calibrated"]] == [True]
     assert len(document["scores"]) == len(PREDICTED) * len(HORIZONS) * len(PREDICTORS)
     for part in ("constant rates", "0.5 s", "roll: good"):
         assert part in repr(found)

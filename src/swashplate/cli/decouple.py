@@ -70,7 +70,10 @@ def decouple(
     step: Annotated[
         float | None,
         typer.Option(
-            "--step", help="Fly this step of the pitch command for 6 m, with and without the decoupling.", min=0.01
+            "--step",
+            help="Fly this step of the pitch command for 6 m, with and without the decoupling.",
+            min=0.01,
+            max=1.0,
         ),
     ] = None,
     to_speed: Annotated[

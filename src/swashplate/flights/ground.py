@@ -32,7 +32,9 @@ class GroundRule:
         calm: how long the rates must have been inside the envelope [s].
         margin: cut before the onset [s].
         rest_speed, rest_rate: slower than this is at rest [m/s], [rad/s].
-        idle: motors below this part of their median in the record do not carry the aircraft.
+        idle: motors below this part of what they do while they run do not carry the aircraft.
+        clear: so high above where it stood the skids are free and most of the ground effect is gone [m].
+        climb: how long it takes to get there at most [s]; a flight that stays lower is kept.
         hold_force: mean in-plane specific force [m/s^2], against the record's median, that no hovering rotor gives.
         hold_time: over how long it is averaged [s].
         hold_speed: above this speed drag may give it [m/s].
@@ -46,6 +48,8 @@ class GroundRule:
     rest_speed: float = 0.03
     rest_rate: float = 0.1
     idle: float = 0.7
+    clear: float = 0.3
+    climb: float = 5.0
     hold_force: float = 0.4
     hold_time: float = 2.0
     hold_speed: float = 0.3
@@ -82,11 +86,45 @@ def _crash(time: Array, rates: Array, lost: Mask, rule: GroundRule) -> int:
     return int(np.searchsorted(time, time[onset] - rule.margin))
 
 
+def _carried(
+    motors: Array, rest: Mask, height: Array, time: Array, rule: GroundRule, wait: int
+) -> tuple[int, int, list[str]]:
+    """First and last sample of the longest stretch off the ground, and what bounds it in words.
+
+    Motors that idle for `wait` samples carry nothing, and an aircraft that still rests, or has hardly risen, when they
+    speed up stands on the ground. In the air it may be at rest and hover just above it.
+    """
+    grounded = np.zeros(motors.size, dtype=np.bool_)
+    idle = motors < rule.idle * np.percentile(motors, 90.0)
+    for start, stop in _runs(idle):
+        if stop - start > wait:
+            grounded[start:stop] = True
+    for start, stop in _runs(rest | grounded):
+        grounded[start:stop] |= grounded[start:stop].any()
+    flown = _runs(~grounded)
+    if not flown:
+        return 0, motors.size - 1, []
+    first, last = max(flown, key=lambda run: run[1] - run[0])
+    last -= 1
+    reasons = []
+    high = np.arange(first, last + 1)
+    if first > 0:
+        risen = high[(height[high] > height[first - 1] + rule.clear) & (time[high] < time[first] + rule.climb)]
+        first = int(risen[0]) if risen.size else first
+        reasons.append(f"on the ground until {time[first]:.2f} s: motors idle, then at rest or just above it")
+    if last < motors.size - 1:
+        risen = high[(height[high] > height[last + 1] + rule.clear) & (time[high] > time[last] - rule.climb)]
+        last = max(first, int(risen[-1])) if risen.size else last
+        reasons.append(f"on the ground from {time[last]:.2f} s: at rest or just above it, then motors idle")
+    return first, last, reasons
+
+
 def flying_interval(flight: Flight, *, rule: GroundRule | None = None) -> FlyingInterval:
     """Where the aircraft flies freely under control.
 
+    * Ground: motors well below those that carry it, and before and after that at rest or hardly above where it stood;
+      of several flights in one record the longest.
     * Crash: tilt or acceleration beyond any flight; the end is set where the rates leave their own envelope before it.
-    * Ground: at rest with motors well below those that carry it, at the start or at the end.
     * Held (by hand, stand or tether) at the end: a thrust that is tilted accelerates the aircraft; where attitude is
       tilted for seconds and nothing accelerates, the specific force in the body's plane shows that something else
       carries it. In free hover its mean is close to zero.
@@ -119,26 +157,22 @@ def flying_interval(flight: Flight, *, rule: GroundRule | None = None) -> Flying
     first, last = 0, time.size - 1
     reasons: list[str] = []
 
+    motors = [seen.values(name) for name in ("motor_lower", "motor_upper") if name in seen]
+    if motors:
+        rest = (speed < rule.rest_speed) & np.all(np.abs(rates) < rule.rest_rate, axis=1)
+        first, last, reasons = _carried(
+            np.mean(motors, axis=0), rest, -seen.values("z"), time, rule, wait=round(rule.calm * rate)
+        )
+
     lost = (tilt > rule.crash_tilt) | (acceleration > rule.crash_acceleration)
-    if lost.any():
-        event = int(np.argmax(lost))
-        last = _crash(time, rates, lost, rule)
+    if lost[first : last + 1].any():
+        event = first + int(np.argmax(lost[first : last + 1]))
+        last = first + _crash(time[first : last + 1], rates[first : last + 1], lost[first : last + 1], rule)
+        reasons = [text for text in reasons if not text.startswith("on the ground from")]
         reasons.append(
             f"crash: tilt {np.degrees(tilt[event]):.0f} deg, {acceleration[event]:.0f} m/s^2 beyond gravity at "
             f"{time[event]:.2f} s; rates leave their envelope after {time[last]:.2f} s"
         )
-
-    motors = [seen.values(name) for name in ("motor_lower", "motor_upper") if name in seen]
-    rest = (speed < rule.rest_speed) & np.all(np.abs(rates) < rule.rest_rate, axis=1)
-    if motors:
-        thrust = np.mean(motors, axis=0)
-        for start, stop in _runs(rest & (thrust < rule.idle * np.median(thrust[first : last + 1]))):
-            if start <= first and stop > first + rule.calm * rate:
-                first = min(stop, last)
-                reasons.append(f"on the ground until {time[first]:.2f} s: at rest with the motors idle")
-            elif stop > last and last - start > rule.calm * rate:
-                last = start
-                reasons.append(f"on the ground from {time[last]:.2f} s: at rest with the motors idle")
 
     plane = force[first : last + 1, :2]
     width = round(rule.hold_time * rate)

@@ -51,6 +51,7 @@ def straightened(time: Array, *, width: int = 75) -> Array:
     return out if np.all(np.diff(out) > 0) else time
 
 
+_SLOWEST = 0.75  # Hz: a log with fewer samples a second is one whose time is in milliseconds
 _OWN_STEPS = 2.5
 """Steps of a stream's own that are never a gap: one sample may go missing from a slow channel."""
 
@@ -126,6 +127,14 @@ def _check(flight: Flight, *, rate: float, max_gap: float, method: str) -> None:
                 channel=str(next(iter(data.data_vars), name)),
                 hint="Check the log: a flight needs seconds of data.",
             )
+    slow = max((_rate(data) for data in flight.streams.values()), default=_SLOWEST)
+    if slow < _SLOWEST:
+        raise FlightError(
+            f"its time steps are {1.0 / slow:.4g} s, expected well below a second: wrong units.",
+            where=where,
+            channel="time",
+            hint="Give --unit time=ms (in Python units={'time': 'ms'}) if it is logged in milliseconds.",
+        )
 
 
 def resample(

@@ -18,7 +18,8 @@ from swashplate.vehicles.vehicle import Vehicle
 _LAGS = 1.0
 """Seconds of residual correlation that the corrected bound allows for."""
 
-_RECORD_UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad"}
+RECORD_UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad"}
+"""Units of what belongs to a record, by the first word of its name."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def record_estimates(found: Found) -> tuple[RecordEstimate, ...]:
     estimates = []
     for i in row.places("nuisance"):
         name, _, number = row.names[i].partition("[")
-        unit = _RECORD_UNITS[name.split("_")[0]]
+        unit = RECORD_UNITS[name.split("_")[0]]
         record = found.likelihood.logs[int(number[:-1])]
         estimates.append(RecordEstimate(record, name, unit, float(found.numbers[i]), float(sigma[i])))
     return tuple(estimates)

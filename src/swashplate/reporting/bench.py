@@ -148,8 +148,11 @@ def _figures(result: BenchResult, prefix: str = "") -> list[Figure]:
 
 
 def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
+    first = curves[0]
     traces: list[dict[str, Any]] = []
     keys = []
+    if len(curves) == 1:
+        keys.append(Key("measured", *((GREY, "solid") if first.x.size > _MANY else (BLACK, "circle"))))
     for number, curve in enumerate(curves):
         color, dash = _COLORS[number % len(_COLORS)], _DASHES[number % len(_DASHES)]
         name = curve.name or "fit"
@@ -179,7 +182,6 @@ def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
                  "marker": marker, "name": "left out"}
             )  # fmt: skip
             keys.append(Key("left out", GREY, "x"))
-    first = curves[0]
     layout = base_layout(_HEIGHT)
     layout["xaxis"], layout["yaxis"] = axis(first.x_title), axis(first.y_title)
     return Figure(

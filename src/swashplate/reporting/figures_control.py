@@ -229,7 +229,7 @@ def modes_figure(check: ControlCheck) -> Figure:
         {"type": "scatter", "mode": "markers", "x": [m.real for m in group], "y": [m.imag for m in group],
          "name": words, "marker": {"color": color, "symbol": "x", "size": 8},
          "hovertemplate": "%{x:.3g} %{y:+.3g}j 1/s<extra></extra>"}
-        for group, words, color in ((good, "held", MODEL), (bad, "growing", VERMILION)) if group
+        for group, words, color in ((good, "dies out", MODEL), (bad, "grows", VERMILION)) if group
     ]  # fmt: skip
     return Figure(
         identifier="modes-plane",
@@ -237,5 +237,5 @@ def modes_figure(check: ControlCheck) -> Figure:
         height=300,
         caption="Modes of the closed loop with the controller's sampling in it.",
         alt=f"{len(check.modes)} modes in the complex plane, {len(bad)} of them growing.",
-        keys=(Key("held", MODEL, "x"), *((Key("growing", VERMILION, "x"),) if bad else ())),
+        keys=(Key("dies out", MODEL, "x"), *((Key("grows", VERMILION, "x"),) if bad else ())),
     )

@@ -273,7 +273,9 @@ _MARKS = {"published": (PUBLISHED, "square-open", 10), "identified": (MODEL, "ci
 def eigenvalues(modes: Mapping[str, Sequence[Mode]]) -> Figure:
     """Eigenvalues at hover in the complex plane, both of each pair."""
     layout = base_layout(380, left=58)
-    layout["xaxis"] = axis("real part [1/s]", zeroline=True, zerolinecolor="#444", zerolinewidth=1.2)
+    layout["xaxis"] = axis(
+        "real part [1/s]", zeroline=True, zerolinecolor="#444", zerolinewidth=1.2, rangemode="tozero"
+    )
     layout["yaxis"] = axis("imaginary part [rad/s]", zeroline=True, zerolinecolor="#bbb")
     traces, keys = [], []
     for label, found in modes.items():

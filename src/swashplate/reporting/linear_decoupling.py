@@ -155,7 +155,7 @@ def _numbers(made: Mapping[str, Decoupling | None], axes: Mapping[str, Sequence[
         modes = np.asarray(filtered.system.poles())
         modes = modes[np.argsort(-modes.real)]
         rows = tuple(
-            (Cell(f"{m.real:+.3f}", number=True), Cell(f"{abs(m.imag):.3f}", number=True))
+            (Cell(f"{m.real:+.3f}", number=True), Cell(f"±{m.imag:.3f}" if m.imag > 0.0 else "0", number=True))
             for m in modes
             if m.imag >= 0.0
         )

@@ -9,7 +9,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.fit import Fit
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.versions import card_hash, date, result_hash, versions
-from swashplate.reporting.words import counted, listed, plain_words, span_words, step_words
+from swashplate.reporting.words import counted, listed, noise_told, plain_words, span_words, step_words
 from swashplate.validation.validation import Validation
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -37,7 +37,9 @@ def asked(fit: Fit | None, validation: Validation | None) -> Section:
     if vehicle is not None:
         blocks.append(Text(f"The vehicle: {vehicle.card.title}. Where its card may be trusted: {vehicle.card.trust}"))
     rows = [("fit", fit.settings)] if fit else []
-    rows += [("validation", validation.settings)] if validation else []
+    if validation:
+        noise = validation.settings.get("noise")
+        rows.append(("validation", {**validation.settings, **({"noise": noise_told(noise)} if noise else {})}))
     cells = tuple((Cell(_setting(k)), Cell(part), Cell(plain_words(v))) for part, s in rows for k, v in s.items())
     if cells:
         blocks.append(Table("Settings", ("setting", "of", "value"), cells))

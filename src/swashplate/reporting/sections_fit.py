@@ -20,7 +20,7 @@ from swashplate.reporting.figures_fit import (
 from swashplate.reporting.figures_time import Series, flight_name, time_figures
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
-from swashplate.reporting.words import sigma_words, value_words
+from swashplate.reporting.words import noise_told, sigma_words, value_words
 
 PRIOR_HEAVY = 0.5
 """Share of prior information above which a value says more about the prior than about the flight."""
@@ -77,15 +77,14 @@ def noise(fit: Fit) -> Section | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
-    calm = () if float(fit.noise.wind) > 0.0 else ("wind", "tau_wind", "speed")
-    told = {name: float(value) for name, value in fit.noise._asdict().items() if name not in calm}
+    told = noise_told({name: float(value) for name, value in fit.noise._asdict().items()})
     table = Table(
         "Noise that the method assumed or estimated",
         ("intensity", "value"),
         tuple((Cell(name), Cell(value_words(value), number=True)) for name, value in told.items()),
         note="white_*: rad/s² or m/s² per √Hz; gust_* and drift_*: rad/s³ or m/s³ per √Hz; tau_*: s; sensor_*: "
         "standard deviation per sample in m or rad"
-        + ("." if calm else "; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s."),
+        + ("; wind: m/s² per √Hz; speed: horizontal, flown, rms in m/s." if "wind" in told else "."),
     )
     return Section("noise", "Noise model", (table,), folded=True)
 

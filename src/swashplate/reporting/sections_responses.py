@@ -50,10 +50,12 @@ class ResponseMaterial:
 
 
 def tone(cost: float) -> str:
+    """The colour of a cost J: up to `INDISTINGUISHABLE` good, up to `ACCEPTABLE` a caution, beyond it bad."""
     return "good" if cost <= INDISTINGUISHABLE else "caution" if cost <= ACCEPTABLE else "bad"
 
 
 def weak(p: ParameterAccuracy) -> bool:
+    """Whether a parameter misses its target for the Cramér-Rao bound or the insensitivity."""
     return p.cramer_rao_percent > CR_TARGET or p.insensitivity_percent > I_TARGET
 
 
@@ -90,6 +92,7 @@ def parameter_table(parameters: Sequence[ParameterAccuracy]) -> Table:
 
 
 def fit_parameters_section(fit: StateSpaceFit) -> Section:
+    """A state-space fit: problems and warnings, parameters, eigenvalues, correlations, how it was reduced, the cost."""
     blocks: list[Block] = [Text(text, tone="bad") for text in fit.problems]
     if fit.warnings:
         blocks.append(Points(fit.warnings, title="What to beware of"))
@@ -173,6 +176,7 @@ def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
 
 
 def fit_costs_section(fit: StateSpaceFit) -> Section:
+    """J of each response, and the mismatch within what a pilot would not notice."""
     pairs = [(fit.model.outputs.index(t.output), fit.model.inputs.index(t.input), t.omega) for t in fit.targets]
     answers = [fit.model.response(omega)[:, o, i] for o, i, omega in pairs]
     found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
@@ -183,6 +187,7 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
 
 
 def transfer_functions_section(m: ResponseMaterial) -> Section:
+    """Transfer functions with their costs and parameters, and what the usual structures would cost."""
     blocks: list[Block] = []
     for fit in m.transfer_functions:
         blocks += [Text(f"{model!r}") for model in fit.models]
@@ -211,6 +216,7 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
 
 
 def bodes_section(m: ResponseMaterial) -> Section:
+    """Where each response may be used, and its Bode plot with the models beside it."""
     r = m.responses
     assert r is not None
     rows, figures = [], []
@@ -255,10 +261,12 @@ def bodes_section(m: ResponseMaterial) -> Section:
 
 
 def excitation_section(r: FrequencyResponse) -> Section:
+    """Input power and cross-control correlation: what was excited and what was mixed."""
     return Section("excitation", "What was excited", (excitation(r),), folded=True)
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:
+    """Suggested rate-loop gains in ArduPilot's names, and the margins that they give."""
     rows = tuple(
         (
             Cell(name),
@@ -288,6 +296,7 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
 
 
 def made_section() -> Section:
+    """Versions of what made the report."""
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     return Section("versions", "Versions", (Table("Versions", ("package", "version"), rows),), folded=True)
 

@@ -8,9 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate.flights.schema import channel
+from swashplate.identification.estimates import RECORD_UNITS
 from swashplate.identification.kinematics import PREDICTED
+from swashplate.identification.stochastic import Nuisance
 from swashplate.reporting.figures_time import Prediction, Series, flight_name, time_figures
 from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
+from swashplate.reporting.glossary import meaning
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import counted, percent, sigma_words, value_words
@@ -56,9 +59,35 @@ def prediction(validation: Validation) -> Section:
     ]
     for i, source in enumerate(sorted(names)):
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
+    blocks += _told(validation)
     blocks.append(fit_over_horizon(validation))
     blocks += [_table(validation, horizon) for horizon in horizons(validation)]
     return Section("prediction", "Prediction", tuple(blocks))
+
+
+def _told(validation: Validation) -> tuple[Block, ...]:
+    """What the first seconds of each record told, and the vehicle could not know."""
+    told = validation.calibrated
+    names = [name for name in Nuisance._fields if any(float(getattr(one, name)) for one in told)]
+    if not names:
+        return ()
+    seconds = float(validation.settings["calibration"])
+    return (
+        Table(
+            "What belongs to the predicted flights and not to the vehicle",
+            ("quantity", "meaning", "unit", *(record.name for record in validation.records)),
+            tuple(
+                (
+                    Cell(name),
+                    Cell(meaning(name)),
+                    Cell(unit_words(RECORD_UNITS[name.split("_")[0]])),
+                    *(_cell(f"{float(getattr(one, name)):.3f}", False) for one in told),
+                )
+                for name in names
+            ),
+            note=f"Told by the first {seconds:g} s of each record, the vehicle held; every prediction starts later.",
+        ),
+    )
 
 
 def _pictures(validation: Validation, source: str, *, identifier: str) -> tuple[Block, ...]:

@@ -38,6 +38,10 @@ _PART_COLORS = {
     "fin": ORANGE,
     "fuselage": PURPLE,
 }
+_PITCHES = (
+    " theta0: collective, B1 and A1: longitudinal and lateral cyclic, theta0T: tail rotor, each as blade pitch; phi "
+    "and theta: roll and pitch attitude."
+)
 _SHOWN = ("Xu", "Zw", "Mu", "Mw", "Mq", "Mp", "Yv", "Lv", "Lp", "Lq", "Nv", "Nr")
 
 
@@ -71,7 +75,7 @@ def speed_page(
         sections.append(Section("doubts", "Where the equations do not hold", (Points(tuple(remarks)),)))
     first, last = trims[0].speed, trims[-1].speed
     report = Report(
-        title=f"{vehicle.card.title}: {first:g} to {last:g} m/s",
+        title=f"{'Trim and derivatives' if tables else 'Trim'} from {first:g} to {last:g} m/s: {vehicle.card.title}",
         banners=(("caution", "Some of these speeds lie outside what the equations cover; see the last section."),)
         if remarks
         else (),
@@ -111,7 +115,7 @@ def _controls(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
         "trim-curves",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        "Controls and attitude that hold each speed.",
+        f"Controls and attitude that hold each speed.{_PITCHES if 'theta0T' in names else ''}",
         f"Trim curves of {', '.join(names)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
     )
 

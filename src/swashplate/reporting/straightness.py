@@ -195,13 +195,13 @@ def _row(name: str, models: str, values: list[float]) -> tuple[Cell, ...]:
 
 def _time(runs: Mapping[str, StepRun]) -> Section:
     present = [name for name in _SHOWN if all(name in run.flight for run in runs.values())]
-    layout = stacked([axis_title(name) for name in present], height=105)
+    layout = stacked(["z [cm]" if name == "z" else axis_title(name) for name in present], height=105)
     traces, keys = [], []
     for (words, run), (color, dash) in zip(runs.items(), _STYLES, strict=False):
         keys.append(Key(f"{words} the decoupling", color, dash))
         for i, name in enumerate(present):
             number = "" if i == 0 else str(i + 1)
-            values = run.flight.values(name) * channel(name).shown_factor
+            values = run.flight.values(name) * (100.0 if name == "z" else channel(name).shown_factor)
             traces.append(line(run.flight.time(name), values, name=name, color=color, dash=dash, axis=number))
     figure = Figure(
         identifier="step-time",

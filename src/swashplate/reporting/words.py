@@ -36,6 +36,12 @@ def _plain(text: str) -> str:
     return f"{float(text):.0f}" if 0 <= power < 5 else f"{mantissa}e{power}"
 
 
+def noise_told(noise: Mapping[str, float]) -> dict[str, float]:
+    """A noise model without the wind that was not asked for."""
+    calm = () if noise.get("wind", 0.0) > 0.0 else ("wind", "tau_wind", "speed")
+    return {name: float(value) for name, value in noise.items() if name not in calm}
+
+
 def percent(value: float, *, digits: int = 0) -> str:
     """A percentage, "–" where there is none; a huge one is not spelled out."""
     if not math.isfinite(value):

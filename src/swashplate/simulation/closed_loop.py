@@ -223,6 +223,13 @@ def simulate_maneuver(
         wind, environment: as in `simulate_closed_loop`.
     """
     excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
+    if excitation.band is not None and excitation.band[1] > 0.5 * rate:
+        raise SwashError(
+            f"{rate:g} samples a second hold no more than {0.5 * rate:g} Hz, and the maneuver goes to "
+            f"{excitation.band[1]:g} Hz.",
+            channel="maneuver",
+            hint=f"Give a lower band, or --rate {100.0 * np.ceil(0.25 * excitation.band[1]):g} (in Python rate=...).",
+        )
     duration = lead + excitation.duration + tail
     time = np.arange(round(duration * rate) + 1) / rate
     start = trim(vehicle, speed=speed, voltage=voltage, environment=environment)

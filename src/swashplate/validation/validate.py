@@ -102,6 +102,7 @@ def validate(
     examples: list[Example] = []
     checks: list[tuple[Array, Array]] = []
     likelihoods: list[dict[str, float]] = []
+    calibrated: list[Nuisance] = []
     for number, piece in enumerate(pieces):
         ahead = max(h for h in horizons if h < piece.time[-1] - piece.time[0] - calibration)
         rivals: dict[str, _Rival] = {}
@@ -116,6 +117,7 @@ def validate(
                 predict(flown, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=every, settling=calibration),
             )
         own = rivals["model"]
+        calibrated.append(own.nuisance)
         truth = measured_states(piece, own.nuisance)
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
@@ -159,6 +161,7 @@ def validate(
             "records": [piece.name for piece in pieces],
             "noise": {k: float(v) for k, v in noise._asdict().items()},
         },
+        calibrated=tuple(calibrated),
     )
 
 

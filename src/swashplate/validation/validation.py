@@ -8,6 +8,7 @@ from typing import Any
 
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.records import Record
+from swashplate.identification.stochastic import Nuisance
 from swashplate.vehicles.vehicle import Vehicle
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
@@ -96,7 +97,8 @@ class Validation:
         examples: predictions to draw.
         records: what was predicted; `measured`: body states (n, 12) of each.
         flights: the conditioned flights.
-        settings: observer, trims, horizons.
+        settings: observer, horizons.
+        calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
     """
 
     vehicle: Vehicle
@@ -111,6 +113,7 @@ class Validation:
     measured: tuple[Array, ...]
     flights: tuple[Flight, ...]
     settings: Mapping[str, Any]
+    calibrated: tuple[Nuisance, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -132,6 +135,10 @@ class Validation:
             "thresholds": dict(self.thresholds),
             "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
             "settings": dict(self.settings),
+            "calibrated": [
+                {"record": record.name} | {name: float(value) for name, value in told._asdict().items()}
+                for record, told in zip(self.records, self.calibrated, strict=False)
+            ],
         }
 
     def __repr__(self) -> str:

@@ -100,12 +100,13 @@ def _in_inside_units(fields: dict[str, Array], source: Source, options: Options)
         unit = options.units.get(name, inside)
         converted[name] = units.to_inside(fields[name], unit, expected=inside, channel=name, where=source.name)
     for name, largest, hint in (
-        ("position", _ROOM, "Give units={'position': 'mm'} if it is logged in millimetres."),
-        ("inputs", _COMMAND, "Give units={'inputs': '%'} if it is logged in percent."),
+        ("position", _ROOM, "Give --unit position=mm (in Python units={'position': 'mm'}) if it is in millimetres."),
+        ("inputs", _COMMAND, "Give --unit inputs=% (in Python units={'inputs': '%'}) if it is in percent."),
     ):
         typical = float(np.median(np.abs(converted[name])))
         if typical > largest:
-            problem = f"its median magnitude is {typical:.4g} {_UNITS[name]}, expected below {largest:g}: wrong units."
+            found = f"{typical:.4g} {_UNITS[name].replace('1', '')}".strip()
+            problem = f"its median magnitude is {found}, expected below {largest:g}: wrong units."
             raise UnitError(problem, where=source.name, channel=f"Data.{name}", hint=hint)
     return converted
 
