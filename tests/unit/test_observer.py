@@ -183,18 +183,18 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
     plan, gains = controller.plan, jnp.asarray(controller.gains)
 
     def in_python(memory: Any, measured: Any, reference: Any) -> Any:
-        numbers, feedback = numbers_from(plan, 1, gains)
+        M, (numbers, feedback) = JaxMatrices(), numbers_from(plan, 1, gains)
         after, commands = lqg_step(
             plan,
             numbers,
             feedback,
-            carried_from(plan, memory),
+            carried_from(plan, memory, M),
             measured[:-1, None],
             measured[-1],
             [reference[i] for i in range(8)],
-            JaxMatrices(),
+            M,
         )
-        return carried_row(after), jnp.stack(commands)
+        return carried_row(after, M), jnp.stack(commands)
 
     step = jax.jit(in_python, compiler_options=QUICK_TO_COMPILE)
     random, N = np.random.default_rng(0), len(plan.names)

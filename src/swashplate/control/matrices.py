@@ -30,7 +30,8 @@ class Matrices(Protocol):
     def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]: ...
     def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any: ...
     def chosen(self, values: Sequence[float], i: Any, /) -> Any: ...
-    def row(self, matrix: Any, i: Any, /) -> Any: ...
+    def stacked(self, parts: Sequence[Any], /) -> Any: ...
+    def diagonal(self, values: Any, /) -> Any: ...
 
 
 class JaxMatrices:
@@ -65,5 +66,21 @@ class JaxMatrices:
     def chosen(self, values: Sequence[float], i: Any, /) -> Any:
         return jnp.asarray(values)[i]
 
-    def row(self, matrix: Any, i: Any, /) -> Any:
-        return jax.lax.dynamic_slice_in_dim(matrix, i, 1, 0)
+    def row(self, scalars: Sequence[Any], /) -> Any:
+        """Scalars side by side."""
+        return self.column(scalars)[:, 0]
+
+    def matrix(self, row: Any, rows: int, columns: int, /) -> Any:
+        """A matrix from a row of its entries, row after row; `flat` is the way back."""
+        return row.reshape(rows, columns)
+
+    def flat(self, matrix: Any, /) -> Any:
+        return matrix.ravel()
+
+    def stacked(self, parts: Sequence[Any], /) -> Any:
+        """One above the other."""
+        return jnp.concatenate(parts, axis=0)
+
+    def diagonal(self, values: Any, /) -> Any:
+        """A matrix of a row's values."""
+        return jnp.eye(len(values)) * values
