@@ -72,6 +72,8 @@ def fly(
 
     if model is not None:
         _only_what_is_linear(model, gusts=gusts != "none", payload=payload > 0.0, battery=bool(battery or sag))
+    draws = _linear_draws if model is not None else _draws
+    drawn = draws(model or vehicle, fit, count=count, seed=seed, tolerances=tolerances, vary=vary, payload=payload)
     ends = _battery(battery)
     hover = sp.trim(vehicle, voltage=voltage if ends is None else ends[0])
     pilot = from_file(controller, seed=seed)(vehicle, hover)
@@ -84,13 +86,11 @@ def fly(
         )
     if not piloted:
         typer.echo("Careful: this controller takes no pilot's command; the maneuver moves its inputs.", err=True)
-    draws = _linear_draws if model is not None else _draws
-    drawn = draws(model or vehicle, fit, count=count, seed=seed, tolerances=tolerances, vary=vary, payload=payload)
     duration = _LEAD + maneuver.duration + _TAIL
     keep = max(1, round(pilot.rate / _KEPT))
     samples = round(duration * pilot.rate)
     time = np.arange(samples) / pilot.rate
-    setting = _setting(gusts)
+    setting = turbulence(gusts)
     fall = sag if ends is None else (ends[0] - ends[1]) / duration
     late = draw_delays(most=delay, count=count, seed=seed + 3_000_003)
     flown = simulate_closed_loops(
@@ -193,7 +193,8 @@ def _varied(values: Mapping[str, float], texts: list[str] | None) -> dict[str, f
     return found
 
 
-def _setting(gusts: str) -> Gusts | None:
+def turbulence(gusts: str) -> Gusts | None:
+    """What --gusts asks for."""
     from swashplate.cli.options import numbers
     from swashplate.simulation.wind import INDOOR, outdoor
 

@@ -27,9 +27,9 @@ from swashplate.simulation.linearize import LinearModel, linearize
 
 Array = NDArray[np.float64]
 EAGER = 10.0
-"""For the CoaX with gyros, accelerometers and late motion capture: offsets learnt in 2 s instead of 21 s, attitude known
-to 0.54 instead of 0.91 mrad over the first 20 s (the filter that finds its gains as it flies: 0.49) and to 0.53 instead
-of 0.48 mrad in the end. With 3 it is 0.61 and 0.49 mrad, with 30 0.61 and 0.61."""
+"""Of the CoaX with gyros, accelerometers and late motion capture offsets are learnt in 2 s instead of 21 s, attitude is
+known to 0.54 instead of 0.91 mrad over the first 20 s (the filter that finds its gains as it flies: 0.49) and to 0.53
+instead of 0.48 mrad in the end. With 3 it is 0.61 and 0.49 mrad, with 30 0.61 and 0.61."""
 _LONGEST = 50
 """Samples of the sensors' common period; each has a gain matrix in the controller."""
 _DOUBLINGS = 40
