@@ -1,7 +1,9 @@
 """A stand-in for ArduPilot's helicopter firmware on its SITL link, written from its documents: packets, reader, loops.
 
 It reads answers as `SIM_JSON.cpp` does (keys looked for from the front, no JSON parser), counts frames, repeats itself
-while nobody answers, mixes for an H3-120 swashplate and truncates pulses to whole microseconds.
+while nobody answers, mixes for an H3-120 swashplate and truncates pulses to whole microseconds. Between gyro and servo
+stand what `copter-heli.parm` puts there: a gyro filter and filters of target and error at 20 Hz, integrals of roll and
+pitch that leak down to ILMI, a cyclic cut at H_CYC_MAX, and a rotor speed output that ramps.
 """
 
 from __future__ import annotations
@@ -14,6 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from made_autopilot_logs import Row, dataflash
+from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
 
 MAGIC_16, MAGIC_32 = 18458, 29569
 Send = Callable[[bytes], bytes | None]
@@ -64,12 +69,46 @@ def _quickly(answer: bytes) -> dict[str, list[float]]:
 
 @dataclass
 class Gains:
-    """ArduPilot's parameters by what they do (ATC_ANG_*_P, ATC_RAT_*)."""
+    """ArduPilot's parameters by what they do (ATC_ANG_*_P, ATC_RAT_*; `kept`: ILMI)."""
 
     angle: tuple[float, float, float] = (4.5, 4.5, 4.5)
     forward: tuple[float, float, float] = (0.18, 0.18, 0.0)
     proportional: tuple[float, float, float] = (0.05, 0.05, 0.25)
     integral: tuple[float, float, float] = (0.1, 0.1, 0.3)
+    kept: tuple[float, float] = (0.1, 0.1)
+
+
+FILTER = 20.0
+"""Hz: INS_GYRO_FILTER, ATC_RAT_*_FLTT, and ATC_RAT_RLL_FLTE, _PIT_FLTE (yaw has none)."""
+LEAK, IMAX = 0.02, (0.4, 0.4, 1.0)
+"""The share of what is above ILMI that leaks from roll's and pitch's integrals each loop near hover, and the most."""
+CYCLIC = 2500.0 / 4500.0
+"""H_CYC_MAX: the most of roll and pitch together."""
+SETPOINT, RAMP, RUN_UP = 0.66, 8.0, 15.0
+"""H_RSC_SETPOINT as a share, H_RSC_RAMP_TIME and H_RSC_RUNUP_TIME [s]."""
+
+
+class LowPass:
+    """First or second order (Butterworth), from its first sample on."""
+
+    def __init__(self, order: int) -> None:
+        self._order, self._states = order, None
+
+    def __call__(self, x: np.ndarray, dt: float) -> np.ndarray:
+        x = np.asarray(x, dtype=float)
+        if self._states is None:
+            self._states = [x] * (2 * self._order)
+        if self._order == 1:
+            share = dt / (dt + 1.0 / (2.0 * math.pi * FILTER))
+            self._states[0] = self._states[0] + share * (x - self._states[0])
+            return self._states[0]
+        o = math.tan(math.pi * FILTER * dt)
+        c = 1.0 + math.sqrt(2.0) * o + o * o
+        b, a1, a2 = o * o / c, 2.0 * (o * o - 1.0) / c, (1.0 - math.sqrt(2.0) * o + o * o) / c
+        x1, x2, y1, y2 = self._states
+        y = b * (x + 2.0 * x1 + x2) - a1 * y1 - a2 * y2
+        self._states = [x, x1, y, y1]
+        return y
 
 
 @dataclass
@@ -81,7 +120,7 @@ class HeliAutopilot:
         rate: frames per second [Hz] (SIM_RATE_HZ). every: the loops run in every so many of them.
         outputs: 16 or 32.
         sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
-        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep.
+        log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
     """
 
     send: Send
@@ -102,6 +141,8 @@ class HeliAutopilot:
     _lift: float = 0.0
     _pulses: list[int] = field(default_factory=lambda: [1460, 1460, 1460, 1500, 0, 0, 0, 1000])
     _since: float = 0.0
+    _ramp: float = 0.0
+    _filters: tuple[LowPass, ...] = field(default_factory=lambda: (LowPass(2), LowPass(1), LowPass(1)))
     _heading: float = 0.0
 
     def exchange(self) -> dict[str, list[float]]:
@@ -129,8 +170,35 @@ class HeliAutopilot:
     def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
         self.sweep, self._since = (axis, signal), self.answers[-1]["timestamp"][0]
 
+    def dataflash(self, first: int, chirp: Chirp) -> bytes:
+        """The log from row `first` on, as the firmware writes a flight in System ID mode that begins there.
+
+        RATE has the filtered gyros that the loops use, SIDD those of the inertial sensor.
+        """
+        begun = self.log[first][0]
+        sids = (chirp.axis, chirp.magnitude, chirp.start_hz, chirp.stop_hz, chirp.fade_in, chirp.dwell)
+        rows: list[Row] = [
+            ("MSG", (0, "ArduCopter V4.5.7 (stand-in)")),
+            ("EV", (round(1e6 * begun) - 2, 10)),
+            ("MODE", (round(1e6 * begun) - 1, 25, 25, 2)),
+            ("SIDS", (round(1e6 * begun) - 1, *sids, chirp.record, chirp.fade_out)),
+        ]
+        for now, p, q, r, roll, pitch, yaw, collective, swept, *slow in self.log[first:]:
+            at, (pf, qf, rf) = round(1e6 * now), np.degrees(slow)
+            turned = np.degrees((p, q, r)).tolist()
+            frequency = float(chirp.frequency(np.array([now - begun - START_DELAY]))[0])
+            rows.append(("RATE", (at, 0.0, pf, roll, 0.0, qf, pitch, 0.0, rf, yaw, 0.0, 0.0, collective)))
+            rows.append(("SIDD", (at, now - begun, swept, frequency, *turned, 0.0, 0.0, 0.0)))
+        rows.append(("EV", (at + 1, 11)))
+        return dataflash(rows)
+
     def _control(self, state: dict[str, list[float]]) -> None:
-        now, gyro, attitude = state["timestamp"][0], np.array(state["gyro"]), state["attitude"]
+        now, attitude, dt = state["timestamp"][0], state["attitude"], self.every / self.rate
+        gyros, targets, errors = self._filters
+        measured = np.array(state["gyro"])
+        gyro = gyros(measured, dt)
+        running = self.armed and self.interlock
+        self._ramp = min(1.0, self._ramp + dt / RAMP) if running else 0.0
         flying = self.armed and self.interlock and self.height > 0.0
         mixer, collective, swept = np.zeros(3), 0.0, 0.0
         if flying:
@@ -138,9 +206,12 @@ class HeliAutopilot:
             error = np.array([wanted[0] - attitude[0], wanted[1] - attitude[1], self._heading - attitude[2]])
             error[2] = math.remainder(error[2], 2.0 * math.pi)
             g = self.gains
-            target = np.clip(np.array(g.angle) * error, -1.5, 1.5)
+            target = targets(np.clip(np.array(g.angle) * error, -1.5, 1.5), dt)
             miss = target - gyro
-            self._sums = np.clip(self._sums + np.array(g.integral) * miss * self.every / self.rate, -0.4, 0.4)
+            miss[:2] = errors(miss[:2], dt)
+            kept = np.clip(self._sums[:2], np.negative(g.kept), g.kept)
+            self._sums[:2] += LEAK * (kept - self._sums[:2])
+            self._sums = np.clip(self._sums + np.array(g.integral) * miss * dt, np.negative(IMAX), IMAX)
             mixer = np.array(g.forward) * target + np.array(g.proportional) * miss + self._sums
             collective = self._climb(state)
             if self.sweep is not None:
@@ -151,9 +222,10 @@ class HeliAutopilot:
             self._heading = attitude[2]
             self._sums[:] = 0.0
         mixer = np.clip(mixer, -1.0, 1.0)
+        mixer[:2] *= min(1.0, CYCLIC / max(1e-9, math.hypot(mixer[0], mixer[1])))
         self.collective = collective
         self._pulses = self._mixed(mixer, collective)
-        self.log.append((now, *gyro, *mixer, collective, swept))
+        self.log.append((now, *measured, *mixer, collective, swept, *gyro))
 
     def _lean(self, state: dict[str, list[float]]) -> tuple[float, float]:
         c, s = math.cos(state["attitude"][2]), math.sin(state["attitude"][2])
@@ -168,7 +240,7 @@ class HeliAutopilot:
         return float(np.clip(self._lift + 0.08 * miss, 0.0, 1.0))
 
     def _mixed(self, mixer: np.ndarray, collective: float) -> list[int]:
-        """H3-120 with H_COL_MIN 1460 and H_COL_MAX 1740; tail on 4, rotor speed on 8 at a set point of 66 %."""
+        """H3-120 with H_COL_MIN 1460 and H_COL_MAX 1740; tail on 4, rotor speed on 8."""
         share = 0.46 + 0.28 * collective
         roll, pitch, yaw = mixer
         servos = [
@@ -176,4 +248,4 @@ class HeliAutopilot:
             for at in (-60.0, 60.0, 180.0)
         ]
         pulses = [int(1000 + 1000 * min(1.0, max(0.0, s))) for s in servos]
-        return [*pulses, int(1500 + 500 * yaw), 0, 0, 0, 1660 if self.armed and self.interlock else 1000]
+        return [*pulses, int(1500 + 500 * yaw), 0, 0, 0, int(1000 + 1000 * SETPOINT * self._ramp)]

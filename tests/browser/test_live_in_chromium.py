@@ -150,6 +150,21 @@ def test_the_helicopter_moves_under_the_stick_and_charts_advance(visit_: Any, co
     visit.done()
 
 
+def test_a_linear_model_moves_under_the_stick_and_says_what_it_is(visit_: Any, tmp_path: Path) -> None:
+    with _served("live", "thirteen_state", cwd=tmp_path) as url:
+        visit = visit_(url).flies()
+        about = visit.of("document.getElementById('about').textContent")
+        assert about.startswith("A linear model")
+        assert "delays are flown" in about
+        north = visit.of("swash.now.own.x[0]")
+        visit.page.click("[data-mode=velocity]")
+        visit.stick(pitch=0.3)
+        visit.until(f"swash.now.own.x[0] > {north + 0.5}")
+        assert visit.of("swash.scene.crafts.own.model.group.position.x") > north
+        assert visit.of("swash.now.trouble") == ""
+        visit.done()
+
+
 def test_pictures_come_rarer_while_steps_are_late_and_more_often_again(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
     assert visit.of("swash.scene.software"), "this browser draws in software"
@@ -241,6 +256,7 @@ def _identified(visit: Visit, *, seconds: float, axes: tuple[str, ...], how: str
     visit.page.select_option("#how", how)
     visit.page.click("#identify")
     visit.until("swash.now.job && swash.now.job[1] === 'running'")
+    visit.until("document.querySelector('#job progress') && document.getElementById('job').innerText.includes(' s')")
     visit.until("swash.now.job[1] !== 'running'", seconds=900.0)
     assert visit.of("swash.now.job[1]") == "done", visit.of("swash.now.job[2]")
     with visit.page.context.expect_page() as opened:

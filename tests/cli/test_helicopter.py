@@ -14,6 +14,7 @@ from swashplate.flights.flight import Flight
 from swashplate.vehicles.card import read_card
 from swashplate.vehicles.catalogue import vehicle
 from swashplate.vehicles.helicopter_parameters import ADDED, MEANING
+from swashplate.vehicles.new_card import new_card as new_card_of
 
 
 def test_trim_at_one_speed_and_over_a_range(tmp_path: Path) -> None:
@@ -241,6 +242,18 @@ def test_a_card_that_is_written_wrongly(new_card: str, change: Callable[[str], s
     message = one_message(swash("derivatives", card))
     assert str(card) in message
     assert said in message
+
+
+def test_a_card_like_the_lynx_cones_feels_the_yaw_and_takes_a_fuselage() -> None:
+    """What the Lynx leaves out is 0 on its card; the bounds of a card like it leave room for a real number."""
+    card = new_card_of("A report's", mass=2200.0, radius=4.9, rotation="cw", like="lynx")
+    assert dict(card.options) == {"rotation": "cw", "coning": True, "yaw_at_blades": True}
+    for name, real in (("fuselage_area_x", 1.2), ("fuselage_area_y", 8.0), ("bar_gain", 0.8)):
+        entry = card.parameters[name]
+        assert entry.value == 0.0
+        assert entry.lower is not None
+        assert entry.upper is not None
+        assert entry.lower <= real <= entry.upper
 
 
 def test_a_card_of_an_earlier_version_flies_and_says_what_it_lacks_where_that_counts(

@@ -11,7 +11,12 @@ from typer.testing import CliRunner
 from swashplate.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = ("explanation/conventional-helicopter.md", "explanation/lpv.md", "howto/your-own-helicopter.md")
+PAGES = (
+    "explanation/conventional-helicopter.md",
+    "explanation/lpv.md",
+    "howto/your-own-helicopter.md",
+    "howto/published-derivatives.md",
+)
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -15,7 +15,8 @@ from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.simulation.dynamics import enable_double_precision, rates_function
 from swashplate.vehicles import catalogue
-from swashplate.vehicles.structure import leaves
+from swashplate.vehicles.conventional import Controls, loads
+from swashplate.vehicles.structure import leaves, rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
 FLOATS = FloatBackend()
@@ -33,7 +34,7 @@ EVERYTHING = {
 FORMS = [
     {},
     {"inflow": "pitt-peters-static", "phase_lag": True, "in_plane": "thrust-tilt"},
-    {"inflow": "uniform", "rotor_speed": "governed"},
+    {"inflow": "uniform", "rotor_speed": "governed", "yaw_at_blades": True},
     EVERYTHING,
 ]
 MIRRORED = ("y", "v", "phi", "psi", "p", "r", "b1", "d", "lam_s", "r_gyro", "A1_servo", "A1", "A1_late", "A1_late_rate")
@@ -84,6 +85,28 @@ def test_a_clockwise_helicopter_flies_the_exact_mirror_image(options: dict[str, 
         air = around._replace(wind_east=-around.wind_east)
         there = np.array(left.rates((sign * x).tolist(), commands.tolist(), left.values(), air, FLOATS))
         np.testing.assert_array_equal(there, sign * here)
+
+
+def test_blades_that_feel_the_yaw_are_blades_of_a_slower_rotor() -> None:
+    """A fuselage that yaws with a counter-clockwise rotor's reaction takes its yaw rate off the blades' speed."""
+    yaw, plain = 0.8, catalogue.vehicle("lynx")
+    speed = plain.card.values()["rotor_speed"]
+    x, u = np.zeros(len(plain.state_names)), np.array([0.25, 0.0, 0.0, 0.2])
+    turning = x.copy()
+    turning[plain.index("r")] = yaw
+    flown = plain.with_values({"shaft_tilt": 0.0, "hub_x": 0.0})
+    feels = catalogue.from_card(replace(flown.card, options={**flown.card.options, "yaw_at_blades": True}))
+
+    def rotor(vehicle: Vehicle, state: np.ndarray, omega: float) -> np.ndarray:
+        par = vehicle.values()._replace(rotor_speed=omega)
+        built = rebuild(vehicle.state, state.tolist())
+        acting = loads(
+            built, Controls(*u), par, Environment(), FLOATS, options=vehicle.derivatives.keywords["options"]
+        ).main_rotor
+        return np.array([*acting.force, *acting.moment])
+
+    np.testing.assert_allclose(rotor(feels, turning, speed), rotor(flown, x, speed - yaw), rtol=1e-12, atol=1e-9)
+    np.testing.assert_array_equal(rotor(flown, turning, speed), rotor(flown, x, speed))
 
 
 def test_the_air_knows_only_relative_motion() -> None:

@@ -1,43 +1,33 @@
-"""A helicopter hovered and swept over the ArduPilot link: its linear response comes back from the flight."""
+"""A helicopter hovered and swept over the ArduPilot link: its linear response comes back from the autopilot's logs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import swashplate as sp
 from heli_autopilot import HeliAutopilot
 from link_bench import bench
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.cli.app import app
+from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.flight import Flight
 from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.respond import respond
 from swashplate.vehicles.catalogue import vehicle
 
 RATE = 200
 BAND = (0.5, 6.0)
-SECONDS = 25.0
-COLUMNS = ("p", "q", "r", "mixer_roll", "mixer_pitch", "mixer_yaw", "mixer_collective", "sweep")
-
-
-def chirp(seconds: float, low: float, high: float, size: float) -> Callable[[float], float]:
-    """An exponential chirp with a second of fading at both ends, as ArduPilot's system identification mode flies."""
-    growth = math.log(high / low)
-
-    def value(t: float) -> float:
-        if not 0.0 <= t <= seconds:
-            return 0.0
-        phase = 2.0 * math.pi * low * seconds / growth * (math.exp(growth * t / seconds) - 1.0)
-        return size * min(1.0, t, seconds - t) * math.sin(phase)
-
-    return value
+SWEEPS = tuple(Chirp.planned(axis, 0.08, (0.4, 8.0), record=30.0, fade=1.0) for axis in (10, 11))
+"""SID_AXIS 10 and 11: roll and pitch behind the rate controllers."""
 
 
 @pytest.fixture(scope="module")
-def sweeps() -> list[Flight]:
-    """From rest on the ground to a hover, a roll and a pitch sweep, and what the autopilot logged of them."""
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """From rest on the ground to a hover, a roll and a pitch sweep in System ID mode, and the log of each."""
     at = bench("raptor50")
     pilot = HeliAutopilot(at.send, rate=RATE)
     pilot.fly(0.2)
@@ -45,24 +35,32 @@ def sweeps() -> list[Flight]:
     pilot.fly(8.0)
     pilot.height, pilot._lift = 3.0, 0.5
     pilot.fly(8.0)
-    flights = []
-    for axis in (0, 1):
+    folder, found = tmp_path_factory.mktemp("logs"), []
+    for chirp in SWEEPS:
         first = len(pilot.log)
-        pilot.begin_sweep(axis, chirp(SECONDS, 0.4, 8.0, 0.08))
-        pilot.fly(SECONDS + 1.0)
-        rows = np.array(pilot.log[first:])
-        columns = dict(zip(COLUMNS, rows[:, 1:].T, strict=True))
-        units = dict.fromkeys(COLUMNS[3:], "1")
-        flights.append(Flight({"rates": stream(rows[:, 0], columns, units)}, Provenance(source=f"sweep {axis}")))
+        pilot.begin_sweep(chirp.axis - 10, lambda t, c=chirp: float(c.signal(np.array([t - START_DELAY]))[0]))
+        pilot.fly(START_DELAY + chirp.record + 1.0)
+        found.append(folder / f"axis-{chirp.axis}.BIN")
+        found[-1].write_bytes(pilot.dataflash(first, chirp))
         pilot.sweep = None
         pilot.fly(2.0)
     assert not at.plant.broken
-    return flights
+    return found
+
+
+def responded(logs: list[Path], out: Path, *outputs: str) -> FrequencyResponse:
+    """`swash respond` as the how-to says it."""
+    channels = ["--inputs", "mixer_roll,mixer_pitch", "--outputs", ",".join(outputs)]
+    band = ["--band", "-".join(f"{f:g}" for f in BAND)]
+    arguments = ["respond", *map(str, logs), *channels, *band, "--rate", str(RATE), "--out", str(out), "--quiet"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    return FrequencyResponse.load(out / "responses.nc")
 
 
 @pytest.fixture(scope="module")
-def responses(sweeps: list[Flight]) -> FrequencyResponse:
-    return respond(sweeps, inputs=("mixer_roll", "mixer_pitch"), outputs=("p", "q"), references=["sweep"], band=BAND)
+def responses(logs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> FrequencyResponse:
+    return responded(logs, tmp_path_factory.mktemp("out") / "responses", "p=p_sid", "q=q_sid")
 
 
 @pytest.fixture(scope="module")
@@ -101,9 +99,28 @@ def test_the_linear_response_comes_back(
         assert np.abs(phase[fast]).max() < 2.0
 
 
-def test_the_sweep_stays_about_hover(sweeps: list[Flight]) -> None:
+def test_rates_of_the_loop_come_late_by_the_gyro_filter(
+    logs: list[Path], truth: Callable[[np.ndarray], np.ndarray], tmp_path: Path
+) -> None:
+    """RATE.R is what the loops see, behind INS_GYRO_FILTER: a second-order low-pass at 20 Hz, 22 degrees at 5 Hz."""
+    found = responded(logs, tmp_path / "out", "p", "q")
+    omega = found.omega
+    s = 1j * omega / (2.0 * np.pi * 20.0)
+    behind = truth(omega) / (1.0 + math.sqrt(2.0) * s + s * s)[:, None, None]
+    fast = omega > 2.0 * np.pi
+    for output, name in (("p", "mixer_roll"), ("q", "mixer_pitch")):
+        o, i = found.place(output, name)
+        ratio = (found.response[:, o, i] / behind[:, o, i])[fast]
+        assert np.abs(20.0 * np.log10(np.abs(ratio))).max() < 0.3
+        assert np.abs(np.degrees(np.angle(ratio))).max() < 3.0
+        late = np.degrees(np.angle(found.response[:, o, i] / truth(omega)[:, o, i]))
+        assert late[np.argmin(np.abs(omega - 10.0 * np.pi))] == pytest.approx(-20.7, abs=2.0)
+
+
+def test_the_sweep_stays_about_hover(logs: list[Path]) -> None:
     """The sweep is one about hover: a linear model may be asked of it."""
-    for flight in sweeps:
+    for log in logs:
+        flight: Flight = sp.read(log)
         assert np.abs(flight.array(("p", "q", "r"))).max() < 1.5
         assert np.abs(flight.array(("mixer_roll", "mixer_pitch"))).max() < 0.5
 

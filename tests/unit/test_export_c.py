@@ -101,6 +101,36 @@ def test_roots_in_one_loop_are_those_of_all_the_steps(tmp_path: Path) -> None:
         unrolled = np.array(model.rates.call([x, u, s, p])[0]).ravel()
         np.testing.assert_allclose(found, unrolled, rtol=1e-12, atol=1e-10)
 
+        # A step's later stages seek from where the first one found, also where they move as far as nothing flies.
+        for dt in (0.002, 0.05, 0.5):
+
+            def rates(row: np.ndarray, u: np.ndarray = u) -> np.ndarray:
+                return run.call("rates", row, u, s, p, out=(row.size,))[0]
+
+            k1 = rates(x)
+            k2 = rates(x + 0.5 * dt * k1)
+            k3 = rates(x + 0.5 * dt * k2)
+            k4 = rates(x + dt * k3)
+            stepped = run.fly(x, np.stack([u, u]), dt, s, p)[1]
+            expected = x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            np.testing.assert_allclose(stepped, expected, rtol=1e-11, atol=1e-11)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("name", "constants"), [("raptor50", 39), ("coax", 16)])
+def test_what_no_state_moves_is_computed_once_a_step(name: str, constants: int) -> None:
+    """Products of parameters only, and their sines: none is left in the function that every stage calls."""
+    vehicle, trim = flown_from(name, {}, 0.0)
+    source = model_code(trace_vehicle(vehicle, trim, name="heli")).source
+    before, _, moving = source.partition("static void moving(")
+    moving, fixed = moving.partition("\n}\n")[0], before.partition("static void fixed(")[2]
+    assert fixed.count("  c[") > constants
+    for line in moving.splitlines():
+        found = re.fullmatch(r"  const heli_real (\w+) = (.*);", line)
+        if found is not None:
+            assert re.search(r"\b(t\d+|i_\w+|x|root\d?)\b", found[2]), line
+    assert "x[" not in fixed
+
 
 @needs_compiler
 def test_every_option_of_a_helicopter_evaluates_as_plain_floats_do(tmp_path: Path) -> None:

@@ -36,15 +36,43 @@ def test_build_up_is_automatic_differentiation(name: str, course: dict[str, floa
     np.testing.assert_allclose(closed.flapping, exact.flapping, rtol=1e-10, atol=1e-12)
 
 
-def test_build_up_of_the_other_forms() -> None:
-    """Free coning, shaft tilt, tail delta-3, thrust tilt, phasing, product of inertia, and a bar that is held."""
-    flown = vehicle("lynx", in_plane="thrust-tilt", inflow="uniform", bar=True).with_values(
-        {"cyclic_phase": 0.1, "wake_distortion": 1.2, "bar_gain": 0.5, "fuselage_area_x": 1.0}
+FORMS = [
+    ({"in_plane": "thrust-tilt", "inflow": "uniform", "bar": True}, {"speed": 12.0}),
+    ({"yaw_at_blades": True}, {"speed": 15.0, "turn": 0.3}),
+    ({"yaw_at_blades": True, "coning": False, "in_plane": "thrust-tilt", "rotation": "cw"}, {"speed": 25.0}),
+]
+
+
+@pytest.mark.parametrize(("options", "course"), FORMS, ids=str)
+def test_build_up_of_the_other_forms(options: dict[str, object], course: dict[str, float]) -> None:
+    """A card without a zero: coning, shaft tilt, hinge offset, phasing, tail cant and twist, incidences, fuselage."""
+    flown = vehicle("lynx", **options).with_values(
+        {
+            "cyclic_phase": 0.1,
+            "wake_distortion": 1.2,
+            "bar_gain": 0.5,
+            "hinge_offset": 0.04,
+            "precone": 0.03,
+            "tail_cant": 0.3,
+            "tail_twist": -0.1,
+            "tail_flap_frequency": 1.03,
+            "tailplane_incidence": -0.03,
+            "tailplane_drop": 0.8,
+            "fin_incidence": 0.05,
+            "fin_wake": 0.5,
+            "fuselage_area_x": 1.0,
+            "fuselage_area_y": 4.0,
+            "fuselage_area_z": 3.0,
+            "fuselage_pitch_volume": 20.0,
+            "fuselage_yaw_volume": 25.0,
+            "fuselage_pitch_zero": -1.0,
+        }
     )
-    at = trim(flown, environment=AIR, speed=12.0)
+    at = trim(flown, environment=AIR, **course)
     exact, closed = derivative_table(flown, at), build_up(flown, at.state, at.inputs, AIR)
     for part, block in closed.parts.items():
         np.testing.assert_allclose(block, exact.parts[part], rtol=1e-9, atol=1e-9, err_msg=part)
+    np.testing.assert_allclose(closed.flapping, exact.flapping, rtol=1e-9, atol=1e-12)
 
 
 def test_the_table_is_the_residualised_linear_model() -> None:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -14,11 +16,13 @@ import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
 from swashplate.identification import accuracy
+from swashplate.identification.innovations import innovations, tangents
 from swashplate.identification.output_error import WINDOW, OutputError
 from swashplate.identification.parameters import parameterize
 from swashplate.identification.prediction_error import PredictionError, stack_records
 from swashplate.identification.records import Record, records
 from swashplate.identification.scoring import minimise
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.validation.calibration import first_part
 
 
@@ -72,6 +76,25 @@ def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | Predict
         step[place] = 1e-4 / max(size[place], 1e-2)  # a ten-thousandth of its standard deviation
         slope = (likelihood.cost(row + step) - likelihood.cost(row - step)) / (2.0 * step[place])
         assert gradient[place] == pytest.approx(slope, rel=1e-3, abs=1e-3 * size[place]), likelihood.row.names[place]
+
+
+def test_derivatives_along_tangent_planes_are_those_of_the_filter() -> None:
+    """The two passes against derivatives that are carried through the equations sample by sample."""
+    likelihood = _prediction_error()
+    row = jnp.asarray(_somewhere(likelihood))
+    likely = (likelihood._plan, likelihood._data)
+    _, _, states = innovations(*likely, row)
+    by_row = tangents(*likely, row, states)
+    direction = jnp.asarray(np.random.default_rng(2).standard_normal(len(likelihood.row)))
+
+    def carried(row: jax.Array) -> object:
+        return jax.jvp(lambda r: innovations(*likely, r)[:2], (row,), (direction,))[1]
+
+    expected = jax.jit(carried, compiler_options=QUICK_TO_COMPILE)(row)
+    for found, exact in zip(by_row, expected, strict=True):
+        np.testing.assert_allclose(
+            jnp.tensordot(direction, found, 1), exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max()
+        )
 
 
 def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: OutputError | PredictionError) -> None:

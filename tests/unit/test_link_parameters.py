@@ -45,7 +45,8 @@ def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[
     angle = tuple(raptor[f"ATC_ANG_{axis}_P"] for axis in axes)
     rate = {k: tuple(raptor[f"ATC_RAT_{axis}_{k}"] for axis in axes) for k in ("FF", "P", "I")}
     at = bench("raptor50")
-    gains = Gains(angle, rate["FF"], rate["P"], rate["I"])  # type: ignore[arg-type]
+    kept = (raptor["ATC_RAT_RLL_ILMI"], raptor["ATC_RAT_PIT_ILMI"])
+    gains = Gains(angle, rate["FF"], rate["P"], rate["I"], kept)  # type: ignore[arg-type]
     pilot = HeliAutopilot(at.send, rate=400, gains=gains)
     still = pilot.fly(0.5)
     assert np.abs([*still["gyro"], *still["velocity"]]).max() < 1e-3
@@ -67,6 +68,10 @@ def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[
     assert np.abs(rates).max() < 0.2
     roll = np.degrees(np.mean([a["attitude"][0] for a in hover]))
     assert roll == pytest.approx(0.01 * raptor["ATC_HOVR_ROL_TRM"], abs=1.0)
+    # What the hover asks of the cyclic is within what the leaking integrals keep: no attitude error has to hold it.
+    mixer = np.abs(np.mean([row[4:6] for row in pilot.log[-400:]], axis=0))
+    assert np.all(mixer < kept)
+    assert np.abs(pilot._sums[:2]) == pytest.approx(mixer, abs=0.02)
 
 
 def test_the_file_says_what_the_mapping_says(raptor: dict[str, float]) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import swashplate as sp
 from flown_by_hand import PHI, Z, fly, fresh, holds_what_is_held, moves_its_way
-from swashplate.control.linear_vehicle import linear_vehicle
+from swashplate.control.linear_vehicle import delays_of, linear_vehicle
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.state_space import StateSpaceModel
@@ -22,7 +23,7 @@ from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.links.live.session import Session
-from swashplate.links.live.world import World
+from swashplate.links.live.world import World, _steps_back
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import linearize
 from swashplate.vehicles.vehicle import Vehicle
@@ -68,15 +69,41 @@ def test_there_is_no_ground_and_a_flight_ends_where_angles_are_no_small_ones(ses
 
 def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(session: Session) -> None:
     world = fresh(session.world, "raw", ghost=True)
-    own = fly(world, 0.5, pitch=0.4).copy()
+    own = fly(world, 0.52, pitch=0.4).copy()
     ghost = world.moment().crafts["ghost"][0].copy()
     fresh(world, "raw")
     world.setting.decoupled = False
-    alone = fly(world, 0.5, pitch=0.4).copy()
+    alone = fly(world, 0.52, pitch=0.4).copy()
     world.setting.decoupled = True
     assert np.max(np.abs(ghost - alone)) < 1e-12
     assert abs(ghost[PHI]) > 1e-3
-    assert abs(own[PHI]) < 0.1 * abs(ghost[PHI]), "half a second after the stick, pitch has left roll alone"
+    assert abs(own[PHI]) < 0.1 * abs(ghost[PHI]), "half a second after the stick arrived, pitch has left roll alone"
+
+
+def test_input_delays_are_flown(session: Session) -> None:
+    """20 ms of every input: the flight of the matrices under inputs that are moved by ten physics steps by hand."""
+    world = fresh(session.world, "raw")
+    vehicle, start = world.vehicle, world.moment().crafts["own"][0].copy()
+    assert set(delays_of(vehicle).values()) == {0.02}
+    given, rows = [], []
+    for k in range(60):
+        rows.append(fly(world, 0.01, roll=0.5 * (k % 20 < 10), pitch=-0.3 * (k > 30)).copy())
+        given.append(world.moment().crafts["own"][1].copy())
+    assert np.array_equal(rows[1], start), "nothing moves before the first stick arrives"
+    assert not np.array_equal(rows[2], start)
+    driven = np.repeat(given, 5, axis=0)
+    driven = np.vstack([np.tile(world.trim.inputs, (10, 1)), driven, driven[-1:]])[: len(driven) + 1]
+    flown = sp.simulate(vehicle, driven, start=world.trim, rate=500.0)
+    found = flown.array(vehicle.state_names)[5::5]
+    assert np.max(np.abs(found - rows)) < 1e-9
+
+
+def test_delays_that_are_no_whole_controller_steps() -> None:
+    late = linear_vehicle(parse(to_toml(structure("thirteen_state")).replace("value = 0.02", "value = 0.034")))
+    back = _steps_back(late, 5)
+    ago = np.arange(5)[:, None] * 2 + 10 * back  # ms from when the input was given to the substep
+    assert np.all((ago >= 34) & (ago < 44))
+    assert not _steps_back(sp.vehicle("coax"), 5).any()
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +134,9 @@ def test_a_recording_is_a_flight_and_replays_with_its_own_model(
     names = (*vehicle.state_names, *vehicle.input_names)
     assert np.array_equal(truth.array(names), np.array(rows)[:, : len(names)])
     shown = replay(truth, model=vehicle, ahead=1.0)
-    assert far_off(shown) < 0.02
+    second = shown.time > 1.0  # what was on its way when the log began is not in it
+    assert np.nanmax(np.abs(shown.predicted - shown.states[:, :12])[second]) < 0.002
+    assert far_off(shown) < 0.1
     assert not as_json(shown)["picture"]["ground"]
 
 

@@ -13,9 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate import progress_lines
 from swashplate.errors import SwashError
 
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
@@ -26,7 +28,7 @@ import websockets
 from websockets.sync.client import connect
 
 from swashplate.links.live import identifying, server
-from swashplate.links.live.identifying import commands
+from swashplate.links.live.identifying import busiest, commands
 from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
 from swashplate.links.live.session import Session
 
@@ -211,7 +213,12 @@ def test_what_a_recording_is_identified_with(tmp_path: Path) -> None:
     raptor, coax = sp.vehicle("raptor50"), sp.vehicle("coax")
     first, second = commands(raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")
     assert first[3] == "identify"
-    assert first[-2:] == ["--free", "rotor"]
+    cheap = ["--flight", str(tmp_path / "f.nc"), "--free", "rotor", "--method", "output-error", "--rate", "50"]
+    assert first[-8:] == cheap
+    (windowed, _) = commands(
+        raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", window=(12.5, 32.5)
+    )
+    assert f"{tmp_path / 'f.nc'}@12.5-32.5" in windowed
     assert second[3:5] == ["respond", str(tmp_path / "f.nc")]
     assert "throttle" not in " ".join(second)
     assert len(commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")) == 1
@@ -245,6 +252,52 @@ def test_the_second_way_is_taken_where_the_first_leaves_no_report(
     assert job.job.state == state
     assert job.job.words.startswith(words)
     assert bool(job.job.words) == bool(words)
+
+
+def test_a_long_recording_is_identified_from_where_its_sticks_move() -> None:
+    inputs = np.zeros((6000, 3))  # a minute
+    inputs[3500:4500, 0] = 0.1 * np.sign(np.sin(0.1 * np.arange(1000)))
+    inputs[:, 1] = 1e-6 * np.sin(np.arange(6000))
+    window = busiest(inputs, period=0.01)
+    assert window is not None
+    assert window[1] - window[0] == pytest.approx(20.0)
+    assert window[0] <= 35.0
+    assert window[1] >= 45.0
+    assert busiest(inputs[:2000], period=0.01) is None
+
+
+def test_an_identification_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = [progress_lines.line(progress_lines.Told("fitting", k, 60)) for k in (1, 2, 3)]
+    script = "; sleep 0.2; ".join(f"echo '{line}' >&2" for line in said)
+    held = f"echo other words >&2; {script}; touch {tmp_path}/seen; sleep 0.5; exit 2"
+    monkeypatch.setattr(identifying, "commands", lambda *_, **__: (["sh", "-c", held],))
+    job = identifying.Identifying(tmp_path)
+
+    async def watched() -> identifying.Job:
+        task = asyncio.create_task(job.run(sp.vehicle("raptor50"), 1))
+        while not (tmp_path / "seen").exists():
+            await asyncio.sleep(0.02)
+        await asyncio.sleep(0.2)
+        assert job.job is not None
+        told = job.job
+        await task
+        return told
+
+    told = asyncio.run(watched())
+    assert told.doing == "fitting"
+    assert told.share == pytest.approx(3 / identifying.USUAL)
+    assert told.left is not None
+    assert 0.5 * 0.2 * 22 < told.left < 5.0 * 0.2 * 22
+    assert job.job is not None
+    assert job.job.words == "other words", "progress is no part of what went wrong"
+
+
+def test_lines_of_progress_are_read_back_and_others_are_left() -> None:
+    told = progress_lines.Told("fitting", 3, 60)
+    assert progress_lines.parse(progress_lines.line(told)) == told
+    assert progress_lines.parse(progress_lines.line(told._replace(total=None))) == told._replace(total=None)
+    for text in ("", "fitting", "swash-progress", "swash-progress {", 'swash-progress ["a"]', "swash-progress 3"):
+        assert progress_lines.parse(text) is None
 
 
 def test_the_bar_comes_off_and_everything_else_stays(running: Running) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend, newton
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body
+from swashplate.physics.fuselage import slender_body_moment
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar, upper_tip_path_plane
@@ -133,3 +134,15 @@ def test_a_product_of_inertia_keeps_energy_and_angular_momentum(body: RigidBody)
     moving = rigid_body_rates(body, zero, zero, inertia, FloatBackend())
     rates, change = np.array(body.rates), np.array(moving.rates)
     np.testing.assert_allclose(matrix @ change + np.cross(rates, matrix @ rates), 0.0, atol=1e-9)
+
+
+@few
+@given(VECTOR)
+def test_air_turns_a_slender_body_across_its_way(air: Vector) -> None:
+    """Munk's moment of an ideal fluid: V x (rho V_body K V) with a diagonal K, so it has no part along the air."""
+    k = (1.0, 3.0, 4.0)
+    moment = slender_body_moment(
+        air, 0.0, pitch=2.0 * (k[2] - k[0]), yaw=2.0 * (k[1] - k[0]), pitch_zero=0.0, density=1.2
+    )
+    whole = 1.2 * np.cross(np.array(k) * np.array(air), np.array(air))
+    np.testing.assert_allclose((moment.y, moment.z), whole[1:], rtol=1e-12, atol=1e-9)

@@ -72,14 +72,26 @@ def test_a_state_that_nobody_sees_grows_no_further_than_the_horizon() -> None:
     assert P[0, 0] == pytest.approx(1e-3, rel=1e-3)
 
 
-def test_it_can_be_differentiated() -> None:
-    A, C, Q, R = (jnp.asarray(part) for part in _system(5, largest=0.95))
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_its_derivatives_are_the_differences(seed: int) -> None:
+    """Along a random change of all four matrices at once."""
+    system = [jnp.asarray(part) for part in _system(seed, largest=1.05)]
+    rng = np.random.default_rng(seed)
+    dA, dC, dQ, dR = (rng.standard_normal(part.shape) for part in system)
+    changes = (0.1 * dA, dC, dQ + dQ.T, 0.05 * (dR + dR.T))
 
-    def size(change: float) -> jax.Array:
-        K, S = kalman_gain(A * (1.0 + change), C, Q * jnp.exp(change), R)
+    def size(step: float) -> jax.Array:
+        K, S = kalman_gain(*(part + step * change for part, change in zip(system, changes, strict=True)))
         return jnp.sum(jnp.sin(K)) + jnp.linalg.slogdet(S)[1]
 
     step = 1e-5
     slope = (float(size(step)) - float(size(-step))) / (2.0 * step)
     _, tangent = jax.jvp(size, (0.0,), (1.0,))
-    assert float(tangent) == pytest.approx(slope, rel=1e-7)
+    assert float(tangent) == pytest.approx(slope, rel=1e-6)
+
+
+def test_the_derivative_of_what_nobody_sees_is_the_horizon() -> None:
+    """P = q n for a drift that no output shows."""
+    A, C = jnp.eye(2), jnp.array([[1.0, 0.0]])
+    _, by_q = jax.jvp(lambda q: predicted_covariance(A, C, q * jnp.eye(2), jnp.eye(1))[1, 1], (1e-6,), (1.0,))
+    assert float(by_q) == pytest.approx(2**16, rel=1e-9)

@@ -154,6 +154,68 @@ def test_off_axis_flapping_reverses_at_a_wake_distortion_of_one() -> None:
         assert (p_plane, q_plane) == pytest.approx((0.0, q), abs=1e-15)
 
 
+def flap_residual(
+    e: float, lock: float, tilt: tuple[float, float], shaft: tuple[float, float], B1: float
+) -> np.ndarray:
+    """First harmonics of the moments about a hinge at e of a uniform blade in hover, from its motion in space.
+
+    Every element's acceleration by differences of its place: the shaft rolls and pitches at (p, q), the rotor turns,
+    the blade flaps. Axes aft, right, up.
+    """
+    (a1, b1), (p, q) = tilt, shaft
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    x, weights = e + (1.0 - e) * 0.5 * (nodes + 1.0), 0.5 * (1.0 - e) * weights
+    turning = np.array([[0.0, 0.0, q], [0.0, 0.0, p], [-q, -p, 0.0]])  # of the vector (-p, q, 0)
+
+    def flap(psi: float) -> float:
+        return -a1 * math.cos(psi) - b1 * math.sin(psi)
+
+    def place(psi: float, t: float) -> np.ndarray:
+        out, up = e + (x - e) * math.cos(flap(psi + t)), (x - e) * math.sin(flap(psi + t))
+        hub = np.stack([out * math.cos(psi + t), out * math.sin(psi + t), up])
+        return np.asarray(hub + turning @ hub * t + 0.5 * turning @ turning @ hub * t * t)
+
+    found, h, count = np.zeros(2), 1e-3, 12
+    for psi in 2.0 * math.pi * np.arange(count) / count:
+        acceleration = (place(psi, h) - 2.0 * place(psi, 0.0) + place(psi, -h)) / h**2
+        tip, beta = np.array([math.cos(psi), math.sin(psi)]), flap(psi)
+        normal = acceleration[2] * math.cos(beta) - tip @ acceleration[:2] * math.sin(beta)
+        inertia = 3.0 / (1.0 - e) ** 3 * float(weights @ ((x - e) * normal))
+        rate = a1 * math.sin(psi) - b1 * math.cos(psi)
+        flow = -(x - e) * rate + x * (p * math.sin(psi) + q * math.cos(psi)) - B1 * math.sin(psi) * x
+        air = 0.5 * lock * float(weights @ ((x - e) * x * flow))
+        found += 2.0 / count * (air - inertia) * tip
+    return found
+
+
+@pytest.mark.parametrize("e", [0.0, 0.05, 0.15])
+def test_flapping_about_an_offset_hinge_balances_every_element(e: float) -> None:
+    """Steady roll, pitch and cyclic: the closed form's tilt leaves no moment about the hinge (to the small angles)."""
+    inertia, shaft, B1 = 0.7, (4e-5, -6e-5), 3e-5
+    held = flapping.hinge(
+        blade_inertia=inertia,
+        blades=4.0,
+        hub_stiffness=0.0,
+        hinge_offset=e,
+        omega=1.0,
+        density=1.2,
+        lift_slope=5.7,
+        chord=0.06,
+        radius=1.0,
+    )
+
+    def rates(a1: float, b1: float) -> np.ndarray:
+        d = Disc(*(0.0,) * 11, B1, 0.0, held.damping * a1, held.damping * b1)
+        given = {"wake_distortion": 0.0, "phase_lag": None, "deficiency": None}
+        return np.array(flapping.plane_rates(Flapping(a1, b1), blade_element.flap_moments(d), held, shaft, **given))
+
+    at_rest = rates(0.0, 0.0)
+    slope = np.stack([rates(1.0, 0.0) - at_rest, rates(0.0, 1.0) - at_rest], axis=1)
+    tilt = np.linalg.solve(slope, np.array(shaft) - at_rest)
+    left = flap_residual(e, 1.2 * 5.7 * 0.06 / inertia, (tilt[0], tilt[1]), shaft, B1)
+    assert np.max(np.abs(left)) < 1e-8
+
+
 def test_an_aerodynamic_phase_lag_is_a_wake_distortion() -> None:
     """Off-axis response alike for K_R = (16 / gamma) tan(lag) (small lag; Mansur and Tischler 1998)."""
     free, lag, turn = HINGE._replace(excess=0.0), 0.05, 0.01

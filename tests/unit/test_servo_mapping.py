@@ -70,6 +70,19 @@ def test_a_servo_has_ends_a_centre_and_a_direction() -> None:
     assert (servo.travel(0), servo.share(0), turned.share(0)) == (0.0, 0.0, 0.0)
 
 
+def test_swashplate_servos_are_thrown_as_ardupilot_throws_them(tmp_path: Path) -> None:
+    """Trim and 500 us either way, whatever the ends are: they only cut. A reversed one mirrors at its trim."""
+    text = (Path(swashplates.__file__).parent / "mappings" / "raptor50.toml").read_text(encoding="utf-8")
+    own = "[servos.1]\nlow = 1100\ncentre = 1520\nhigh = 1900\nreversed = true\n[servos.2]\nlow = 900\nhigh = 2100\n"
+    (tmp_path / "own.toml").write_text(f"{text}\n{own}", encoding="utf-8")
+    plain, other = servo_mapping("raptor50", RAPTOR), servo_mapping(tmp_path / "own.toml", RAPTOR)
+    for roll, pitch, collective in ((0.0, 0.0, 0.0), (0.1, -0.2, 0.5), (-0.2, 0.1, 1.0)):
+        pulses = pulses_of(roll, pitch, collective)
+        moved = [1500.0 - pulses[0] + 1520.0, *pulses[1:]]  # set_output_pwm_trimmed
+        assert 1100.0 <= moved[0] <= 1900.0
+        np.testing.assert_allclose(other.inputs(moved, 0.01), plain.inputs(pulses, 0.01), atol=1e-12)
+
+
 def pulses_of(roll: float, pitch: float, collective: float, *, tail: int = 1500, throttle: int = 1000) -> list[float]:
     share = 0.46 + 0.28 * collective
     swash = [1500.0 + 500.0 * n for n in ardupilot_outputs("H3-120", roll, pitch, share)]

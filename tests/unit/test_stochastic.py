@@ -50,7 +50,7 @@ def _model() -> StochasticModel:
 def _step() -> Any:
     """One compiled sample for every test: `(x, push, u, parameters, voltage)`."""
     model = _model()
-    return jax.jit(lambda x, push, u, voltage: model.step(x, push, (u, u, u), COAX.values(), voltage))
+    return jax.jit(lambda x, push, u, voltage: model.step(x, push, u, COAX.values(), voltage))
 
 
 @lru_cache(maxsize=1)
@@ -135,7 +135,7 @@ def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() ->
     np.testing.assert_allclose(np.diag(A)[n + 6 : n + 8], np.exp(-DT / 0.5))
     np.testing.assert_allclose(np.diag(Q)[n + 6 : n + 8], 0.4**2 * DT)
     volts = jnp.asarray(VOLTAGE)
-    air = jax.jit(jax.vmap(lambda x, w: model.step(x, jnp.append(jnp.zeros(6), w), (u, u, u), COAX.values(), volts)))
+    air = jax.jit(jax.vmap(lambda x, w: model.step(x, jnp.append(jnp.zeros(6), w), u, COAX.values(), volts)))
     sigma, tiny = np.sqrt(0.1**2 + 0.4**2 * 0.5 / 2.0), 1e-4
     drawn = np.tile(np.asarray(x), (4000, 1))
     drawn[:, [COAX.index("u"), COAX.index("v")]] += sigma * np.random.default_rng(5).standard_normal((4000, 2))
@@ -168,8 +168,11 @@ def _filtered(y: np.ndarray, u: np.ndarray, nuisance: Nuisance, heading: float) 
     def run(y: Any, u: Any, heading: Any) -> Any:
         gain = model.gain(x0, u0, COAX.values(), jnp.asarray(VOLTAGE), Noise(), nuisance)
         start = FilterState(x0.at[COAX.index("psi")].set(heading), jnp.zeros(6), jnp.zeros(6))
-        volts = jnp.full(y.shape[0], VOLTAGE)
-        return model.run(start, y, (u, u, u), COAX.values(), volts, Noise(), nuisance, gain)
+
+        def advance(x: Any, acting: Any, u: Any) -> Any:
+            return model.step(x, acting, u, COAX.values(), jnp.asarray(VOLTAGE))
+
+        return model.run(start, y, advance, u, Noise(), nuisance, gain)
 
     innovations, states = _compiled(run)(y, u, heading)
     return np.asarray(innovations), states
@@ -225,20 +228,16 @@ def test_without_a_surprise_the_filter_is_the_simulation_and_a_steady_push_becom
 INPUTS = np.random.default_rng(5).standard_normal((40, 4))
 
 
-def _commands(nuisance: Nuisance, *, held: bool, inputs: np.ndarray = INPUTS) -> tuple[np.ndarray, ...]:
-    return tuple(np.asarray(part) for part in commands(COAX, DT, jnp.asarray(inputs), nuisance, held=held))
+def _commands(nuisance: Nuisance, inputs: np.ndarray = INPUTS) -> np.ndarray:
+    return np.asarray(commands(COAX, DT, jnp.asarray(inputs), nuisance))
 
 
 def test_commands_on_time_are_the_logged_ones() -> None:
-    for part in _commands(Nuisance(), held=True):
-        np.testing.assert_allclose(part, INPUTS, atol=1e-14)
-    first, _, last = _commands(Nuisance(), held=False)
-    np.testing.assert_allclose(first, INPUTS, atol=1e-14)
-    np.testing.assert_allclose(last[:-1], INPUTS[1:], atol=1e-14)
+    np.testing.assert_allclose(_commands(Nuisance()), INPUTS, atol=1e-14)
 
 
 def test_whole_samples_of_delay_shift_servos_and_motors_each_by_their_own() -> None:
-    late, _, _ = _commands(Nuisance(delay_servo=3 * DT, delay_motor=5 * DT), held=True)
+    late = _commands(Nuisance(delay_servo=3 * DT, delay_motor=5 * DT))
     np.testing.assert_allclose(late[5:, :2], INPUTS[:-5, :2], atol=1e-12)
     np.testing.assert_allclose(late[3:, 2:], INPUTS[:-3, 2:], atol=1e-12)
     np.testing.assert_allclose(late[:5, :2], np.tile(INPUTS[0, :2], (5, 1)), atol=1e-12)  # before the log: its first
@@ -247,17 +246,15 @@ def test_whole_samples_of_delay_shift_servos_and_motors_each_by_their_own() -> N
 def test_a_delay_between_samples_follows_a_smooth_command() -> None:
     time = DT * np.arange(40)
     smooth = np.sin(2 * np.pi * 3.0 * time)[:, None] * np.ones(4)
-    late, middle, end = _commands(Nuisance(delay_servo=0.0234), held=False, inputs=smooth)
-    for part, offset in ((late, 0.0), (middle, 0.5 * DT), (end, DT)):
-        expected = np.sin(2 * np.pi * 3.0 * (time + offset - 0.0234))
-        np.testing.assert_allclose(part[5:-3, 2], expected[5:-3], atol=2e-3)
+    late = _commands(Nuisance(delay_servo=0.0234), smooth)
+    np.testing.assert_allclose(late[5:-3, 2], np.sin(2 * np.pi * 3.0 * (time - 0.0234))[5:-3], atol=2e-3)
 
 
 def test_the_cost_of_a_delay_has_no_kink() -> None:
     """The slope of a late command by its delay is continuous across a whole sample."""
 
     def late(delay: Any) -> Any:
-        return commands(COAX, DT, jnp.asarray(INPUTS), Nuisance(delay_servo=delay), held=True)[0][:, 2]
+        return commands(COAX, DT, jnp.asarray(INPUTS), Nuisance(delay_servo=delay))[:, 2]
 
     before, after = (np.asarray(jax.jacfwd(late)(2 * DT + side)) for side in (-1e-9, 1e-9))
     np.testing.assert_allclose(before[3:], after[3:], atol=1e-3)
@@ -267,5 +264,5 @@ def test_the_cost_of_a_delay_has_no_kink() -> None:
 def test_trims_are_added_to_their_own_command() -> None:
     names = COAX.input_names
     for i, name in enumerate(names):
-        trimmed, _, _ = _commands(Nuisance(**{f"trim_{name}": 0.03}), held=True)
+        trimmed = _commands(Nuisance(**{f"trim_{name}": 0.03}))
         np.testing.assert_allclose(trimmed - INPUTS, np.tile(0.03 * np.eye(4)[i], (40, 1)), atol=1e-15)

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from swashplate import progress_lines
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -47,7 +49,10 @@ def as_json(value: Any) -> str:
 
 
 class Progress:
-    """One line on standard error that says what is being done; appears after a second, and only on a terminal."""
+    """One line on standard error that says what is being done; appears after a second, and only on a terminal.
+
+    Where whoever started the command asks for it, every change is a line of `progress_lines` instead.
+    """
 
     def __init__(self, *, quiet: bool) -> None:
         self._lock = threading.Lock()
@@ -56,7 +61,8 @@ class Progress:
         # A timer, because a compilation goes on for seconds without calling back.
         self._timer = threading.Timer(_AFTER, self._show)
         self._timer.daemon = True
-        if not quiet and sys.stderr.isatty():
+        self._tells = progress_lines.wanted()
+        if not quiet and not self._tells and sys.stderr.isatty():
             self._timer.start()
 
     def _show(self) -> None:
@@ -75,6 +81,8 @@ class Progress:
 
     def say(self, what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
         """What is being done now; `total` of the steps where they are known."""
+        if self._tells:
+            print(progress_lines.line(progress_lines.Told(what, done, total)), file=sys.stderr, flush=True)
         with self._lock:
             self._latest = {"description": what, "completed": done, "total": total, "note": note}
             if self._bar is not None:

@@ -50,7 +50,7 @@ def live(
         raise SwashError("is a file, expected a folder.", where=out, channel="--out")
     vehicle = given.vehicle_of(model, None, switched)
     if vehicle.name == "linear" and not quiet:
-        typer.echo("A linear model: deviations from one trim, without ground, wind, battery or input delays.", err=True)
+        typer.echo("A linear model: deviations from one trim, without ground, wind or battery.", err=True)
     from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
 
     enable_compilation_cache()

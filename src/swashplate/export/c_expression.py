@@ -150,7 +150,11 @@ def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str
     Raises:
         ExportError: as `statements`.
     """
-    found = statements(function, precision=precision, inputs=inputs)
+    return printed(statements(function, precision=precision, inputs=inputs), real, precision, outputs)
+
+
+def printed(found: Statements, real: str, precision: Precision, outputs: Sequence[str]) -> str:
+    """Statements in C, then stores of the outputs into arrays of these names."""
     lines = [f"  {s.text(real, precision)}" for s in found.body]
     stores = [f"  {outputs[o]}[{place}] = {text};" for (o, place), text in found.outputs.items()]
     return "\n".join([*lines, *stores]) + "\n"

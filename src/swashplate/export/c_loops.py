@@ -7,30 +7,26 @@ depend on each other are sought in one loop, so that a processor works on the on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from swashplate.export.c_expression import Statement, statements
+from swashplate.export.c_expression import Statement, Statements
 from swashplate.export.c_text import Precision, literal
 
-if TYPE_CHECKING:
-    from swashplate.export.traced import Looped
-
-_SETTLED: dict[Precision, float] = {"double": 1e-9, "single": 1e-4}
+_SETTLED: dict[Precision, float] = {"double": 1e-8, "single": 1e-4}
 """Relative change of a step after which the error, of the order of its square, is below rounding."""
 
 
-def looped_body(made: Looped, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+def looped(found: Statements, steps: Sequence[int], *, real: str, precision: Precision, outputs: Sequence[str]) -> str:
     """Statements in C that compute a function with roots.
 
-    Args:
-        made: the function and its roots.
-        real, precision, inputs, outputs: as for `c_expression.body`, without those of the roots.
+    They read and write an array `root`, and read `known`: where it is not zero, `root` holds guesses, and a search that
+    does not settle from there begins again where it begins otherwise.
 
-    Raises:
-        ExportError: as `c_expression.statements`.
+    Args:
+        found: of a `traced.Looped` function.
+        steps: of each root, at most.
+        real, precision, outputs: as for `c_expression.body`.
     """
-    found = statements(made.function, precision=precision, inputs=[*inputs, "guess", "root"])
-    count, n = len(made.steps), len(outputs)
+    count, n = len(steps), len(outputs)
     start, value, slope = ([found.outputs[n + k, i] for i in range(count)] for k in range(3))
     needs = _needs(found.body, count)
     rounds = _rounds([*zip(start, value, slope, strict=True)], needs, count)
@@ -47,10 +43,11 @@ def looped_body(made: Looped, *, real: str, precision: Precision, inputs: Sequen
         sought = [i for i in range(count) if rounds[i] == number + 1]
         if sought:
             inside = [s for s in found.body if needs[s.name][1] & set(sought)]
-            lines += _loop(sought, inside, made, (start, value, slope), real, precision)
+            lines += _loop(sought, inside, steps, (start, value, slope), real, precision)
     stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in found.outputs.items() if o < n]
-    head = [f"  {real} {', '.join(f'root{i}' for i in range(count))};", "  int step;"]
-    return "\n".join([*head, *lines, *stores]) + "\n"
+    head = [f"  {real} {', '.join(f'root{i} = root[{i}]' for i in range(count))};", "  int step;"]
+    kept = [f"  root[{i}] = root{i};" for i in range(count)]
+    return "\n".join([*head, *lines, *kept, *stores]) + "\n"
 
 
 _Needs = dict[str, tuple[frozenset[int], frozenset[int]]]
@@ -90,7 +87,7 @@ def _named(s: Statement) -> Statement:
 def _loop(
     sought: Sequence[int],
     inside: Sequence[Statement],
-    made: Looped,
+    steps: Sequence[int],
     texts: tuple[Sequence[str], Sequence[str], Sequence[str]],
     real: str,
     precision: Precision,
@@ -99,9 +96,11 @@ def _loop(
     size = "fabsf" if precision == "single" else "fabs"
     small = literal(_SETTLED[precision], precision)
     settled = " && ".join(f"{size}(move{i}) <= {small} * {size}(root{i})" for i in sought)
+    most = max(steps[i] for i in sought)
+    begin = " ".join(f"root{i} = {_renamed(start[i])};" for i in sought)
     return [
-        *(f"  root{i} = {_renamed(start[i])};" for i in sought),
-        f"  for (step = 0; step < {max(made.steps[i] for i in sought)}; ++step) {{",
+        f"  for (step = known ? -{most} : 0; step < {most}; ++step) {{",
+        f"    if (step == 0) {{ {begin} }}",
         *(f"    {_named(s).text(real, precision)}" for s in inside),
         *(f"    const {real} move{i} = {_renamed(value[i])} / {_renamed(slope[i])};" for i in sought),
         *(f"    root{i} -= move{i};" for i in sought),

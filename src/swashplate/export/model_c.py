@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from swashplate.export.c_expression import body
-from swashplate.export.c_loops import looped_body
+from swashplate.export.c_stages import stages
 from swashplate.export.c_text import REAL, Precision, array, words
-from swashplate.export.traced import Looped, Traced, Variable, late_notes
+from swashplate.export.traced import Traced, Variable, late_notes
 
 _KINDS = ("state", "input", "surrounding", "parameter", "output")
 
@@ -74,17 +74,23 @@ def _variables(model: Traced) -> dict[str, tuple[Variable, ...]]:
 
 def _equations(model: Traced, precision: Precision) -> dict[str, str]:
     given = ("x", "u", "s", "p")
+    real = f"{model.name}_real"
 
-    def printed(function: object, outputs: Sequence[str]) -> str:
-        write: Callable[..., str] = looped_body if isinstance(function, Looped) else body
-        text = write(function, real=f"{model.name}_real", precision=precision, inputs=given, outputs=outputs)
-        unused = [name for name in given if not re.search(rf"\b{name}\[", text)]
-        return text + "".join(f"  (void){name};\n" for name in unused)
+    def used(text: str, names: Sequence[str]) -> str:
+        """With a nod to what it does not read: strict compilers ask for it."""
+        return text + "".join(f"  (void){name};\n" for name in names if not re.search(rf"\b{name}\b", text))
 
+    def single(function: object, outputs: Sequence[str]) -> str:
+        return used(body(function, real=real, precision=precision, inputs=given, outputs=outputs), given)
+
+    made = stages(model, real=real, precision=precision)
     return {
-        "RATES": printed(model.looped or model.rates, ["rates"]),
-        "OUTPUTS": printed(model.readings, ["outputs"]),
-        "JACOBIANS": printed(model.jacobians, ["A", "B"]),
+        "FIXED": used(made.fixed, (*given[1:], "c")),
+        "MOVING": used(made.moving, (*given, "c", "root", "known")),
+        "N_CONSTANTS": str(max(1, made.constants)),
+        "N_ROOTS": str(max(1, made.roots)),
+        "OUTPUTS": single(model.readings, ["outputs"]),
+        "JACOBIANS": single(model.jacobians, ["A", "B"]),
     }
 
 
@@ -178,8 +184,20 @@ _SOURCE = """#include "@NAME@.h"
 #include <math.h>
 
 @ARRAYS@
+/* Of the rates what no state moves, c. */
+static void fixed(const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *c) {
+@FIXED@}
+
+/* The rates, given c. root: what is found by iteration, from the guesses in it where known is not 0. */
+static void moving(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *c,
+                   @REAL@ *root, int known, @REAL@ *rates) {
+@MOVING@}
+
 void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates) {
-@RATES@}
+  @REAL@ c[@N_CONSTANTS@], root[@N_ROOTS@] = {0};
+  fixed(u, s, p, c);
+  moving(x, u, s, p, c, root, 0, rates);
+}
 
 void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs) {
 @OUTPUTS@}
@@ -195,25 +213,26 @@ void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @
 }
 
 void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt) {
-  @REAL@ k[@NAME@_n_states], sum[@NAME@_n_states], at[@NAME@_n_states];
+  @REAL@ k[@NAME@_n_states], sum[@NAME@_n_states], at[@NAME@_n_states], c[@N_CONSTANTS@], root[@N_ROOTS@] = {0};
   const @REAL@ half = dt / 2, sixth = dt / 6;
   int i;
-  @NAME@_rates(x, u, s, p, k);
+  fixed(u, s, p, c);
+  moving(x, u, s, p, c, root, 0, k);
   for (i = 0; i < @NAME@_n_states; ++i) {
     sum[i] = k[i];
     at[i] = x[i] + half * k[i];
   }
-  @NAME@_rates(at, u, s, p, k);
+  moving(at, u, s, p, c, root, 1, k);
   for (i = 0; i < @NAME@_n_states; ++i) {
     sum[i] += 2 * k[i];
     at[i] = x[i] + half * k[i];
   }
-  @NAME@_rates(at, u, s, p, k);
+  moving(at, u, s, p, c, root, 1, k);
   for (i = 0; i < @NAME@_n_states; ++i) {
     sum[i] += 2 * k[i];
     at[i] = x[i] + dt * k[i];
   }
-  @NAME@_rates(at, u, s, p, k);
+  moving(at, u, s, p, c, root, 1, k);
   for (i = 0; i < @NAME@_n_states; ++i) x[i] += sixth * (sum[i] + k[i]);
 }
 """

@@ -18,8 +18,8 @@ from swashplate.identification.output_error import OutputError
 from swashplate.identification.parameters import FROM_CARD, Free, Parameterization, parameterize
 from swashplate.identification.prediction_error import PredictionError, in_wind
 from swashplate.identification.records import POSE, Record, records
-from swashplate.identification.scoring import minimise
 from swashplate.identification.stochastic import Noise, Nuisance
+from swashplate.identification.valleys import minimise_over_valleys
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.vehicles.card import Card
@@ -102,7 +102,7 @@ def identify(
         optimum = nelder_mead.minimise_squares(likelihood, progress=progress)
     else:
         shots = method == "output-error"
-        optimum = minimise(likelihood, iterations=iterations, together=shots, progress=progress)
+        optimum = minimise_over_valleys(likelihood, iterations=iterations, together=shots, progress=progress)
     found = found_at(table, likelihood, optimum)
     parameters, problems = estimates_of(found, vehicle)
     notes += [

@@ -261,8 +261,8 @@ def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tup
     nuisance = nuisance._replace(
         **{name: getattr(nuisance, name) + own[states + i] for i, name in enumerate(plan.drifting)}
     )
-    reaching = commands(vehicle, model.dt, data["inputs"][record], nuisance, held=model.held)
-    cut = tuple(jax.lax.dynamic_slice_in_dim(u, first, plan.length) for u in reaching)
+    reaching = commands(vehicle, model.dt, data["inputs"][record], nuisance)
+    cut = jax.lax.dynamic_slice_in_dim(reaching, first, plan.length)
     voltage = jax.lax.dynamic_slice_in_dim(data["voltage"][record], first, plan.length)
     start = start_state(
         vehicle,
@@ -271,7 +271,7 @@ def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tup
         nuisance,
         value=data["value"][place],
         rate=data["rate"][place],
-        inputs=cut[0][0],
+        inputs=cut[0],
         voltage=voltage[0],
     )
     calm = jnp.zeros(N_DISTURBANCES)

@@ -9,30 +9,19 @@ answers to the measured motion does not bias it as it biases output error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from swashplate.flights.flight import Array
 from swashplate.identification import robust
-from swashplate.identification.parameters import Layout, Parameterization
+from swashplate.identification.innovations import Plan, innovations, tangents, unpack
+from swashplate.identification.parameters import Parameterization
 from swashplate.identification.records import Record, logs
 from swashplate.identification.rows import Entry, Row
-from swashplate.identification.start_states import hover, slopes, start_state
-from swashplate.identification.stochastic import (
-    N_DISTURBANCES,
-    FilterState,
-    Noise,
-    Nuisance,
-    StochasticModel,
-    commands,
-    stochastic_model,
-)
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.identification.start_states import slopes
+from swashplate.identification.stochastic import FilterState, Noise, Nuisance, StochasticModel, stochastic_model
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
@@ -142,17 +131,16 @@ class PredictionError:
                 entries.append(
                     Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
                 )
-        if estimate_noise:
-            for name in _estimated(self.model):
-                value = getattr(self.noise, name)
-                log = float(np.log(value))
-                entries.append(
-                    Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
-                )
+        noises = _estimated(self.model) if estimate_noise else ()
+        for name in noises:
+            log = float(np.log(getattr(self.noise, name)))
+            entries.append(
+                Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
+            )
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
-        self._plan = _Plan(self.model, table.layout, len(self.logs), estimate_noise)
+        self._plan = Plan(self.model, table.layout, len(self.logs), tuple(_NUISANCE), noises)
         self._data = {
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
             "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
@@ -167,21 +155,21 @@ class PredictionError:
 
     def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
         """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
-        return _unpack(self._plan, self._data, jnp.asarray(row))
+        return unpack(self._plan, self._data, jnp.asarray(row))
 
     def innovations(self, row: Array) -> tuple[Any, Any, FilterState]:
         """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
-        return _innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+        return innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
         """Negative log-likelihood of the counted innovations (without its constant)."""
-        innovations, covariances, _ = self.innovations(row)
-        return self._cost(np.asarray(innovations), np.asarray(covariances))
+        found, covariances, _ = self.innovations(row)
+        return self._cost(np.asarray(found), np.asarray(covariances))
 
-    def _cost(self, innovations: Array, covariances: Array) -> float:
+    def _cost(self, found: Array, covariances: Array) -> float:
         total = 0.0
-        for nu, S, counted in zip(innovations, covariances, self.counted, strict=True):
+        for nu, S, counted in zip(found, covariances, self.counted, strict=True):
             nu = nu[counted]
             if not (np.isfinite(nu).all() and np.isfinite(S).all()):
                 return np.inf
@@ -198,16 +186,18 @@ class PredictionError:
         return self._cost(*values), gradient, information
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
-        values, tangents = _with_tangents(self._plan, self._data, jnp.asarray(row))
-        values = tuple(np.asarray(v) for v in values)
-        tangents = tuple(np.asarray(t) for t in tangents)
+        given = (self._plan, self._data, jnp.asarray(row))
+        *found, states = innovations(*given)
+        values = (np.asarray(found[0]), np.asarray(found[1]))
         p = len(self.row)
         gradient, information = np.zeros(p), np.zeros((p, p))
+        by_row = tangents(*given, states)
+        moved = (np.asarray(by_row[0]), np.asarray(by_row[1]))
         for r, counted in enumerate(self.counted):
             nu, S = values[0][r][counted], values[1][r]
             if not np.isfinite(nu).all():
-                return gradient, information, values, tangents
-            d_nu, dS = tangents[0][:, r][:, counted], tangents[1][:, r]
+                return gradient, information, values, moved
+            d_nu, dS = moved[0][:, r][:, counted], moved[1][:, r]
             Li = np.linalg.inv(np.linalg.cholesky(S))
             white = nu @ Li.T
             weight = robust.weights(white)
@@ -220,7 +210,7 @@ class PredictionError:
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
             information += (flat * weight.ravel()) @ flat.T
             information += _by_covariance(dM, nu.shape[0])
-        return gradient, information, values, tangents
+        return gradient, information, values, moved
 
     def refresh(self, row: Array) -> None:
         """Nothing is held between iterations: the noise is part of the row."""
@@ -243,13 +233,13 @@ class PredictionError:
 
         The last is the information (p, p) that lies in the innovations' covariance instead.
         """
-        _, _, values, tangents = self._accumulate(row)
+        _, _, values, moved = self._accumulate(row)
         white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
         for r, counted in enumerate(self.counted):
             Li = np.linalg.inv(np.linalg.cholesky(values[1][r]))
             white.append(values[0][r][counted] @ Li.T)
-            sensitivities.append(tangents[0][:, r][:, counted] @ Li.T)
-            rest += _by_covariance(Li @ tangents[1][:, r] @ Li.T, int(counted.sum()))
+            sensitivities.append(moved[0][:, r][:, counted] @ Li.T)
+            rest += _by_covariance(Li @ moved[1][:, r] @ Li.T, int(counted.sum()))
         return white, sensitivities, rest
 
 
@@ -262,97 +252,3 @@ def _by_covariance(dM: Array, n: int) -> Array:
 def _estimated(model: StochasticModel) -> tuple[str, ...]:
     """The noise numbers that are estimated: the speed is given, and the wind's only where there is one."""
     return tuple(name for name in Noise._fields if name != "speed" and (model.windy or name not in _WIND))
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """What compiled code depends on: everything but numbers."""
-
-    model: StochasticModel
-    layout: Layout
-    logs: int
-    estimate_noise: bool
-
-
-def _unpack(plan: _Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
-    numbers = row * data["scale"]
-    k, n, m = len(plan.layout.free), plan.logs, len(_NUISANCE)
-    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
-    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
-        **{name: block[:, i] for i, name in enumerate(_NUISANCE)}
-    )
-    noise = data["noise"]
-    if plan.estimate_noise:
-        estimated = jnp.array([Noise._fields.index(name) for name in _estimated(plan.model)])
-        noise = noise.at[estimated].set(jnp.exp(numbers[k + n * m :]))
-    return plan.layout.values(data["card"], numbers[:k]), nuisance, Noise(*noise)
-
-
-@partial(jax.jit, static_argnums=0)
-def _innovations(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
-    parameters, nuisances, noise = _unpack(plan, data, row)
-
-    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance) -> Any:
-        return filter_record(
-            plan.model, y, u, voltage, value=value, rate=rate, parameters=parameters, noise=noise, nuisance=nuisance
-        )
-
-    return jax.vmap(one)(  # type: ignore[no-any-return]
-        data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], nuisances
-    )
-
-
-def _tangents(plan: _Plan, data: Any, row: Any) -> Any:
-    """Innovations and covariances with their derivatives by every entry of the row."""
-
-    def residuals(row: Any) -> Any:
-        return _innovations(plan, data, row)[:2]
-
-    return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,)), out_axes=(None, 0))(jnp.eye(row.shape[0]))
-
-
-_swiftly = jax.jit(_tangents, static_argnums=0)
-_soon = jax.jit(_tangents, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-
-
-def _with_tangents(plan: _Plan, data: Any, row: Any) -> Any:
-    """`_tangents`, compiled for speed; a helicopter's many times as many operations, to be compiled soon."""
-    return (_soon if plan.model.vehicle.name == "conventional" else _swiftly)(plan, data, row)
-
-
-def filter_record(
-    model: StochasticModel,
-    y: Any,
-    u: Any,
-    voltage: Any,
-    *,
-    value: Any,
-    rate: Any,
-    parameters: Any,
-    noise: Noise,
-    nuisance: Nuisance,
-) -> tuple[Any, Any, FilterState]:
-    """Innovations, their covariance and the filtered states of one record (traceable).
-
-    Args:
-        model: the stochastic model.
-        y, u, voltage: measurements, logged inputs and battery voltage by sample.
-        value, rate: measured channels and their rates at the first sample.
-    """
-    reaching = commands(model.vehicle, model.dt, u, nuisance, held=model.held)
-    around, at_hover = hover(model.vehicle, parameters, jnp.mean(voltage))
-    gain = model.gain(around, at_hover, parameters, jnp.mean(voltage), noise, nuisance)
-    settled = max(1, round(0.5 / model.dt))
-    x = start_state(
-        model.vehicle,
-        model.output_names,
-        parameters,
-        nuisance,
-        value=value,
-        rate=rate,
-        inputs=jnp.mean(reaching[0][:settled], axis=0),
-        voltage=voltage[0],
-    )
-    start = FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
-    innovations, states = model.run(start, y, reaching, parameters, voltage, noise, nuisance, gain)
-    return innovations, gain.covariance, states

@@ -10,6 +10,7 @@ depend on where the nose points.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -94,6 +95,10 @@ class Gain(NamedTuple):
     covariance: Any
 
 
+Advance = Callable[[Any, Any, Any], Any]
+"""A state row one sample later, from the row, the disturbances that act and what holds at this sample."""
+
+
 class FilterState(NamedTuple):
     """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts."""
 
@@ -113,14 +118,12 @@ class StochasticModel:
         output_names: measured channels.
         dt: sample time [s].
         windy: a horizontal wind is among the disturbances.
-        held: commands are kept through each sample (a flight computer's outputs); otherwise a smooth curve joins them.
     """
 
     equations: Equations
     output_names: tuple[str, ...]
     dt: float
     windy: bool = False
-    held: bool = True
 
     @property
     def vehicle(self) -> Vehicle:
@@ -133,16 +136,14 @@ class StochasticModel:
         return N_DISTURBANCES + 2 * self.windy
 
     # ---- one sample --------------------------------------------------------------------------------------------
-    def step(self, x: Any, gust: Any, u: tuple[Any, Any, Any], parameters: Any, voltage: Any) -> Any:
-        """The state one sample later, with held disturbances: accelerations as in `DISTURBED`, and perhaps the wind."""
+    def step(self, x: Any, gust: Any, u: Any, parameters: Any, voltage: Any) -> Any:
+        """The state one sample later, with commands and disturbances held.
+
+        Disturbances are accelerations as in `DISTURBED`, and perhaps the wind.
+        """
         rates, push = self._rates(parameters), self._push(gust)
-        driving = jnp.stack([self._driving(gust, row, voltage) for row in u])
-        return rk4_step_looped(
-            lambda x, w: rates(x, w) + push,
-            x,
-            lambda fraction: driving[jnp.round(2.0 * fraction).astype(int)],
-            self.dt,
-        )
+        driving = self._driving(gust, u, voltage)
+        return rk4_step_looped(lambda x, w: rates(x, w) + push, x, lambda _: driving, self.dt)
 
     def _rates(self, parameters: Any) -> Any:
         rates = row_rates(self.equations, padded=False)
@@ -263,40 +264,33 @@ class StochasticModel:
         x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
         return FilterState(state.x + x, state.gust + gust, state.drift + drift), innovation
 
-    def predict(
-        self, state: FilterState, u: tuple[Any, Any, Any], parameters: Any, voltage: Any, noise: Noise
-    ) -> FilterState:
+    def acting(self, state: FilterState) -> Any:
+        """The disturbances that act: gusts and drifts together, and perhaps the wind."""
+        return state.gust + jnp.concatenate([state.drift, jnp.zeros(2 * self.windy)])
+
+    def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
         """The state one sample later."""
-        acting = state.gust + jnp.concatenate([state.drift, jnp.zeros(2 * self.windy)])
-        x = self.step(state.x, acting, u, parameters, voltage)
-        return FilterState(x, self._fade(noise) * state.gust, state.drift)
+        return FilterState(advance(state.x, self.acting(state), now), self._fade(noise) * state.gust, state.drift)
 
     def run(
-        self,
-        start: FilterState,
-        y: Any,
-        u: Any,
-        parameters: Any,
-        voltage: Any,
-        noise: Noise,
-        nuisance: Nuisance,
-        gain: Gain,
+        self, start: FilterState, y: Any, advance: Advance, along: Any, noise: Noise, nuisance: Nuisance, gain: Gain
     ) -> tuple[Any, FilterState]:
         """Innovations (n, n_outputs) and the states after each measurement.
 
         Args:
             start: predicted state at the first sample.
             y: measurements (n, n_outputs).
-            u: inputs at each sample's start, middle and end, each (n, n_inputs).
-            voltage: battery voltage (n,).
+            advance: a state row one sample later.
+            along: what `advance` is told, by sample.
+            noise, nuisance, gain: of this record.
         """
 
-        def sample(state: FilterState, now: Any) -> tuple[FilterState, Any]:
-            measured, commands, volts = now
+        def sample(state: FilterState, here: Any) -> tuple[FilterState, Any]:
+            measured, now = here
             corrected, innovation = self.correct(state, measured, gain, nuisance)
-            return self.predict(corrected, commands, parameters, volts, noise), (innovation, corrected)
+            return self.predict(corrected, noise, advance, now), (innovation, corrected)
 
-        _, (innovations, states) = jax.lax.scan(sample, start, (y, u, voltage))
+        _, (innovations, states) = jax.lax.scan(sample, start, (y, along))
         return innovations, states
 
 
@@ -324,8 +318,8 @@ def stochastic_model(
     return StochasticModel(equations_of(vehicle), output_names, round(dt, 9), windy)
 
 
-def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, held: bool) -> tuple[Any, Any, Any]:
-    """What reaches the vehicle at the start, middle and end of each sample: trimmed, and later than logged.
+def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> Any:
+    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged (n, n_inputs).
 
     A smooth curve through the samples; before the first and after the last sample the nearest one holds.
     """
@@ -336,16 +330,9 @@ def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, *, he
     motor = [name.startswith("motor") for name in vehicle.input_names]
     delay = jnp.where(jnp.array(motor), nuisance.delay_motor, nuisance.delay_servo)
     trimmed = inputs + trims
-
-    def at(offset: float) -> Any:
-        place = jnp.clip(jnp.arange(n)[:, None] + (offset - delay)[None, :] / dt, 0.0, n - 1.0)
-        below = jnp.clip(jnp.floor(place), 0, n - 2).astype(int)
-        a, b, c, d = (jnp.take_along_axis(trimmed, jnp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
-        t = place - below
-        # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
-        return b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
-
-    if held:
-        now = at(0.0)
-        return now, now, now
-    return at(0.0), at(0.5 * dt), at(dt)
+    place = jnp.clip(jnp.arange(n)[:, None] - delay[None, :] / dt, 0.0, n - 1.0)
+    below = jnp.clip(jnp.floor(place), 0, n - 2).astype(int)
+    a, b, c, d = (jnp.take_along_axis(trimmed, jnp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+    t = place - below
+    # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
+    return b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))

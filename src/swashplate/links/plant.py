@@ -11,6 +11,7 @@ from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
 from swashplate.links.servos import ServoMapping
 from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Vector
 from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
@@ -145,4 +146,4 @@ class Plant:
         self._held = self._resting(stopped)
 
     def _resting(self, states: Array) -> Motion:
-        return motion(states, np.zeros_like(states), float(self.environment.gravity))
+        return motion(states, Vector(0.0, 0.0, 0.0), float(self.environment.gravity))

@@ -32,6 +32,17 @@ class Servo:
         at = (pulse - self.centre) / side
         return -at if self.reversed else at
 
+    def throw(self, pulse: float) -> float:
+        """The way from the centre in units of `HALF`, whatever the ends are; 0 without a pulse.
+
+        This is how ArduPilot writes swashplate servos: trim and 500 us either way, cut at the ends
+        (`set_output_pwm_trimmed`), so that servos with other ends still tilt the plate alike.
+        """
+        if pulse == NO_PULSE:
+            return 0.0
+        at = (pulse - self.centre) / HALF
+        return -at if self.reversed else at
+
     def share(self, pulse: float) -> float:
         """0 to 1 from the low to the high end, for motors and throttles; 0 without a pulse."""
         if pulse == NO_PULSE:

@@ -75,7 +75,7 @@ class HelicopterMapping:
 
     def inputs(self, pulses: Sequence[float], duration: float) -> Array:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
-        collective, roll, pitch = self._inverse @ [s.travel(pulses[s.channel - 1]) for s in self.swash]
+        collective, roll, pitch = self._inverse @ [s.throw(pulses[s.channel - 1]) for s in self.swash]
         (first, last), (least, most) = self._collective
         theta0 = least + (collective - first) / (last - first) * (most - least)
         side, ahead = self._cyclic

@@ -25,13 +25,17 @@ class Hinge(NamedTuple):
 
     Attributes:
         excess: lambda_b^2 - 1.
-        lock: Lock number gamma = rho a c R^4 / I_b.
+        lock: Lock number gamma = rho a c R^4 / I_b, less what a hinge that is not in the centre takes off it.
         moment: hub moment per tilt [N m/rad].
+        offset: the hinge's part of the excess: hub rates turn a blade by 1 + offset times its own inertia.
+        damping: flapping about the hinge over the same motion about the centre, in the air's moments.
     """
 
     excess: Scalar
     lock: Scalar
     moment: Scalar
+    offset: Scalar = 0.0
+    damping: Scalar = 1.0
 
 
 def hinge(
@@ -48,16 +52,25 @@ def hinge(
 ) -> Hinge:
     """Flap frequency and hub stiffness from the blade and the hub (Bramwell 2001, eqs 1.9 and 3.60).
 
-    `hub_stiffness` is the whole hub's [N m/rad], N_b / 2 times a blade's spring; `hinge_offset` a fraction of R. Two
+    `hub_stiffness` is the whole hub's [N m/rad], N_b / 2 times a blade's spring; `hinge_offset` a fraction e of R. Two
     blades pass their moment on twice per revolution unevenly; the mean over a revolution is taken.
+
+    Blades that begin at the hinge have less moment of the air: by pitch and hub rates 4 int_e^1 (x - e) x^2 dx =
+    1 - 4 e / 3 + e^4 / 3, by flapping 4 int_e^1 (x - e)^2 x dx = 1 - 8 e / 3 + 2 e^2 - e^4 / 3 of that about the centre
+    (Chen 1980). The first is used for the terms with advance ratio too (exactly 1 - 3 e / 2: 1 % at e = 0.05).
     """
+    cubed = hinge_offset * hinge_offset * hinge_offset
+    by_pitch = 1.0 - hinge_offset * (4.0 - cubed) / 3.0
+    by_flapping = 1.0 - hinge_offset * (8.0 - 6.0 * hinge_offset + cubed) / 3.0
     centrifugal = blade_inertia * omega * omega
     offset = 1.5 * hinge_offset / (1.0 - hinge_offset)
     half = 0.5 * blades
     return Hinge(
         hub_stiffness / (half * centrifugal) + offset,
-        density * lift_slope * chord * radius * radius * radius * radius / blade_inertia,
+        by_pitch * density * lift_slope * chord * radius * radius * radius * radius / blade_inertia,
         hub_stiffness + half * centrifugal * offset,
+        offset,
+        by_flapping / by_pitch,
     )
 
 
@@ -71,6 +84,7 @@ def plane_rates(
     flapping: Flapping,
     moments: FlapMoments,
     held: Hinge,
+    shaft: tuple[Scalar, Scalar] = (0.0, 0.0),
     *,
     wake_distortion: Scalar,
     phase_lag: tuple[Scalar, Scalar] | None,
@@ -80,19 +94,25 @@ def plane_rates(
 
     cos:  (1 - K_R) q + (16/gamma) p = -S a1 - 4 M_c,      sin:  (1 - K_R) p - (16/gamma) q = -S b1 - 4 M_s
 
+    A hinge at an offset damps flapping less than it feels the shaft turn: with d = `damping`, (1 - K_R) q becomes
+    (d - K_R) q + (1 - d) q_shaft, and (16/gamma) p becomes (16/gamma) (p + offset p_shaft).
+
     Args:
         flapping: its tilt (counter-clockwise rotor).
-        moments: `flap_moments` of the disc with p = q = 0.
+        moments: `flap_moments` of the disc with p = q = 0, and a1, b1 times the hinge's `damping`.
+        shaft: its rates (p, q) over the rotor speed; count only with an offset.
         held: the hinge; S = 8 (lambda_b^2 - 1) / gamma.
         wake_distortion: K_R; the wake bends with the disc's turning and puts K_R (q cos + p sin) onto the inflow
             (Keller 1996; Arnold, Keller, Curtiss and Reichert 1998).
         phase_lag: (cos, sin) of the angle by which the air's moments come late (Mansur and Tischler 1998), or None.
         deficiency: matrix (cc, cs, ss) on the aerodynamic moments by a static inflow gradient, or None.
     """
-    m, inertia = 1.0 - wake_distortion, 16.0 / held.lock
+    m, inertia = held.damping - wake_distortion, 16.0 / held.lock
     stiffness = 8.0 * held.excess / held.lock
+    p_shaft, q_shaft = shaft
     # aerodynamic moment times 4: D (4 M + m W), W = (q, p); rows cos and sin
-    c, s = 4.0 * moments.cos, 4.0 * moments.sin
+    c = 4.0 * moments.cos + (1.0 - held.damping) * q_shaft
+    s = 4.0 * moments.sin + (1.0 - held.damping) * p_shaft
     w_cq, w_cp, w_sq, w_sp = m, 0.0, 0.0, m
     if deficiency is not None:
         cc, cs, ss = deficiency
@@ -108,7 +128,8 @@ def plane_rates(
             sine * w_cp + cosine * w_sp,
         )
     w_cp, w_sq = w_cp + inertia, w_sq - inertia
-    right_c, right_s = -stiffness * flapping.a1 - c, -stiffness * flapping.b1 - s
+    right_c = -stiffness * flapping.a1 - c - inertia * held.offset * p_shaft
+    right_s = -stiffness * flapping.b1 - s + inertia * held.offset * q_shaft
     determinant = w_cq * w_sp - w_cp * w_sq
     q = (right_c * w_sp - right_s * w_cp) / determinant
     p = (right_s * w_cq - right_c * w_sq) / determinant

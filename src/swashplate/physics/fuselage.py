@@ -37,3 +37,22 @@ def flat_plate_drag(air_velocity: Vector, downwash: Scalar, *, areas: Vector, de
     speed = xp.sqrt(u * u + v * v + through * through + 1e-9)
     pressure = -0.5 * density * speed
     return Vector(pressure * areas.x * u, pressure * areas.y * v, pressure * areas.z * through)
+
+
+def slender_body_moment(
+    air_velocity: Vector, downwash: Scalar, *, pitch: Scalar, yaw: Scalar, pitch_zero: Scalar, density: Scalar
+) -> Vector:
+    """Moment [N m] with which the air turns a slender body across its way (Munk 1924; Heffley and Mnich 1988).
+
+    Munk's is a product of speeds, rho V (k2 - k1) u w for a body of volume V, and so smooth through hover and in every
+    direction: M = rho/2 (pitch u w + pitch_zero u^2), N = -rho/2 yaw u v.
+
+    Args:
+        air_velocity, downwash: as in `flat_plate_drag`.
+        pitch, yaw: [m^3], positive where they turn the body away from the air, as fuselages do: 2 V (k2 - k1), about
+            twice the volume for a slender one.
+        pitch_zero: [m^3], nose up, in air from straight ahead: camber, and drag that acts above or below the CG.
+    """
+    u, v, w = air_velocity
+    half = 0.5 * density * u
+    return Vector(0.0, half * (pitch * (w - downwash) + pitch_zero * u), -half * yaw * v)

@@ -34,3 +34,30 @@ def lifting_force(
     linear = (lift_slope * ahead + xp.abs(across)) * across
     most = ahead * ahead + across * across
     return -0.5 * density * area * xp.maximum(-most, xp.minimum(most, linear))
+
+
+def inclined_force(
+    along: Scalar,
+    across: Scalar,
+    incidence: Scalar,
+    *,
+    area: Scalar,
+    lift_slope: Scalar,
+    density: Scalar,
+    xp: Backend,
+) -> tuple[Scalar, Scalar]:
+    """Forces [N] along and across the body of a surface that is set at an incidence [rad]; see `lifting_force`.
+
+    Positive incidence is what air from the side of positive `across` would give: a leading edge that is up for a
+    horizontal tail (across is down), to the left for a fin (across is right).
+    """
+    ci, si = xp.cos(incidence), xp.sin(incidence)
+    force = lifting_force(
+        along * ci - across * si,
+        across * ci + along * si,
+        area=area,
+        lift_slope=lift_slope,
+        density=density,
+        xp=xp,
+    )
+    return force * si, force * ci

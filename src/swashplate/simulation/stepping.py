@@ -3,6 +3,8 @@
 Dispatch is what such a step costs, so all that changes goes in as one row, all that is wanted comes out as one row, and
 nothing is left outside the loop: XLA hoists what does not change in it into some hundred kernels of their own, unless a
 barrier holds it (measured on two cores: 170 us a step with them, 23 us without, 9 us of it the bare call).
+
+Attitude is carried as a quaternion (`tumbling`): what an autopilot or a hand does may end upside down.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from swashplate.simulation.dynamics import (
     rk4_step_looped,
     row_rates,
 )
+from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -38,6 +41,7 @@ LONGEST_STEP = 5e-4
 """s, of one Runge-Kutta step: skids on the ground are the stiffest part (friction of a light body: 1/1400 s)."""
 
 _FLOATS = FloatBackend()
+_SPEEDS = slice(RigidBody._fields.index("u"), RigidBody._fields.index("w") + 1)
 
 
 class Motion(NamedTuple):
@@ -67,10 +71,10 @@ class Stepping:
 
     def __init__(self, vehicle: Vehicle, state: Array, environment: Environment) -> None:
         enable_double_precision()
-        self.vehicle = vehicle
-        self._advance = _compiled(equations_of(vehicle))
+        self.vehicle, self._moved = vehicle, tumbling(vehicle)
+        self._advance = _compiled(equations_of(self._moved))
         self._parameters = jax.device_put(parameter_row(vehicle, environment))
-        self._n = len(vehicle.state_names)
+        self._n = len(self._moved.state_names)
         self._gravity = float(environment.gravity)
         self._around = np.array([getattr(environment, name) for name in SURROUNDINGS])
         self._low, self._high = np.array(vehicle.input_limits).T
@@ -84,7 +88,7 @@ class Stepping:
     def place(self, state: Array) -> None:
         """Put the vehicle into a state."""
         self._last = np.array(state, dtype=np.float64)
-        self._state = jax.device_put(self._last.copy())
+        self._state = jax.device_put(from_euler(self._last))
 
     def surround(self, **values: float) -> None:
         """Change wind or voltage, by name."""
@@ -105,20 +109,21 @@ class Stepping:
         if not np.isfinite(values).all():
             self.place(self._last)
             first = int(np.argmin(np.isfinite(values))) % self._n
-            raise DivergenceError("left the finite numbers.", time=float("nan"), state=self.vehicle.state_names[first])
-        self._state, self._last = state, values[: self._n]
-        return motion(values[: self._n], values[self._n :], self._gravity)
+            name = self._moved.state_names[first]
+            raise DivergenceError("left the finite numbers.", time=float("nan"), state=name)
+        self._state, self._last = state, to_euler(values[: self._n], self._last)
+        return motion(self._last, Vector(*values[self._n :][_SPEEDS].tolist()), self._gravity)
 
 
-def motion(states: Array, rates: Array, g: float) -> Motion:
-    """What sensors need, from a state row and its derivative.
+def motion(states: Array, change: Vector, g: float) -> Motion:
+    """What sensors need, from a state row and the rates of u, v and w [m/s^2].
 
     The specific force is the acceleration less gravity, seen from turning axes (Stevens, Lewis and Johnson 2016, eq.
     1.7-15): one evaluation of the equations then tells everything.
     """
-    body, change = RigidBody(*states[:12].tolist()), RigidBody(*rates[:12].tolist())
+    body = RigidBody(*states[: len(RigidBody._fields)].tolist())
     pull = gravity(1.0, g, body.attitude, _FLOATS)
-    force = change.velocity + body.rates.cross(body.velocity) + pull.scaled(-1.0)
+    force = change + body.rates.cross(body.velocity) + pull.scaled(-1.0)
     return Motion(body, body_to_local(body.velocity, body.attitude, _FLOATS), force, states)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.flights.flight import Array
+from swashplate.identification.innovations import filter_record
 from swashplate.identification.kinematics import PREDICTED
-from swashplate.identification.prediction_error import filter_record
 from swashplate.identification.records import Record
 from swashplate.identification.riccati import predicted_covariance
 from swashplate.identification.start_states import hover, slopes
@@ -137,13 +137,15 @@ def _predict(
         noise=noise,
         nuisance=nuisance,
     )
-    reaching = commands(model.vehicle, model.dt, inputs, nuisance, held=model.held)
+    reaching = commands(model.vehicle, model.dt, inputs, nuisance)
     kept = jnp.array([model.vehicle.index(name) for name in PREDICTED])
+
+    def advance(x: Any, acting: Any, k: Any) -> Any:
+        return model.step(x, acting, reaching[k], parameters, voltage[k])
 
     def run(start: Any) -> Any:
         def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
-            now = (reaching[0][k], reaching[1][k], reaching[2][k])
-            following = model.predict(state, now, parameters, voltage[k], noise)
+            following = model.predict(state, noise, advance, k)
             return following, following.x[kept]
 
         return jax.lax.scan(sample, jax.tree.map(lambda rows: rows[start], filtered), start + jnp.arange(ahead))[1]

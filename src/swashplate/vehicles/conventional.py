@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, NamedTuple
 
-from swashplate.physics import actuators, bell_hiller, engine, fuselage, ground_contact, tail_rotor, tail_surfaces
+from swashplate.physics import actuators, bell_hiller, engine, ground_contact
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.bell_hiller import Bar
 from swashplate.physics.engine import EngineLag, RotorSpeed
@@ -19,6 +19,7 @@ from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector, local_to_body
 from swashplate.physics.inflow import Inflow
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
+from swashplate.vehicles.airframe import airframe
 from swashplate.vehicles.card import Card
 from swashplate.vehicles.helicopter_checks import check_numbers, with_added
 from swashplate.vehicles.helicopter_options import HelicopterOptions, helicopter_options
@@ -120,10 +121,6 @@ class Loads(NamedTuple):
 CONTRIBUTORS = ("main_rotor", "tail_rotor", "tailplane", "fin", "fuselage", "ground")
 
 
-def _at(position: Vector, force: Vector) -> Contribution:
-    return Contribution(force, position.cross(force))
-
-
 def loads(
     state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
 ) -> Loads:
@@ -131,7 +128,6 @@ def loads(
     body = state.body
     sense, density = options.sense, env.air_density
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
-    u, v, w = air
     p, q, r = body.rates
 
     # Controls: delay, servos, yaw gyro, stabilizer bar.
@@ -186,59 +182,21 @@ def loads(
     if state.rotor is not None:
         lifted = Contribution(lifted.force.scaled(fading), lifted.moment.scaled(fading))
 
-    # Tail rotor; its wake and the main rotor's reach the tails.
-    tail_at = Vector(-par.tail_arm, 0.0, -par.tail_height)
-    at_tail = air + body.rates.cross(tail_at)
-    tail = tail_rotor.tail_rotor_loads(
+    frame = airframe(
+        air,
+        body.rates,
         tail_pitch,
-        at_tail.x * at_tail.x + at_tail.z * at_tail.z,
-        -sense * at_tail.y,
-        omega=par.tail_gear * omega,
-        density=density,
-        radius=par.tail_radius,
-        chord=par.tail_chord,
-        blades=par.tail_blades,
-        lift_slope=par.tail_lift_slope,
-        drag=par.tail_drag,
-        delta3=par.tail_delta3,
-        blade_inertia=par.tail_blade_inertia,
-        xp=xp,
-    )
-    unblocked = tail_rotor.fin_blockage(par.fin_area, par.tail_radius, par.fin_blockage)
-    tail_force = Vector(0.0, sense * unblocked * fading * tail.thrust, 0.0)
-
-    rim = par.tail_arm - par.rotor_radius
-    downwash = tail_surfaces.wake_on_tailplane(
-        u,
-        w,
         blowing * rotor.induced,
-        near=rim - par.tail_radius,
-        far=rim + par.tail_radius,
-        drop=par.tail_height,
-        xp=xp,
+        omega,
+        (blowing, fading),
+        par,
+        density,
+        xp,
+        sense,
     )
-    tailplane_lift = tail_surfaces.lifting_force(
-        u,
-        w + par.tailplane_arm * q - downwash,
-        area=par.tailplane_area,
-        lift_slope=par.tailplane_lift_slope,
-        density=density,
-        xp=xp,
-    )
-    fin_at = Vector(-par.fin_arm, 0.0, -par.fin_height)
-    fin_side = tail_surfaces.lifting_force(
-        u,
-        v - par.fin_arm * r + par.fin_height * p + sense * par.fin_wake * blowing * tail.induced,
-        area=par.fin_area,
-        lift_slope=par.fin_lift_slope,
-        density=density,
-        xp=xp,
-    )
-    areas = Vector(par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
-    drag = fuselage.flat_plate_drag(air, blowing * rotor.induced, areas=areas, density=density, xp=xp)
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.
-    load = fading * (rotor.torque + par.tail_gear * tail.torque)
+    load = fading * (rotor.torque + par.tail_gear * frame.tail_torque)
     rotor_rates, lag = None, None
     if state.rotor is not None:
         throttle = inputs.throttle if options.throttle else 1.0
@@ -270,10 +228,10 @@ def loads(
         touching = Contribution(*ground_contact.skid_loads(body, skids, xp))
     return Loads(
         lifted,
-        _at(tail_at, tail_force),
-        _at(Vector(-par.tailplane_arm, 0.0, 0.0), Vector(0.0, 0.0, tailplane_lift)),
-        _at(fin_at, Vector(0.0, fin_side, 0.0)),
-        Contribution(drag, Vector(0.0, 0.0, 0.0)),
+        frame.tail_rotor,
+        frame.tailplane,
+        frame.fin,
+        frame.fuselage,
         touching,
         rotor.disc,
         bar_rates,

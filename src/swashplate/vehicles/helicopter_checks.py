@@ -21,16 +21,24 @@ def with_added(card: Card, options: HelicopterOptions) -> Card:
     """
     lacking = {name: entry for name, entry in ADDED.items() if name not in card.parameters}
     for name, (option, _) in lacking.items():
-        if getattr(options, option):
+        if option is not None and getattr(options, option):
             raise CardError(
                 f"is missing, and option '{option}' needs it ({MEANING[name]}).",
                 where=card.path or card.vehicle,
                 channel=name,
                 hint=f'Add [parameters.{name}] with value, unit = "{UNITS[name]}", source and status.',
             )
-    source = "not on the card, which is older than this parameter; without its option it has no effect"
-    added = {name: Parameter(value, UNITS[name], source, "assumed") for name, (_, value) in lacking.items()}
+    added = {name: _stand_in(name, *entry, card) for name, entry in lacking.items()}
     return replace(card, parameters={**card.parameters, **added}) if added else card
+
+
+def _stand_in(name: str, option: str | None, value: float | str, card: Card) -> Parameter:
+    source = "not on the card, which is older than this parameter; "
+    if isinstance(value, str):
+        known = card.parameters.get(value)
+        return Parameter(known.value if known else math.nan, UNITS[name], f"{source}{value} stands for it", "assumed")
+    meant = "this leaves it out" if option is None else "without its option it has no effect"
+    return Parameter(value, UNITS[name], source + meant, "assumed")
 
 
 def check_numbers(card: Card) -> None:

@@ -25,6 +25,8 @@ class HelicopterOptions(NamedTuple):
         ground: skids touch ground at z = 0.
         phase_lag: use the card's aerodynamic phase lag.
         in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
+        yaw_at_blades: the blades meet the air at the rotor's speed less the yaw rate, as they do on any shaft whose
+            speed is kept against the fuselage; most published tables and the packaged cards leave it out.
     """
 
     rotation: str = "ccw"
@@ -39,6 +41,7 @@ class HelicopterOptions(NamedTuple):
     ground: bool = False
     phase_lag: bool = False
     in_plane: str = "blade-element"
+    yaw_at_blades: bool = False
 
     @property
     def sense(self) -> float:
@@ -55,7 +58,10 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
     "rotor_speed": ("fixed", "governed", "throttle"),
     "in_plane": ("blade-element", "thrust-tilt"),
-    **dict.fromkeys(("coning", "bar", "gyro", "servos", "delay", "engine_lag", "ground", "phase_lag"), (True, False)),
+    **dict.fromkeys(
+        ("coning", "bar", "gyro", "servos", "delay", "engine_lag", "ground", "phase_lag", "yaw_at_blades"),
+        (True, False),
+    ),
 }
 
 

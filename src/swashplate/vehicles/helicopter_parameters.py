@@ -45,18 +45,35 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("tail_height", "m", "tail rotor above the CG"),
     ("tail_delta3", "1", "tangent of the tail rotor's pitch-flap angle, negative takes pitch off; 0 for models"),
     ("tail_blade_inertia", "kg m^2", "of one tail blade; counts only with delta3"),
+    ("tail_flap_frequency", "1", "flapping frequency of the tail blades per turn; 1 on a teeter; only with delta3"),
+    ("tail_twist", "rad", "tail blade twist from root to tip, negative washes out"),
+    ("tail_cant", "rad", "tail rotor's thrust leaning upwards; 0 on most"),
     ("fin_blockage", "1", "thrust lost per fin area over disc area; 0.75"),
     ("tailplane_area", "m^2", "horizontal tail area; 0 where there is none"),
     ("tailplane_lift_slope", "1/rad", "its lift curve slope; about 3 for small aspect ratios"),
     ("tailplane_arm", "m", "horizontal tail behind the CG"),
+    ("tailplane_drop", "m", "main rotor hub above the horizontal tail: as far as the rotor's wake sinks to reach it"),
+    (
+        "tailplane_incidence",
+        "rad",
+        "horizontal tail's incidence, leading edge up; with camber, less its zero-lift angle",
+    ),
     ("fin_area", "m^2", "vertical tail area"),
     ("fin_lift_slope", "1/rad", "its lift curve slope; about 2 to 3"),
     ("fin_arm", "m", "vertical tail behind the CG"),
     ("fin_height", "m", "vertical tail above the CG"),
+    ("fin_incidence", "rad", "vertical tail's incidence or camber, positive where it helps the tail rotor"),
     ("fin_wake", "1", "share of the tail rotor's induced velocity at the fin"),
     ("fuselage_area_x", "m^2", "drag area ahead: c_D times frontal area"),
     ("fuselage_area_y", "m^2", "drag area sideways"),
     ("fuselage_area_z", "m^2", "drag area downwards"),
+    (
+        "fuselage_pitch_volume",
+        "m^3",
+        "nose-up moment over rho/2 u w: 0 where unknown; slender bodies about twice their volume",
+    ),
+    ("fuselage_yaw_volume", "m^3", "moment away from the air over rho/2 u v: as for pitch"),
+    ("fuselage_pitch_zero", "m^3", "nose-up moment over rho/2 u^2 where the air comes from straight ahead"),
     ("bar_gain", "1", "blade pitch per stabilizer bar tilt: the Hiller mixer's levers"),
     ("bar_cyclic", "1", "paddle pitch per blade cyclic that the stick commands"),
     ("bar_inner", "m", "paddles begin at this radius"),
@@ -94,8 +111,20 @@ MEANING: Mapping[str, str] = {name: text for name, _, text in _TABLE}
 
 HelicopterParameters = NamedTuple("HelicopterParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
 
-ADDED: Mapping[str, tuple[str, float]] = {"servo_delay": ("delay", 0.02), "engine_time": ("engine_lag", 0.1)}
-"""What the first cards lack: the option without which it has no effect, and what stands for it while that is off."""
+ADDED: Mapping[str, tuple[str | None, float | str]] = {
+    "servo_delay": ("delay", 0.02),
+    "engine_time": ("engine_lag", 0.1),
+    "tail_flap_frequency": (None, 1.0),
+    "tail_twist": (None, 0.0),
+    "tail_cant": (None, 0.0),
+    "tailplane_drop": (None, "tail_height"),
+    "tailplane_incidence": (None, 0.0),
+    "fin_incidence": (None, 0.0),
+    "fuselage_pitch_volume": (None, 0.0),
+    "fuselage_yaw_volume": (None, 0.0),
+    "fuselage_pitch_zero": (None, 0.0),
+}
+"""What the first cards lack: the option that needs it, and the number or parameter that stood for it before."""
 
 POSITIVE = (
     "mass",
@@ -117,6 +146,7 @@ POSITIVE = (
     "tail_gear",
     "tail_arm",
     "tail_blade_inertia",
+    "tail_flap_frequency",
     "bar_inertia",
     "engine_power",
     "engine_time",
@@ -167,5 +197,9 @@ ANGLES = (
     "collective_high",
     "tail_low",
     "tail_high",
+    "tail_twist",
+    "tail_cant",
+    "tailplane_incidence",
+    "fin_incidence",
 )
 """What is an angle of much less than a radian on every helicopter."""

@@ -51,13 +51,15 @@ def main_rotor(
         disc: tip-path plane.
         induced: dynamic inflow states, or None for momentum theory at every instant.
         blades: theta0, A1, B1 at the blades [rad].
-        omega: rotor speed [rad/s].
+        omega: rotor speed against the fuselage [rad/s].
         par, density: the card's numbers, the air.
     """
     sense = options.sense
     hub = Vector(par.hub_x, par.hub_y, -par.hub_height)
     at_hub = air + rates.cross(hub)
     ct, st = xp.cos(par.shaft_tilt), xp.sin(par.shaft_tilt)
+    if options.yaw_at_blades:
+        omega = omega - sense * (rates.z * ct - rates.x * st)
     tip = omega * par.rotor_radius
     mu_x = (at_hub.x * ct + at_hub.z * st) / tip
     mu_y = sense * at_hub.y / tip
@@ -110,12 +112,12 @@ def main_rotor(
     else:
         cone = par.precone
     seen = seen._replace(a0=cone)
-    still = blade_element.flap_moments(seen._replace(p=0.0, q=0.0))
+    still = blade_element.flap_moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1))
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
     kept = 0.0 if options.inflow == "pitt-peters" else bending
     lag = (xp.cos(par.phase_lag), xp.sin(par.phase_lag)) if options.phase_lag else None
     plane_p, plane_q = flapping.plane_rates(
-        own, still, held, wake_distortion=kept, phase_lag=lag, deficiency=deficiency
+        own, still, held, (p / omega, q / omega), wake_distortion=kept, phase_lag=lag, deficiency=deficiency
     )
     disc_rates = Flapping(omega * plane_q - q, sense * (omega * plane_p - p))
 
@@ -123,7 +125,9 @@ def main_rotor(
     lam_c, lam_s = flow.lam_c + kept * plane_q, flow.lam_s + kept * plane_p
     if deficiency is not None:
         cc, cs, ss = deficiency
-        c, s = 4.0 * still.cos + plane_q * (1.0 - kept), 4.0 * still.sin + plane_p * (1.0 - kept)
+        turned = held.damping - kept
+        c = 4.0 * still.cos + turned * plane_q + (1.0 - held.damping) * q / omega
+        s = 4.0 * still.sin + turned * plane_p + (1.0 - held.damping) * p / omega
         lam_c, lam_s = lam_c + c - (cc * c + cs * s), lam_s + s - (cs * c + ss * s)
     moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
     inflow_rates = None

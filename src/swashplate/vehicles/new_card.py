@@ -13,6 +13,7 @@ from swashplate.vehicles.helicopter_parameters import MEANING
 _SCALE: Mapping[str, Callable[[float, float], float]] = {
     "m": lambda size, weight: size,
     "m^2": lambda size, weight: size**2,
+    "m^3": lambda size, weight: size**3,
     "kg": lambda size, weight: weight,
     "kg m^2": lambda size, weight: weight * size**2,
     "N m/rad": lambda size, weight: weight * size,
@@ -67,7 +68,8 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             note="",
         )
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
-    return Card("conventional", title, trust, {"rotation": rotation}, parameters)
+    options = {**pattern.options, "rotation": rotation, "yaw_at_blades": True}
+    return Card("conventional", title, trust, options, parameters)
 
 
 def commented(card: Card) -> str:

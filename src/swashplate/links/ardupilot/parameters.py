@@ -32,14 +32,17 @@ _HELI_SERVOS, _FIFTH, _TAIL, _THROTTLE = (33, 34, 35), 37, 36, 31
 _MOTORS = {1: 33, 2: 34, 5: 37, 6: 38}
 _SEEN = np.geomspace(1.0, 10.0, 30)  # rad/s
 _CROSSOVER = 7.0  # rad/s, of the yaw rate loop
+_KEPT, _MARGIN = 0.1, 1.25
 
 
 def parameters(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Parameters:
     """By name, what ArduPilot has to be told about a vehicle.
 
     Rate loops of a single rotor: feed-forward is one over the largest rate per command from 1 to 10 rad/s, P 0.28 and I
-    0.55 of it; yaw has a P that crosses over at 7 rad/s. These are starts that hover, made from the linear model about
-    hover without ArduPilot's filters and delays, not tuned gains. A coaxial gets none.
+    0.55 of it; yaw has a P that crosses over at 7 rad/s. Near hover ArduPilot lets the integrals of roll and pitch leak
+    down to ILMI: that is a quarter more than what the hover's cyclic asks for, at least 0.1. These are starts that
+    hover, made from the linear model about hover without ArduPilot's filters and delays, not tuned gains. A coaxial
+    gets none.
 
     Args:
         mapping: between the autopilot's outputs and the vehicle.
@@ -131,9 +134,11 @@ def _rates(mapping: HelicopterMapping, vehicle: Vehicle, hover: Trim) -> tuple[b
         return by * model.B[:, model.inputs.index(name)]
 
     found: Parameters = {}
-    for axis, rate, column in (("RLL", "p", moved("A1", side)), ("PIT", "q", moved("B1", -ahead))):
-        forward = 1.0 / _largest(model.A, column, model.states.index(rate))
+    commands = hover.commands()
+    for axis, rate, name, full in (("RLL", "p", "A1", side), ("PIT", "q", "B1", -ahead)):
+        forward = 1.0 / _largest(model.A, moved(name, full), model.states.index(rate))
         found |= _gains(axis, forward, 0.28 * forward, 0.55 * forward)
+        found[f"ATC_RAT_{axis}_ILMI"] = max(_KEPT, round(_MARGIN * abs(commands[name] / full), 2))
     turn = float(moved("theta0T", 0.5 * (high - low))[model.states.index("r")])
     if turn == 0.0:
         raise LinkError("the tail moves nothing.", channel="tail.deg")

@@ -16,8 +16,8 @@ from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
 ABOUT = (
-    "A linear model: deviations from one trim, trusted near it only. It has no ground, wind or battery, and its input "
-    "delays are left out; height counts from an arbitrary level; size and rotor speed are only drawn."
+    "A linear model: deviations from one trim, trusted near it only. It has no ground, wind or battery; its input "
+    "delays are flown, to 2 ms; height counts from an arbitrary level; size and rotor speed are only drawn."
 )
 """What whoever flies one must know."""
 _TIP_SPEED = 60.0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.control.linear_vehicle import delays_of
 from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.kinematics import PREDICTED, measured_states
@@ -194,8 +195,12 @@ def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Arr
 def _flown(model: Vehicle, time: Array, states: Array, inputs: Array, ahead: float) -> Array:
     """The model from the logged state on, anew every `ahead` seconds, on the logged inputs.
 
-    For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for.
+    For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for. A
+    linear model's own delays are flown.
     """
+    late = delays_of(model)
+    waits = (late.get(name, 0.0) for name in model.input_names)
+    inputs = np.stack([np.interp(time - d, time, u) for d, u in zip(waits, inputs.T, strict=True)], axis=1)
     step = float(np.median(np.diff(time)))
     length, found = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
     for first in range(0, time.size - length, length):

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from swashplate.control.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
-from swashplate.links.live.identifying import HOWS, How, Identifying
+from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
 from swashplate.links.live.linear_picture import ABOUT
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
 from swashplate.links.live.pilots import MODES
@@ -31,11 +33,12 @@ _UNIT_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording on disk: its number, length [s], and the vehicle that flew it."""
+    """A recording on disk: its number, length [s], the vehicle that flew it, and its busiest stretch [s]."""
 
     number: int
     seconds: float
     vehicle: Vehicle
+    window: Window | None = None
 
 
 class Session:
@@ -184,13 +187,15 @@ class Session:
         await asyncio.to_thread(
             save_recording, vehicle, rows, period=self.world.period, folder=self.folder, number=number
         )
-        self.recordings.append(Recording(number, len(rows) * self.world.period, vehicle))
+        period, first = self.world.period, len(vehicle.state_names)
+        window = busiest(np.stack(rows)[:, first : first + len(vehicle.input_names)], period=period)
+        self.recordings.append(Recording(number, len(rows) * period, vehicle, window))
 
     def _identify(self, number: int, how: How) -> None:
         chosen = next((recording for recording in self.recordings if recording.number == number), None)
         if chosen is None:
             raise SwashError(f"There is no recording {number}.")
-        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number, how))
+        task = asyncio.create_task(self.identifying.run(chosen.vehicle, number, how, window=chosen.window))
         self._jobs.add(task)
         task.add_done_callback(self._jobs.discard)
 
@@ -246,7 +251,7 @@ class Session:
             "maneuver": round(left, 1),
             "recording": None if recorded is None else round(recorded, 1),
             "recordings": [[r.number, round(r.seconds, 1)] for r in self.recordings],
-            "job": None if job is None else [job.recording, job.state, job.words, round(job.seconds)],
+            "job": None if job is None else _told(job),
             "setting": {
                 "mode": setting.mode,
                 "decoupled": setting.decoupled,
@@ -257,6 +262,13 @@ class Session:
                 "voltage": setting.voltage,
             },
         }
+
+
+def _told(job: Job) -> list[Any]:
+    """A job as the page reads it."""
+    left = None if job.left is None else round(job.left)
+    share = None if job.share is None else round(job.share, 2)
+    return [job.recording, job.state, job.words, round(job.seconds), job.doing, share, left]
 
 
 def _has_bar(vehicle: Vehicle) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.control.autopilot import Autopilot
+from swashplate.control.linear_vehicle import delays_of
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.links.live.axes import STICKS
@@ -32,6 +33,7 @@ from swashplate.simulation.dynamics import (
 from swashplate.simulation.record import check_divergence
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
+from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 from swashplate.simulation.wind import Gusts, Turbulence
 from swashplate.vehicles.linear import NAME as LINEAR
 from swashplate.vehicles.vehicle import Vehicle
@@ -51,6 +53,9 @@ def advance(
     law: Step,
     substeps: int,
     x: Any,
+    y: Any,
+    past: Any,
+    back: Any,
     memory: Any,
     wanted: Any,
     around: Any,
@@ -59,29 +64,37 @@ def advance(
     p: Any,
     limits: Any,
     dt: Any,
-) -> tuple[Any, Any, Any]:
-    """One controller step: the law, then `substeps` of physics [s each] with its inputs held.
+) -> tuple[Any, Any, Any, Any]:
+    """One controller step: the law on the state row x, then `substeps` of physics [s each] with its inputs held.
+
+    Args:
+        x: what the law measures. y: the row that the equations move.
+        past: inputs of the last controller steps, the latest last.
+        back: how many steps ago an input was given that acts now, shape (substeps, n_inputs).
 
     Returns:
-        State row, controller memory, and the inputs as the actuators got them (limited, excitation included).
+        The row y, `past`, controller memory, and the inputs as the actuators got them (limited, excitation included).
     """
     rates = row_rates(equations, padded=True)
     measured = jnp.concatenate([x, around[-1:]])
     memory, command = law(memory, 0.0, measured, wanted, gains)
     inputs = jnp.clip(command + added, limits[0], limits[1])
-    w = jnp.concatenate([inputs, around])
+    past = jnp.concatenate([past[1:], inputs[None]])
+    columns, last = jnp.arange(inputs.size), past.shape[0] - 1
 
-    def substep(_: Any, x: Any) -> Any:
-        return rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
+    def substep(i: Any, y: Any) -> Any:
+        w = jnp.concatenate([past[last - back[i], columns], around])
+        return rk4_step_looped(lambda y, w: rates(y, w, p), y, lambda _: w, dt)
 
-    return jax.lax.fori_loop(0, substeps, substep, x), memory, inputs
+    return jax.lax.fori_loop(0, substeps, substep, y), past, memory, inputs
 
 
 @dataclass
 class Craft:
-    """One flying copy: state row, controller memory, the inputs it last got."""
+    """One flying copy: state row, inputs on their way, controller memory, the inputs it last got."""
 
     x: Array
+    past: Array
     memory: Array
     inputs: Array
 
@@ -143,10 +156,13 @@ class World:
         self.setting = Setting(voltage=float(around.voltage))
         self.rows: list[Array] | None = None
         self._environment, self._seed = around, seed
-        self._equations, self._p = equations_of(vehicle), parameter_row(vehicle, around)
+        # A linear model's angles are small ones, and their rates its own.
+        self._equations = equations_of(vehicle if self.linear else tumbling(vehicle))
+        self._p = parameter_row(vehicle, around)
         self._limits = np.array(vehicle.input_limits).T
         self._substeps = round(PHYSICS_RATE / self.pilot.rate)
         self.period = self._substeps / PHYSICS_RATE
+        self._back = _steps_back(vehicle, self._substeps)
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
 
@@ -163,7 +179,9 @@ class World:
         self._target = np.array(self.trim.state[[0, 1, 2, 8]])
 
     def _fresh(self) -> Craft:
-        return Craft(np.array(self.trim.state), np.array(self.pilot.memory), np.array(self.trim.inputs))
+        inputs = np.array(self.trim.inputs)
+        past = np.tile(inputs, (1 + int(self._back.max()), 1))
+        return Craft(np.array(self.trim.state), past, np.array(self.pilot.memory), inputs)
 
     def set_mode(self, mode: Mode) -> None:
         """Another mode in flight: it begins where the aircraft is."""
@@ -179,7 +197,7 @@ class World:
         own = self._crafts["own"]
         self._crafts.pop("ghost", None)
         if on:
-            self._crafts["ghost"] = Craft(own.x.copy(), own.memory.copy(), own.inputs.copy())
+            self._crafts["ghost"] = Craft(own.x.copy(), own.past.copy(), own.memory.copy(), own.inputs.copy())
 
     def set_gusts(self, sigma: float) -> None:
         """Turbulence of a standard deviation [m/s] across the wind; none at zero."""
@@ -220,6 +238,9 @@ class World:
                 self.pilot.step,
                 self._substeps,
                 craft.x,
+                craft.x if self.linear else from_euler(craft.x),
+                craft.past,
+                self._back,
                 craft.memory,
                 wanted,
                 around,
@@ -229,7 +250,8 @@ class World:
                 self._limits,
                 1.0 / PHYSICS_RATE,
             )
-            craft.x, craft.memory, craft.inputs = (np.asarray(part) for part in found)
+            row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in found)
+            craft.x = row if self.linear else to_euler(row, craft.x)
         own = self._crafts["own"]
         self._check(own, before)
         if self.trouble:
@@ -321,6 +343,13 @@ class World:
         """Take over the switches of another world (a bar was put on or off)."""
         self.setting = replace(other.setting, sticks=dict(other.setting.sticks))
         self.reset()
+
+
+def _steps_back(vehicle: Vehicle, substeps: int) -> NDArray[np.int_]:
+    """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
+    late = delays_of(vehicle)
+    waits = np.array([round(late.get(name, 0.0) * PHYSICS_RATE) for name in vehicle.input_names], dtype=np.int_)
+    return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
 
 
 def _leans_too_far(x: Array) -> bool:

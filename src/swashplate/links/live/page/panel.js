@@ -156,9 +156,14 @@ export class Panel {
     this.told = key;
     $("job").replaceChildren();
     if (!job) return;
-    const [n, state, words, seconds] = job;
-    if (running) $("job").textContent = `identifying recording ${n}: ${seconds} s`;
-    else $("job").textContent = `recording ${n}: ${state === "done" ? `identified in ${seconds} s. ` : "failed. "}${words}`;
+    const [n, state, words, seconds, doing, share, left] = job;
+    if (running) {
+      const rest = left === null ? "" : `, about ${left} s left`;
+      $("job").textContent = `identifying recording ${n}: ${doing || "starting"}, ${seconds} s${rest} `;
+      const bar = document.createElement("progress");
+      if (share !== null) bar.value = share;
+      $("job").append(bar);
+    } else $("job").textContent = `recording ${n}: ${state === "done" ? `identified in ${seconds} s. ` : "failed. "}${words}`;
     if (state === "done") {
       const link = document.createElement("a");
       Object.assign(link, { href: `/report/${n}`, target: "_blank", rel: "noopener", textContent: " Open the report" });

@@ -1,0 +1,98 @@
+"""A vehicle whose attitude is a quaternion: it may pitch through the vertical, where Euler angles have no rates.
+
+Its equations are those of the vehicle: only the rates of roll, pitch and yaw are put aside, on which no other rate
+depends. States outside remain Euler angles; `from_euler` and `to_euler` change rows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.physics.backend import Backend, FloatBackend, Scalar
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector
+from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of, quaternion_rates
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.vehicles.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_FLOATS = FloatBackend()
+_PHI: Final = 6  # where attitude begins in a row
+_P: Final = 9  # and where the rates do
+
+
+class TumblingBody(NamedTuple):
+    """`RigidBody` with a quaternion in place of roll, pitch and yaw."""
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+    u: Scalar
+    v: Scalar
+    w: Scalar
+    q0: Scalar
+    q1: Scalar
+    q2: Scalar
+    q3: Scalar
+    p: Scalar
+    q: Scalar
+    r: Scalar
+
+
+def tumbling(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with a quaternion among its states. Its attitude must be kinematics, as all but linear models' is.
+
+    Only for compiled steps: its card, inputs and parameters are the vehicle's own, its states one more.
+    """
+    inner: Any = vehicle.derivatives
+    still: RigidBody = vehicle.state.body
+    body = TumblingBody._make((*still[:_PHI], 1.0, 0.0, 0.0, 0.0, *still[_P:]))
+    count = len(RigidBody._fields)
+    return replace(
+        vehicle,
+        state=vehicle.state._replace(body=body),
+        state_names=(*TumblingBody._fields, *vehicle.state_names[count:]),
+        state_units=(*vehicle.state_units[:_PHI], *("1",) * 4, *vehicle.state_units[_P:]),
+        derivatives=partial(_derivatives, inner.func, inner.args, **inner.keywords),
+    )
+
+
+def _derivatives(
+    free: Callable[..., Any],
+    args: tuple[Any, ...],
+    state: Any,
+    inputs: Any,
+    par: Any,
+    env: Environment,
+    xp: Backend,
+    **how: Any,
+) -> Any:
+    body: TumblingBody = state.body
+    rotation = Quaternion(body.q0, body.q1, body.q2, body.q3)
+    seen = RigidBody(*body[:_PHI], *euler_of(rotation, xp), body.p, body.q, body.r)
+    rates = free(*args, state._replace(body=seen), inputs, par, env, xp, **how)
+    turned = quaternion_rates(rotation, Vector(body.p, body.q, body.r))
+    return rates._replace(body=TumblingBody._make((*rates.body[:_PHI], *turned, *rates.body[_P:])))
+
+
+def from_euler(row: Array) -> Array:
+    """A state row of the vehicle as one of `tumbling`."""
+    rotation = quaternion_of(Euler(*row[_PHI : _PHI + 3].tolist()), _FLOATS)
+    return np.concatenate([row[:_PHI], rotation, row[_P:]])
+
+
+def to_euler(row: Array, before: Array) -> Array:
+    """A state row of `tumbling` as one of the vehicle, with roll and yaw counted on from `before`, a row of it."""
+    found = euler_of(Quaternion(*row[_PHI : _PHI + 4].tolist()), _FLOATS)
+    last = before[_PHI : _PHI + 3].tolist()
+    angles = [was + math.remainder(now - was, 2.0 * math.pi) for now, was in zip(found, last, strict=True)]
+    angles[1] = found.theta
+    return np.concatenate([row[:_PHI], angles, row[_PHI + 4 :]])
