@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from swashplate.control.matrices import Matrices
-from swashplate.control.observer import Estimate, Numbers, Plan, arriving, innovations_of, keeping, moving, runge_kutta
+from swashplate.control.matrices import Matrices, runge_kutta
+from swashplate.control.observer import Estimate, Numbers, Plan, arriving, innovations_of, keeping, moving
 
 
 def corrected_steadily(

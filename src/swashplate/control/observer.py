@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.matrices import Matrices, Scalars
+from swashplate.control.matrices import Matrices, runge_kutta
 from swashplate.control.sensor_suite import BIASED, Suite, biased, readings
 from swashplate.errors import ControllerError
 from swashplate.physics.backend import Backend
@@ -393,15 +393,3 @@ def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: S
         stored = [] if J is None else [J @ P]
         P = M.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
     return Estimate(M.stacked(mean), 0.5 * (P + P.T) + M.diagonal(numbers.process))
-
-
-def runge_kutta(rates: Scalars, x: Any, w: Any, dt: float, M: Matrices) -> Any:
-    """How far a classical Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
-
-    def stage(i: Any, carry: Any) -> Any:
-        k, total = carry
-        ahead, weight = M.chosen((0.0, 0.5, 0.5, 1.0), i) * dt, M.chosen((1 / 6, 1 / 3, 1 / 3, 1 / 6), i) * dt
-        k = M.value(rates, x + ahead * k, w)
-        return k, total + weight * k
-
-    return M.repeated(4, stage, (0.0 * x, 0.0 * x))[1]
