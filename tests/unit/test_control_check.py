@@ -10,6 +10,7 @@ import pytest
 import swashplate as sp
 from swashplate.control.autopilot import autopilot
 from swashplate.control.check import ControlCheck, check_controller
+from swashplate.control.check_gusts import fly_gusts
 from swashplate.control.lqg_analysis import analyse, sensitivity
 from swashplate.control.lqg_design import design
 from swashplate.control.requirements import BANDWIDTH, PHASE_MARGIN, REJECTION_PEAK, froude_scale
@@ -21,6 +22,7 @@ from swashplate.errors import SwashError
 from swashplate.reporting.control_check import compose_check
 from swashplate.simulation.closed_loop import REFERENCES, simulate_closed_loop
 from swashplate.simulation.trim import Trim
+from swashplate.simulation.wind import INDOOR, Gusts
 from swashplate.vehicles.vehicle import Vehicle
 
 
@@ -228,3 +230,21 @@ def test_rejection_with_an_observer(coax: Vehicle) -> None:
         assert left[late][-1] == pytest.approx(1.0, abs=0.05)
     assert left[40].max() > left[0].max() > 1.0
     assert sensitivity(told, w, "u") is None  # motion capture shows no speed
+
+
+def test_gusts_move_what_a_controller_holds_by_their_square(coax: Vehicle, hover: Trim, place: ControlCheck) -> None:
+    """The card's drag grows with the square: a tenth of the gusts moves a hundredth as far. No speed is held here."""
+    found = place.in_gusts
+    assert found is not None
+    assert found.gusts is INDOOR
+    assert 0.02 < found.place < 0.1
+    assert 0.0 < found.heading < 0.01
+    assert math.isnan(found.speed)
+    weak = Gusts((0.015, 0.015, 0.01), INDOOR.length, INDOOR.speed)
+    held, problems, notes = ("psi", "z", "x", "y"), list[str](), list[str]()
+    less = fly_gusts(coax, autopilot(coax, hover), hover, weak, held, 20.0, problems, notes)
+    assert less is not None
+    assert less.place / found.place == pytest.approx(0.01, rel=0.2)
+    assert fly_gusts(coax, autopilot(coax, hover), hover, None, held, 20.0, problems, notes) is None
+    assert not problems
+    assert not notes

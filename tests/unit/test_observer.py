@@ -76,9 +76,9 @@ def test_constant_gains_are_the_filters_after_a_long_time() -> None:
 def test_with_constant_gains_it_is_as_sure_as_it_may_be(tmp_path: Path) -> None:
     controller = with_steady_gain(made())
     found = trial(controller.vehicle, controller, duration=12.0, seeds=range(2), gusts=INDOOR)
-    for name in HIDDEN:
-        assert found.of(name).within >= 0.98, found
-        assert 0.5 < found.of(name).nees < 2.0, found
+    for state in found.states:  # attitude too, although offsets are unknown at the start
+        assert state.within >= 0.97, found
+        assert 0.5 < state.nees < 2.0, found
     assert np.sqrt(np.mean(found.place**2)) < 0.08
     save_controller(controller, tmp_path / "c.toml")
     again = read_controller(tmp_path / "c.toml")
@@ -183,18 +183,18 @@ def test_the_c_step_is_the_python_step(which: str, precision: str, tolerance: fl
     plan, gains = controller.plan, jnp.asarray(controller.gains)
 
     def in_python(memory: Any, measured: Any, reference: Any) -> Any:
-        numbers, feedback = numbers_from(plan, 1, gains)
+        M, (numbers, feedback) = JaxMatrices(), numbers_from(plan, 1, gains)
         after, commands = lqg_step(
             plan,
             numbers,
             feedback,
-            carried_from(plan, memory),
+            carried_from(plan, memory, M),
             measured[:-1, None],
             measured[-1],
             [reference[i] for i in range(8)],
-            JaxMatrices(),
+            M,
         )
-        return carried_row(after), jnp.stack(commands)
+        return carried_row(after, M), jnp.stack(commands)
 
     step = jax.jit(in_python, compiler_options=QUICK_TO_COMPILE)
     random, N = np.random.default_rng(0), len(plan.names)

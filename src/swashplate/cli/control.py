@@ -158,9 +158,13 @@ def design(
     )
     found = [analyse(made, at=i, where=model) for i in range(len(speeds))]
     if gain is Gain.STEADY:
-        from swashplate.control.steady_observer import with_steady_gain
+        from dataclasses import replace
+
+        from swashplate.control.steady_observer import steady_sigmas, with_steady_gain
 
         made = with_steady_gain(made)
+        kept = dict(zip(made.plan.names, map(float, steady_sigmas(made)), strict=True))
+        found = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in found]
     code = None
     if c_code is not None:
         from swashplate.export.controller_c import controller_code

@@ -46,10 +46,13 @@ def check(
     speed: Annotated[float, typer.Option("--speed", help="Speed ahead of the steady flight [m/s].")] = 0.0,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage [V].")] = None,
     duration: Annotated[float, typer.Option("--duration", help="Of each step [s].", min=5.0, max=300.0)] = 20.0,
+    gusts: Annotated[
+        str, typer.Option("--gusts", help="Turbulence to hold against: none, indoor, or Dryden's at a mean wind [m/s].")
+    ] = "indoor",
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Judge a controller on a model: margins, disturbance rejection, handling qualities, steps, cross-coupling.
+    """Judge a controller on a model: margins, disturbance rejection, handling qualities, steps, coupling, gusts.
 
     Exit code 2 where the loop does not stand; what could be found is written and marked.
     """
@@ -58,17 +61,26 @@ def check(
     import swashplate as sp
     from swashplate.cli.console import as_json
     from swashplate.cli.flying import end_with
+    from swashplate.cli.monte_carlo import turbulence
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.cli.simulate import from_file
     from swashplate.control.check import check_controller
 
+    blowing = turbulence(gusts)
     vehicle = given.vehicle_of(model, None, None)
     nominal = vehicle.card.values().get("voltage_nominal")
     trim = sp.trim(vehicle, speed=speed, voltage=nominal if voltage is None else voltage)
     made = from_file(controller)(vehicle, trim)
     with folder_when_complete(out, ours=OURS) as folder:
         found = check_controller(
-            vehicle, made, trim, task=task.value, command=response.value, scale=scale, duration=duration
+            vehicle,
+            made,
+            trim,
+            task=task.value,
+            command=response.value,
+            scale=scale,
+            duration=duration,
+            gusts=blowing,
         )
         document = as_document(found, controller=controller.name)
         if folder is not None:
@@ -89,6 +101,7 @@ def check(
 def as_document(check: ControlCheck, *, controller: str) -> dict[str, Any]:
     """The check as what becomes JSON."""
     import math
+    from dataclasses import asdict
 
     from swashplate.control.requirements import ATTITUDE_COUPLING, GAIN_MARGIN, PHASE_MARGIN, REJECTION_PEAK
 
@@ -150,6 +163,7 @@ def as_document(check: ControlCheck, *, controller: str) -> dict[str, Any]:
             for s in check.steps
         },
         "couplings": {c.name: {"value": c.value, "unit": c.unit, "level": c.level} for c in check.couplings},
+        "in_gusts": None if check.in_gusts is None else asdict(check.in_gusts),
         "boundaries": [
             {
                 "name": b.name,
@@ -214,6 +228,20 @@ def _tables(check: ControlCheck) -> None:
                 [(c.name, shown(c.value), c.unit, level(c.level)) for c in check.couplings],
             )
         )
+    if (blown := check.in_gusts) is not None:
+        held = [
+            f"{name} {shown(factor * value)} {unit}"
+            for name, value, factor, unit in (
+                ("place", blown.place, 1e3, "mm"),
+                ("speed", blown.speed, 1.0, "m/s"),
+                ("height", blown.height, 1e3, "mm"),
+                ("heading", blown.heading, math.degrees(1.0), "deg"),
+                ("lean", blown.lean, math.degrees(1.0), "deg"),
+            )
+            if math.isfinite(value)
+        ]
+        sigma = max(blown.gusts.sigma)
+        typer.echo(f"\nin gusts of {sigma:.2g} m/s, {blown.flights} flights, RMS: {', '.join(held)}")
     for note in check.notes:
         typer.echo(f"\n{note}")
     typer.echo("\nLevels by boundaries that were not checked against the standards' text: provisional.")

@@ -137,6 +137,7 @@ def simulate(
                 vary=vary,
                 payload=payload,
                 delay=delay,
+                model=given.linear_model(vehicle),
             )
             paths = _save(worst, out)
         if not quiet:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.control.check_gusts import InGusts, fly_gusts
 from swashplate.control.check_steps import COUPLING_WITHIN, STEPS, Coupling, Step, couplings_of, fly_steps
 from swashplate.control.lqg import Lqg
 from swashplate.control.lqg_analysis import analyse, sensitivity
@@ -28,6 +29,7 @@ from swashplate.errors import ControllerError, IdentificationError, SwashError
 from swashplate.identification.handling import Handling, handling_qualities
 from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim
+from swashplate.simulation.wind import INDOOR, Gusts
 from swashplate.vehicles.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -118,6 +120,7 @@ class ControlCheck:
         margins: None for a loop that does not stand.
         omega, opened: the loop opened at the inputs, for the plots; empty with an observer.
         notes: what is not told here, and why.
+        in_gusts: how far it strays in turbulence; None where none was flown.
     """
 
     vehicle: Vehicle
@@ -135,6 +138,7 @@ class ControlCheck:
     couplings: tuple[Coupling, ...]
     problems: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    in_gusts: InGusts | None = None
 
     @property
     def slowest(self) -> complex:
@@ -156,6 +160,7 @@ def check_controller(
     command: Command = "auto",
     scale: float | None = None,
     duration: float = 20.0,
+    gusts: Gusts | None = INDOOR,
     points: int = 600,
 ) -> ControlCheck:
     """Judge a controller about a trim.
@@ -168,7 +173,8 @@ def check_controller(
         command: type of the attitude response. "rate" counts the lower of the two bandwidths, "attitude" that by
             phase; "auto" takes it for attitude where the phase at a tenth of the bandwidth is above -60 degrees.
         scale: of the Froude scaling; by default the UH-60's rotor radius over the vehicle's.
-        duration: of the steps [s].
+        duration: of the steps and of the flights in gusts [s].
+        gusts: the turbulence of those flights; None for none.
         points: of the frequency grid.
 
     Raises:
@@ -180,7 +186,7 @@ def check_controller(
         raise SwashError(f"is {duration:g} s, expected more than {COUPLING_WITHIN:g} s.", channel="duration")
     n = scale if scale is not None else _scale_of(vehicle)
     if isinstance(controller, Lqg) and controller.plan.sensors:
-        return _observed(vehicle, controller, trim, n, task, duration)
+        return _observed(vehicle, controller, trim, n, task, duration, gusts)
     behind = isinstance(controller, ObservedAutopilot)
     loop = sampled_loop(
         vehicle, controller.autopilot if isinstance(controller, ObservedAutopilot) else controller, trim
@@ -194,6 +200,8 @@ def check_controller(
         problems.append(f"No margins: {error.problem}")
     answered = [r for r, (s, _, _) in STEPS.items() if s in loop.states and loop.answers(r, s)]
     steps = fly_steps(vehicle, controller, trim, answered, duration, problems)
+    notes = [_FED] if behind else []
+    blown = fly_gusts(vehicle, controller, trim, gusts, answered if margins else (), duration, problems, notes)
     return ControlCheck(
         vehicle=vehicle,
         trim=trim,
@@ -211,11 +219,14 @@ def check_controller(
         steps=tuple(steps),
         couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
-        notes=(_FED,) if behind else (),
+        notes=tuple(notes),
+        in_gusts=blown,
     )
 
 
-def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task: str, duration: float) -> ControlCheck:
+def _observed(
+    vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task: str, duration: float, gusts: Gusts | None
+) -> ControlCheck:
     """A controller with an observer: its margins by its own analysis, its steps with noisy sensors."""
     speeds = np.asarray(controller.feedback.speeds)
     at = int(np.argmin(np.abs(speeds - trim.speed)))
@@ -224,7 +235,9 @@ def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task:
     left = {state: sensitivity(controller, w, state, at=at) for state in _DISTURBED}
     held = ("x", "y") if float(controller.feedback.place) > 0.5 else ("ahead", "right")
     problems: list[str] = []
-    steps = fly_steps(vehicle, controller, trim, ["psi", "z", *held], duration, problems)
+    answered, notes = ["psi", "z", *held], [_OBSERVED]
+    steps = fly_steps(vehicle, controller, trim, answered, duration, problems)
+    blown = fly_gusts(vehicle, controller, trim, gusts, answered, duration, problems, notes)
     nothing = np.zeros(0)
     return ControlCheck(
         vehicle=vehicle,
@@ -241,7 +254,8 @@ def _observed(vehicle: Vehicle, controller: Lqg, trim: Trim, scale: float, task:
         steps=tuple(steps),
         couplings=tuple(couplings_of({step.reference: step for step in steps})),
         problems=tuple(problems),
-        notes=(_OBSERVED,),
+        notes=tuple(notes),
+        in_gusts=blown,
     )
 
 

@@ -27,7 +27,7 @@ STEPS: Mapping[str, tuple[str, str, float]] = {
     "right": ("v", "", 0.5),
 }
 """Steps by reference: the state that answers, its measured rate, and the size [rad, m, m/s, share of the stick]."""
-_LEAD = 0.5
+LEAD = 0.5
 """Seconds of rest before a step."""
 _PHYSICS = 500.0
 """Least rate of the simulation [Hz]."""
@@ -56,6 +56,11 @@ class Coupling:
     level: int | None
 
 
+def flying_rate(controller: Controller) -> float:
+    """Rate of the simulation [Hz]: a whole multiple of the controller's."""
+    return controller.rate * max(1, round(_PHYSICS / controller.rate))
+
+
 def fly_steps(
     vehicle: Vehicle,
     controller: Controller,
@@ -72,9 +77,9 @@ def fly_steps(
         duration: after the step [s].
         problems: a lost flight is told here.
     """
-    rate = controller.rate * max(1, round(_PHYSICS / controller.rate))
-    samples = round((_LEAD + duration) * rate) + 1
-    on = np.arange(samples) / rate >= _LEAD
+    rate = flying_rate(controller)
+    samples = round((LEAD + duration) * rate) + 1
+    on = np.arange(samples) / rate >= LEAD
     at_rest = trim.states()
     found = []
     for reference, (state, measured_rate, size) in STEPS.items():
@@ -84,7 +89,7 @@ def fly_steps(
             flight = simulate_closed_loop(
                 vehicle,
                 controller,
-                duration=_LEAD + duration,
+                duration=LEAD + duration,
                 reference={reference: at_rest.get(reference, 0.0) + size * on},
                 start=trim,
                 rate=rate,
@@ -120,7 +125,7 @@ def couplings_of(steps: Mapping[str, Step]) -> list[Coupling]:
         if step is None:
             continue
         t = step.flight.time(on)
-        part = (t >= _LEAD) & (t <= _LEAD + COUPLING_WITHIN)
+        part = (t >= LEAD) & (t <= LEAD + COUPLING_WITHIN)
         value = factor * cross_ratio(step.flight.values(on)[part], step.flight.values(off)[part])
         level = ATTITUDE_COUPLING.level(value) if unit == "deg/deg" else None
         found.append(Coupling(f"{name} (step of {step.reference})", value, unit, level))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from swashplate.control.matrices import Matrices
+from swashplate.control.matrices import Matrices, runge_kutta
 from swashplate.control.observer import Estimate, Numbers, Plan, arriving, innovations_of, keeping, moving
 
 
@@ -33,13 +33,5 @@ def predicted_steadily(
     xp, dt, e = M.xp, plan.dt, estimate.mean
     if any(at.kept for at in plan.sampling):
         e = M.value(lambda e, w: keeping(plan, numbers, e, w, xp), e, M.column([*M.scalars(w), *taken]))
-    begin = e
-
-    def stage(i: Any, carry: Any) -> Any:
-        k, total = carry
-        ahead, weight = M.chosen((0.0, 0.5, 0.5, 1.0), i) * dt, M.chosen((1 / 6, 1 / 3, 1 / 3, 1 / 6), i) * dt
-        k = M.value(lambda e, w: moving(plan, numbers, e, w, xp), begin + ahead * k, w)
-        return k, total + weight * k
-
-    zero = 0.0 * begin
-    return Estimate(begin + M.repeated(4, stage, (zero, zero))[1], estimate.covariance)
+    step = runge_kutta(lambda e, w: moving(plan, numbers, e, w, xp), e, w, dt, M)
+    return Estimate(e + step, estimate.covariance)

@@ -61,10 +61,11 @@ def _shares(speed: Any, speeds: Sequence[Any], xp: Backend) -> list[Any]:
     return shares
 
 
-def _mixed(shares: Sequence[Any], table: Any) -> Any:
-    total = shares[0] * table[0]
-    for share, row in zip(shares[1:], table[1:], strict=True):
-        total = total + share * row
+def _mixed(shares: Sequence[Any], rows: Sequence[Sequence[Any]]) -> list[Any]:
+    """Weighted sum of the trims' rows, number by number."""
+    total = [shares[0] * value for value in rows[0]]
+    for share, row in zip(shares[1:], rows[1:], strict=True):
+        total = [value + share * more for value, more in zip(total, row, strict=True)]
     return total
 
 
@@ -105,7 +106,9 @@ def lqr_law(
     asked = asked + _limited(cruise + ahead - asked, -f.pace * dt, f.pace * dt, xp)
     speeds = [f.speeds[i] for i in range(f.speeds.shape[0])]
     now, wanted = _shares(here["u"], speeds, xp), _shares(asked, speeds, xp)
-    trim_x, trim_u = _mixed(wanted, f.states), _mixed(wanted, f.inputs)
+    trim_x, trim_u = (
+        _mixed(wanted, [[row[j] for j in range(table.shape[1])] for row in table]) for table in (f.states, f.inputs)
+    )
     beyond = asked - _limited(asked, speeds[0], speeds[-1], xp)
 
     c, s = xp.cos(here["psi"]), xp.sin(here["psi"])
@@ -126,7 +129,7 @@ def lqr_law(
     ]
     held = [late[i] - trim_u[j] for i, j in enumerate(late_of)]
     deviation = M.column([*(away[name] for name in names), *held, *sums])
-    pushed = M.scalars(_mixed(now, f.gains) @ deviation)
+    pushed = _mixed(now, [M.scalars(gain @ deviation) for gain in f.gains])
     commands, fits = [], 1.0
     for j, push in enumerate(pushed):
         whole = trim_u[j] - push + f.battery[j] * (f.voltage - voltage)

@@ -30,7 +30,20 @@ class Matrices(Protocol):
     def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]: ...
     def repeated(self, count: int, body: Callable[[Any, Any], Any], start: Any, /) -> Any: ...
     def chosen(self, values: Sequence[float], i: Any, /) -> Any: ...
-    def row(self, matrix: Any, i: Any, /) -> Any: ...
+    def stacked(self, parts: Sequence[Any], /) -> Any: ...
+    def diagonal(self, values: Any, /) -> Any: ...
+
+
+def runge_kutta(rates: Scalars, x: Any, w: Any, dt: float, M: Matrices) -> Any:
+    """How far a classical Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
+
+    def stage(i: Any, carry: Any) -> Any:
+        k, total = carry
+        ahead, weight = M.chosen((0.0, 0.5, 0.5, 1.0), i) * dt, M.chosen((1 / 6, 1 / 3, 1 / 3, 1 / 6), i) * dt
+        k = M.value(rates, x + ahead * k, w)
+        return k, total + weight * k
+
+    return M.repeated(4, stage, (0.0 * x, 0.0 * x))[1]
 
 
 class JaxMatrices:
@@ -65,5 +78,21 @@ class JaxMatrices:
     def chosen(self, values: Sequence[float], i: Any, /) -> Any:
         return jnp.asarray(values)[i]
 
-    def row(self, matrix: Any, i: Any, /) -> Any:
-        return jax.lax.dynamic_slice_in_dim(matrix, i, 1, 0)
+    def row(self, scalars: Sequence[Any], /) -> Any:
+        """Scalars side by side."""
+        return self.column(scalars)[:, 0]
+
+    def matrix(self, row: Any, rows: int, columns: int, /) -> Any:
+        """A matrix from a row of its entries, row after row; `flat` is the way back."""
+        return row.reshape(rows, columns)
+
+    def flat(self, matrix: Any, /) -> Any:
+        return matrix.ravel()
+
+    def stacked(self, parts: Sequence[Any], /) -> Any:
+        """One above the other."""
+        return jnp.concatenate(parts, axis=0)
+
+    def diagonal(self, values: Any, /) -> Any:
+        """A matrix of a row's values."""
+        return jnp.eye(len(values)) * values

@@ -3,8 +3,8 @@
 Estimated are the vehicle's states, six disturbing accelerations (first-order Gauss-Markov: gusts, and what the model
 does not know), the sensors' biases, and, for sensors whose readings arrive late, the readings at the time they were
 taken (Roumeliotis and Burdick 2002, stochastic cloning), so that a late reading corrects the past that it belongs to.
-Prediction is one Runge-Kutta step whose Jacobian is the product of the stages' exact ones; the update takes one scalar
-after the other and inverts no matrix (Bar-Shalom, Li and Kirubarajan 2001, secs 5.2, 7.4).
+The mean moves by a Runge-Kutta step, the covariance by the exponential of the exact Jacobian in the step's middle;
+the update eliminates reading after reading and inverts no matrix (Bar-Shalom, Li and Kirubarajan 2001, secs 5.2, 7.4).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.matrices import Matrices
+from swashplate.control.matrices import Matrices, runge_kutta
 from swashplate.control.sensor_suite import BIASED, Suite, biased, readings
 from swashplate.errors import ControllerError
 from swashplate.physics.backend import Backend
@@ -322,20 +322,32 @@ def corrected(
         M: the operations.
     """
     xp = M.xp
-    expected, H = M.linearised(lambda e, w: arriving(plan, numbers, e, w, xp), estimate.mean, w)
-    heard = M.column([flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels])
-    away = innovations_of(plan, y, expected, M)
-    innovations, noise = M.column(away), M.column([numbers.measurement[i] for i in range(len(away))])
+    flags = [flag for flag, sensor in zip(due, plan.sensors, strict=True) for _ in sensor.channels]
+    m, first = len(flags), plan.inputs + 1
 
-    def channel(i: Any, carry: Any) -> Any:
-        e, P = carry
-        row = M.row(H, i)
-        spread = P @ row.T
-        gain = spread * (M.row(heard, i) / (row @ spread + M.row(noise, i)))
-        return e + gain * (M.row(innovations, i) - row @ (e - estimate.mean)), P - gain @ spread.T
+    def heard(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+        """What arrives now; zero, whatever is estimated, of what does not."""
+        now = arriving(plan, numbers, e, w[:first], xp)
+        return [flag * value for flag, value in zip(w[first:], now, strict=True)]
 
-    after = M.repeated(len(away), channel, (estimate.mean, estimate.covariance))
-    return Estimate(*after), innovations, H @ estimate.covariance @ H.T + np.eye(len(away)) * noise
+    expected, H = M.linearised(heard, estimate.mean, M.column([*M.scalars(w), *flags]))
+    innovations = M.column(innovations_of(plan, M.column(flags) * y, expected, M))
+    together = H @ estimate.covariance
+    spread = H @ together.T + M.diagonal(numbers.measurement)
+    # Rows of [S | H P | innovation] without those above them, the pivots' roots taken out: a Cholesky factor L of S
+    # and behind it L^-1 H P and L^-1 times the innovation, in which the update is a plain product.
+    left, rows = M.stacked([spread, together.T, innovations.T]).T, []
+    for i in range(m):
+        (pivot,) = M.scalars(left[:1, :1])
+        row = left[:1, :] * (1.0 / xp.sqrt(pivot))
+        rows.append(row[:, m - i :])
+        if i + 1 < m:
+            left = left[1:, 1:] - row[:, 1 : m - i].T @ row[:, 1:]
+    known = M.stacked(rows)
+    N = len(plan.names)
+    told, news = known[:, :N], known[:, N:]
+    after = Estimate(estimate.mean + told.T @ news, estimate.covariance - told.T @ told)
+    return after, innovations, spread
 
 
 def innovations_of(plan: Plan, y: Any, expected: Any, M: Matrices) -> list[Any]:
@@ -356,24 +368,28 @@ def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: S
         taken: per sensor 1 where it takes a reading now.
     """
     xp, dt = M.xp, plan.dt
-    e, P = estimate
+    begin, P = estimate
+    moves, own = plan.n + len(DISTURBED), plan.n + len(DISTURBED) + len(plan.biases)
+
+    def rates(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+        return moving(plan, numbers, e, w, xp)
+
+    x = begin[:moves, :]
+    moved = runge_kutta(rates, x, w, dt, M)
+    _, A = M.linearised(rates, x + 0.5 * moved, w)
+    identity = np.eye(moves)
+    F = identity + (0.25 * dt) * A
+    for share in (1.0 / 3.0, 0.5, 1.0):
+        F = identity + ((share * dt) * A) @ F
+    mean, stored, J = [x + moved, begin[moves:own, :]], [], None
     if any(at.kept for at in plan.sampling):
-        with_flags = M.column([*M.scalars(w), *taken])
-        e, G = M.linearised(lambda e, w: keeping(plan, numbers, e, w, xp), e, with_flags)
-        P = G @ P @ G.T
-    begin, identity = e, np.eye(len(plan.names))
 
-    def stage(i: Any, carry: Any) -> Any:
-        """Classical Runge-Kutta; `D` is the derivative of the stage's rate by the first state."""
-        k, D, total, slope = carry
-        ahead, weight = M.chosen((0.0, 0.5, 0.5, 1.0), i) * dt, M.chosen((1 / 6, 1 / 3, 1 / 3, 1 / 6), i) * dt
-        k, A = M.linearised(lambda e, w: moving(plan, numbers, e, w, xp), begin + ahead * k, w)
-        D = A @ (identity + ahead * D)
-        return k, D, total + weight * k, slope + weight * D
+        def kept(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
+            return keeping(plan, numbers, e, w, xp)[own:]
 
-    zero, flat = 0.0 * begin, 0.0 * P
-    _, _, moved, slope = M.repeated(4, stage, (zero, flat, zero, flat))
-    F = identity + slope
-    P = F @ P @ F.T
-    P = 0.5 * (P + P.T) + np.eye(len(plan.names)) * numbers.process
-    return Estimate(begin + moved, P)
+        readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))
+        mean.append(readings)
+    for _ in range(2):  # the moved states' rows, the offsets', the kept readings'; then the same from the other side
+        stored = [] if J is None else [J @ P]
+        P = M.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
+    return Estimate(M.stacked(mean), 0.5 * (P + P.T) + M.diagonal(numbers.process))

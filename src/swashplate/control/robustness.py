@@ -47,7 +47,7 @@ def draw_models(
     Raises:
         ControllerError: where the file is no fit, or its covariance lies mostly outside the bounds of physics.
     """
-    document = fit.as_dict() if isinstance(fit, Fit) else _document(fit)
+    document = fit.as_dict() if isinstance(fit, Fit) else read_fit(fit, kind="fit", writer="swash identify")
     names = [str(name) for name in document["names"]]
     estimates = {entry["name"]: entry for entry in document["parameters"]}
     mean = np.array([estimates[name]["value"] for name in names])
@@ -56,22 +56,9 @@ def draw_models(
         np.array([default if (bound := getattr(vehicle.card.parameters[n], side)) is None else bound for n in names])
         for side, default in (("lower", -np.inf), ("upper", np.inf))
     )
-    random = np.random.default_rng(seed)
-    scale = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    found = np.empty((0, len(names)))
-    for _ in range(_TRIES):
-        tried = mean + random.standard_normal((count, len(names))) @ root.T
-        found = np.concatenate([found, tried[np.all((tried >= low) & (tried <= high), axis=1)]])[:count]
-        if len(found) == count:
-            break
-    else:
-        raise ControllerError(
-            f"only {len(found)} of {count * _TRIES} draws lie within the bounds of physics.",
-            where=vehicle.card.path or vehicle.name,
-            hint="The fit knows too little; fix parameters or add data.",
-        )
+    found = normal_within(
+        mean, covariance, low, high, count=count, seed=seed, where=str(vehicle.card.path or vehicle.name)
+    )
     drawn = {name: found[:, i] for i, name in enumerate(names)}
     for name, entry in estimates.items():
         if entry.get("tie") in drawn:
@@ -79,15 +66,61 @@ def draw_models(
     return drawn
 
 
-def _document(path: str | Path) -> dict[str, Any]:
+def normal_within(
+    mean: Array, covariance: Array, low: Array, high: Array, *, count: int, seed: int, where: str
+) -> Array:
+    """Normal draws, shape (count, n); one outside the bounds is drawn again.
+
+    Args:
+        mean, low, high: shape (n,).
+        covariance: shape (n, n).
+        count, seed: of the draws.
+        where: named in the message.
+
+    Raises:
+        ControllerError: where the distribution lies mostly outside the bounds.
+    """
+    random = np.random.default_rng(seed)
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    found = np.empty((0, len(mean)))
+    for _ in range(_TRIES):
+        tried = mean + random.standard_normal((count, len(mean))) @ root.T
+        found = np.concatenate([found, tried[np.all((tried >= low) & (tried <= high), axis=1)]])[:count]
+        if len(found) == count:
+            return found
+    raise ControllerError(
+        f"only {len(found)} of {count * _TRIES} draws lie within the bounds of physics.",
+        where=where,
+        hint="The fit knows too little; fix parameters or add data.",
+    )
+
+
+def read_fit(path: str | Path, *, kind: str, writer: str) -> dict[str, Any]:
+    """The document of a fit.json.
+
+    Args:
+        path: the file.
+        kind: what it must be.
+        writer: the command that writes such files.
+
+    Raises:
+        ControllerError: where it cannot be read or is something else.
+    """
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ControllerError("there is no such file.", where=path, hint="Check the path.") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise ControllerError(f"cannot be read as a fit: {error}.", where=path) from None
-    if not isinstance(document, dict) or document.get("kind") != "fit":
-        raise ControllerError("is no fit.", where=path, hint="`swash identify --out DIR` writes DIR/fit.json.")
+    if not isinstance(document, dict) or document.get("kind") != kind:
+        found = document.get("kind") if isinstance(document, dict) else None
+        raise ControllerError(
+            f"is no fit of this model's kind (found {found!r}, expected '{kind}').",
+            where=path,
+            hint=f"`{writer} --out DIR` writes DIR/fit.json.",
+        )
     return document
 
 

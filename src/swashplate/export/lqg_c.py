@@ -65,8 +65,15 @@ class CasadiMatrices:
     def chosen(self, values: Sequence[float], i: Any, /) -> Any:
         return values[i]
 
-    def row(self, matrix: Any, i: Any, /) -> Any:
-        return matrix[i, :]
+    def stacked(self, parts: Sequence[Any], /) -> Any:
+        import casadi
+
+        return casadi.vertcat(*parts)
+
+    def diagonal(self, values: Any, /) -> Any:
+        import casadi
+
+        return casadi.diag(casadi.DM(np.asarray(values)))
 
 
 def lqg_function(controller: Lqg) -> Any:

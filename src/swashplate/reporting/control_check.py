@@ -54,7 +54,15 @@ def control_report(check: ControlCheck, *, path: str | os.PathLike[str], title: 
 
 def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
     """The report's structure."""
-    sections = [_loops(check), _rejection(check), _handling(check), _steps(check), _boundaries(check), _made(check)]
+    sections = [
+        _loops(check),
+        _rejection(check),
+        _handling(check),
+        _steps(check),
+        _gusts(check),
+        _boundaries(check),
+        _made(check),
+    ]
     slowest = check.slowest
     words = f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s, at {check.rate:g} Hz"
     return Report(
@@ -107,7 +115,7 @@ def _margins_line(check: ControlCheck) -> tuple[str, str]:
 
 def _rejection_line(check: ControlCheck) -> tuple[str, str]:
     if not check.rejections:
-        return ("not computed with an observer." if check.notes else "no state is held."), "plain"
+        return ("not computed with an observer." if not check.omega.size else "no state is held."), "plain"
     worst = max(check.rejections, key=lambda r: r.peak)
     levels = [x for r in check.rejections for x in (r.level, r.peak_level) if x is not None]
     names = listed([r.state for r in check.rejections], most=8)
@@ -117,7 +125,9 @@ def _rejection_line(check: ControlCheck) -> tuple[str, str]:
 def _handling_line(check: ControlCheck) -> tuple[str, str]:
     rows = [(a, a.handling) for a in check.attitudes if a.handling]
     if not rows:
-        return ("not computed with an observer." if check.notes else "no bandwidth could be read off."), "caution"
+        return (
+            "not computed with an observer." if not check.omega.size else "no bandwidth could be read off."
+        ), "caution"
     words = [
         f"{figures.ATTITUDE_WORDS[a.state]} {h.bandwidth.value:.3g} rad/s, Level {a.level or '–'}" for a, h in rows
     ]
@@ -242,6 +252,30 @@ def _steps(check: ControlCheck) -> Section | None:
     )
     steps = Table("Steps", columns, tuple(rows), note=note)
     return Section("steps", "Steps and cross-coupling", (steps, figures.steps_figure(check), couplings))
+
+
+def _gusts(check: ControlCheck) -> Section | None:
+    blown = check.in_gusts
+    if blown is None:
+        return None
+    rows = tuple(
+        (Cell(name), _number(factor * value), Cell(unit))
+        for name, value, factor, unit in (
+            ("place, level", blown.place, 1e3, "mm"),
+            ("speed, level", blown.speed, 1.0, "m/s"),
+            ("height", blown.height, 1e3, "mm"),
+            ("heading", blown.heading, math.degrees(1.0), "°"),
+            ("roll and pitch together", blown.lean, math.degrees(1.0), "°"),
+        )
+        if math.isfinite(value)
+    )
+    along, across, down = blown.gusts.sigma
+    note = (
+        f"{counted(blown.flights, 'flight')} of {blown.duration:g} s on the nonlinear vehicle in Dryden turbulence of "
+        f"{along:.2g}, {across:.2g} and {down:.2g} m/s (along, across, down; no mean wind), the first 2 s left out."
+    )
+    table = Table("Root mean square of what it strays by", ("of", "RMS", "unit"), rows, note=note)
+    return Section("gusts", "In gusts", (table,))
 
 
 def _boundaries(check: ControlCheck) -> Section:

@@ -47,7 +47,8 @@ class Controller(Protocol):
         gains: its numbers, a row, so that other gains compile nothing anew.
         step: a module's function `(memory, time, measured, reference, gains) -> (memory, inputs)`; `measured` is the
             vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it. A step with
-            an attribute `feels` that is true is given the specific force at the centre of gravity between the two.
+            an attribute `feels` that is true is given the specific force at the centre of gravity between the two; one
+            with `stacks` that is true takes and gives columns of many vehicles too, shape (rows, vehicles).
     """
 
     @property

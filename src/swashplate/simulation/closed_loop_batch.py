@@ -35,7 +35,7 @@ from swashplate.vehicles.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 BLOCK = 256
-"""Vehicles per block; each block keeps one core busy."""
+"""Vehicles per block, where the controller's step does not say how many (`block`); a block keeps one core busy."""
 
 
 def simulate_closed_loops(
@@ -46,6 +46,7 @@ def simulate_closed_loops(
     size: int,
     parameters: Mapping[str, ArrayLike] | None = None,
     reference: Mapping[str, ArrayLike] | None = None,
+    excitation: Mapping[str, ArrayLike] | None = None,
     wind: Mapping[str, ArrayLike] | None = None,
     voltage: ArrayLike | None = None,
     noise: Mapping[str, float] | None = None,
@@ -65,6 +66,7 @@ def simulate_closed_loops(
         size: number of vehicles.
         parameters: numbers of the card by name, shape (size,) each.
         reference: as in `simulate_closed_loop`, numbers or series (n,) at the controller's rate, the same for all.
+        excitation: series (n,) by input name at the controller's rate, added to every vehicle's commands.
         wind, voltage: numbers, series (n,) or (n, size) at the controller's rate, held between samples.
         noise: standard deviation of the white noise on a measured state, by its name [its unit].
         delay: of each vehicle's commands on their way to the actuators [s], a number or shape (size,); to the nearest
@@ -97,6 +99,7 @@ def simulate_closed_loops(
     wanted = np.stack(
         [_series(n, (reference or {}).get(n, states.get(n, 0.0)), samples, 1)[:, 0] for n in REFERENCES], 1
     )
+    added = np.stack([_series(n, (excitation or {}).get(n, 0.0), samples, 1)[:, 0] for n in vehicle.input_names], 1)
     p = np.repeat(parameter_row(vehicle, surroundings)[:, None], size, axis=1)
     for name, values in (parameters or {}).items():
         if name not in vehicle.parameter_names:
@@ -110,9 +113,10 @@ def simulate_closed_loops(
     for name, value in (noise or {}).items():
         sigma[vehicle.index(name)] = value
 
+    count = min(size, getattr(controller.step, "block", BLOCK))
+
     def block(first: int) -> tuple[Array, Array]:
-        part = slice(first, min(first + BLOCK, size))
-        count = part.stop - first
+        part = np.minimum(first + np.arange(count), size - 1)  # of one size all, so that one program flies them
         key = jax.random.fold_in(jax.random.key(seed), first)
         fly = _fly_many_quickly_compiled if getattr(controller.step, "feels", False) else _fly_many
         found = fly(
@@ -127,6 +131,7 @@ def simulate_closed_loops(
             np.asarray(controller.gains),
             around if around.shape[2] == 1 else around[:, :, part],
             wanted,
+            added,
             p[:, part],
             np.array(vehicle.input_limits).T[:, :, None],
             sigma[:, None],
@@ -138,8 +143,8 @@ def simulate_closed_loops(
         return np.asarray(found[0]), np.asarray(found[1])
 
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        parts = list(threads.map(block, range(0, size, BLOCK)))
-    flown, inputs = (np.concatenate([part[i] for part in parts], axis=2) for i in (0, 1))
+        parts = list(threads.map(block, range(0, size, count)))
+    flown, inputs = (np.concatenate([part[i] for part in parts], axis=2)[:, :, :size] for i in (0, 1))
     kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
     rows = np.concatenate([inputs, kept], axis=1)
     return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
@@ -175,6 +180,7 @@ def _flying_many(
     gains: Any,
     around: Any,
     wanted: Any,
+    added: Any,
     p: Any,
     limits: Any,
     sigma: Any,
@@ -187,7 +193,9 @@ def _flying_many(
     flying: Any = jax.vmap(
         lambda x, w, p: rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt), in_axes=(1, 1, 1), out_axes=1
     )
-    deciding: Any = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
+    deciding: Any = control
+    if not getattr(control, "stacks", False):
+        deciding = jax.vmap(control, in_axes=(1, None, 1, None, None), out_axes=1)
     voltage = SURROUNDINGS.index("voltage")
 
     feels = getattr(control, "feels", False)
@@ -198,9 +206,9 @@ def _flying_many(
         ago = jnp.clip(-((j - late) // substeps), 0, waiting)
         return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
 
-    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any]) -> tuple[Any, Any]:
+    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
         x, memory, sent, k = carry
-        surroundings, reference = now
+        surroundings, reference, excited = now
         measured = x
         if noisy:
             measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
@@ -208,7 +216,7 @@ def _flying_many(
         felt = [feeling(x, jnp.concatenate([acting, surroundings]), p)] if feels else []
         measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
-        inputs = jnp.clip(command, limits[0], limits[1])
+        inputs = jnp.clip(command + excited[:, None], limits[0], limits[1])
         if not waiting:
             w = jnp.concatenate([inputs, surroundings])
             after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
@@ -225,7 +233,7 @@ def _flying_many(
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
         return carry, (x[0], inputs[0])
 
-    tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted))
+    tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted, added))
     sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
     _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), sent, 0), tables)
     return record  # type: ignore[no-any-return]
