@@ -148,6 +148,7 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     assert "the flight has no such channel" in one_message(
         swash("respond", flown, "--inputs", "stick", "--outputs", "p")
     )
+    assert "Did you mean 'mixer_roll'?" in one_message(swash("respond", flown, "--inputs", "roll", "--outputs", "p"))
     assert "is not LOW-HIGH" in one_message(swash("respond", flown, *ask, "--band", "10-1"))
     assert "no such file" in one_message(swash("fit-tf", folder / "nothing.nc", "--input", "mixer_roll"))
     assert "does not hold frequency responses" in one_message(swash("fit-tf", flown, "--input", "mixer_roll"))
@@ -224,3 +225,21 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     assert "NOT A HOLD-OUT" not in page
     assert "is no method" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
     assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))
+
+
+def test_a_channel_of_another_name_is_flown_along_where_asked_or_where_the_responses_say_so(
+    folder: Path, flown: Path
+) -> None:
+    other = folder / "other.csv"
+    other.write_text(flown.read_text(encoding="utf-8").replace(",p [rad/s]", ",p_gyro [rad/s]"), encoding="utf-8")
+    renamed = folder / "renamed"
+    ask = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p=p_gyro,q", "--band", "0.2-12")
+    assert swash("respond", other, *ask, "--out", renamed).code == 0
+    fitted = swash("fit-ss", "rotor_body", renamed, "--starts", "1", "--hold-out", other, "--out", renamed)
+    assert fitted.code == 0, fitted.err
+    checked = ("validate", "--model", renamed / "model.toml", "--flight", other)
+    assert "  p   " not in swash(*checked).out
+    done = swash(*checked, "--rename", "p=p_gyro")
+    assert done.code == 0, done.err
+    assert "  p   " in done.out
+    assert "Did you mean 'p_gyro'?" in one_message(swash(*checked, "--rename", "p=p_gyr"))

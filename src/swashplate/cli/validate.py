@@ -36,6 +36,7 @@ def validate(
     band: flying.BandOption = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
+    rename: flying.Rename = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
@@ -56,7 +57,8 @@ def validate(
     from swashplate.identification.state_space_file import is_state_space
     from swashplate.vehicles.catalogue import vehicle as find
 
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    channels = flying.renamed(rename, option="--rename")
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
     if is_state_space(model):
         limits = flying.band(band)
         _verify(

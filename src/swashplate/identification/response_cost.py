@@ -246,6 +246,11 @@ class ParameterAccuracy:
         return 100.0 * self.insensitivity / abs(self.value) if self.value else float("inf")
 
 
+def percent(value: float, *, width: int = 8) -> str:
+    """A figure in percent for a table; what is beyond all use keeps its column."""
+    return f"{value:>{width}.1f}" if value < 1e4 else f"{'>9999':>{width}}"
+
+
 def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:
     """Cramér-Rao bounds, insensitivities and correlation from the residuals' slopes.
 

@@ -27,9 +27,7 @@ from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.spectra import Complex
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_result import StateSpaceFit
-
-CR_TARGET, I_TARGET = 20.0, 10.0
-"""Percent of the value that a Cramér-Rao bound and an insensitivity should not exceed (Tischler and Remple 2012)."""
+from swashplate.identification.state_space_words import words
 
 FAST_GROWTH = 1.0
 """1/s: a start model with a mode that grows faster is no helicopter, but a wrong sign."""
@@ -210,7 +208,7 @@ def fit_targets(
         )
         for name, p in found.parameters.items()
     )
-    warnings += _words(targets, costs, parameters, optimum)
+    warnings += words(targets, costs, parameters, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
     over = [c.name for c, above in zip(ceilings, every[len(targets) :], strict=True) if above > ACCEPTABLE]
     if over:
         warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
@@ -370,28 +368,6 @@ def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
     hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
     ends = [minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
     return min((best, *ends), key=lambda end: end.cost)
-
-
-def _words(
-    targets: Sequence[Target],
-    costs: Sequence[float],
-    parameters: Sequence[ParameterAccuracy],
-    optimum: Optimum,
-) -> list[str]:
-    words = [] if optimum.converged else ["the iterations ran out."]
-    poor = [f"{t.name} ({cost:.0f})" for t, cost in zip(targets, costs, strict=True) if cost > ACCEPTABLE]
-    if poor:
-        words.append(f"J above {ACCEPTABLE:g}: {', '.join(poor)}.")
-    moving = [p for p in parameters if not p.fixed and not p.tie]
-    blind = [p.name for p in moving if p.insensitivity_percent > I_TARGET]
-    vague = [p.name for p in moving if p.cramer_rao_percent > CR_TARGET]
-    if blind:
-        words.append(f"insensitivity above {I_TARGET:g} %: {', '.join(blind)}.")
-    if vague:
-        words.append(f"Cramér-Rao bound above {CR_TARGET:g} %: {', '.join(vague)}.")
-    if optimum.at_bound:
-        words.append(f"ended on a bound: {', '.join(optimum.at_bound)}.")
-    return words
 
 
 def frequencies(targets: Sequence[Target]) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from swashplate.identification.response_cost import (
     Target,
     accuracy_of,
     cost_of,
+    percent,
     target,
 )
 from swashplate.identification.rows import Entry, Row
@@ -85,7 +86,11 @@ class TransferFunctionFit:
         lines = [f"{model!r}   J = {cost:.1f}" for model, cost in zip(self.models, self.costs, strict=True)]
         lines.append(f"  {'parameter':<24}{'value':>12}{'CR %':>9}{'I %':>9}")
         for p in self.parameters:
-            cells = "    fixed" if p.fixed else f"{p.cramer_rao_percent:>9.1f}{p.insensitivity_percent:>9.1f}"
+            cells = (
+                "    fixed"
+                if p.fixed
+                else (percent(p.cramer_rao_percent, width=9) + percent(p.insensitivity_percent, width=9))
+            )
             lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}")
         return "\n".join([*lines, *(f"! {text}" for text in self.warnings)])
 
