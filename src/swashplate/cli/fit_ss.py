@@ -83,10 +83,7 @@ def fit_ss(
         if start_from is not None:
             line.say("finding start values")
             model = _started(model, start_from, found, seed=seed)
-        values = {
-            n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
-        }
-        model = model.with_values(values).with_values(options.fixed_values(fix), free=False)
+        model = flying.with_given(model, start, fix)
         line.say("fitting")
         fit = fit_state_space(
             model,

@@ -66,10 +66,7 @@ def fit_time(
     wanted = flying.names(outputs) or model.outputs
     channels = flying.renamed(rename, option="--rename")
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
-    values = {
-        n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
-    }
-    model = model.with_values(values).with_values(options.fixed_values(fix), free=False)
+    model = flying.with_given(model, start, fix)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("reading logs")
         flown = (*model.inputs, *wanted)

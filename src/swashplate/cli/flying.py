@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli import options
 from swashplate.cli.guard import Exit, complain
 from swashplate.errors import SwashError
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from swashplate.cli.reading import Reading
     from swashplate.flights.flight import Flight
     from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.state_space import StateSpaceModel
     from swashplate.identification.verification import Verification
 
 RESPONSES = "responses.nc"
@@ -117,6 +119,20 @@ def flown(
         )
         made.append(with_names(flight, {n: s for n, s in how.channels.items() if n not in logged}))
     return made
+
+
+def with_given(model: StateSpaceModel, start: Sequence[str] | None, fix: Sequence[str] | None) -> StateSpaceModel:
+    """The model with `--start NAME=VALUE` and, held, `--fix NAME=VALUE`.
+
+    Raises:
+        CardError: a name that the model does not have, or a value outside its bounds.
+    """
+    begun = options.assignments(start, option="--start").items()
+    values = {name: options.numbers(value, option="--start", count=1)[0] for name, value in begun}
+    held = options.fixed_values(fix)
+    given = model.with_values(values).with_values(held, free=False)
+    given.check_bounds((*values, *held))
+    return given
 
 
 def load_responses(path: Path) -> FrequencyResponse:

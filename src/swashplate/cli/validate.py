@@ -24,8 +24,8 @@ def validate(
         str | None,
         typer.Option(
             "--published",
-            help="The card to compare with (by default the one that it was identified from); for a state-space model "
-            "also a model.",
+            help="The card to compare with (by default the one that it was identified from). Beside a state-space "
+            "model a vehicle flies linearised in hover, as that model does; another model may be given too.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
@@ -115,7 +115,7 @@ def _other(name: str) -> StateSpaceModel:
     from swashplate.identification.vehicle_model import model_of
 
     aircraft = sp.vehicle(name)
-    return model_of(sp.linearize(aircraft), name=aircraft.name)
+    return model_of(sp.linearize(aircraft), name=f"{aircraft.name}, linearised in hover")
 
 
 def _verify(
