@@ -23,8 +23,8 @@ def fit_ss(
         str,
         typer.Argument(
             metavar="STRUCTURE",
-            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, thirteen_state, coaxial, "
-            "rotor_body, heave.",
+            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, eleven_state, "
+            "thirteen_state, coaxial, rotor_body, heave.",
         ),
     ],
     responses: flying.Responses,

@@ -170,6 +170,8 @@ def respond(
     warnings += response_warnings.lead_words(made)
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
+    if not references:
+        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED)
     if others and not references and not all(name.startswith(INJECTED) for name in inputs):
         warnings += response_warnings.bystander_words(
             pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap

@@ -7,7 +7,7 @@ with the coherence g (Tischler and Remple 2012, eqs 11.2 and 11.3).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Target:
     @property
     def name(self) -> str:
         return f"{self.output} / {self.input}"
+
+    def above(self, omega: float) -> Target:
+        """The part from a frequency [rad/s] on."""
+        k = self.omega >= omega
+        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k])
 
     @property
     def weights(self) -> tuple[Array, Array]:
