@@ -91,6 +91,8 @@ def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) ->
     fixed = swash("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "2/4", "--fix", "tau=0.05")
     assert fixed.code == 0
     assert "fixed" in fixed.out
+    (gain,) = (line for line in fixed.out.splitlines() if line.startswith("  K "))
+    assert gain.endswith("rad/s^3")  # rad/s per 1, over two more poles than zeros
 
 
 def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answered: Path) -> None:
@@ -148,6 +150,7 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     assert "the flight has no such channel" in one_message(
         swash("respond", flown, "--inputs", "stick", "--outputs", "p")
     )
+    assert "Did you mean 'mixer_roll'?" in one_message(swash("respond", flown, "--inputs", "roll", "--outputs", "p"))
     assert "is not LOW-HIGH" in one_message(swash("respond", flown, *ask, "--band", "10-1"))
     assert "no such file" in one_message(swash("fit-tf", folder / "nothing.nc", "--input", "mixer_roll"))
     assert "does not hold frequency responses" in one_message(swash("fit-tf", flown, "--input", "mixer_roll"))
@@ -163,10 +166,47 @@ def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: 
     assert "'Lbb'" in message
     bad.write_text(text.replace('b = "Lb"', 'b = "Lb/0"'), encoding="utf-8")
     assert "divides by zero" in one_message(swash("fit-ss", bad, answered))
-    fixed = [word for name in structure("rotor_body").free for word in ("--fix", f"{name}=1")]
+    fixed = [word for name in structure("rotor_body").free for word in ("--fix", f"{name}=0.3")]
     assert "every parameter is fixed" in one_message(swash("fit-ss", "rotor_body", answered, *fixed))
     assert "Did you mean 'Lb'" in message
     assert "is no parameter" in one_message(swash("fit-ss", "rotor_body", answered, "--start", "Lbb=3"))
+    for option in ("--start", "--fix"):
+        outside = one_message(swash("fit-ss", "rotor_body", answered, option, "tau_f=-1"))
+        assert "tau_f: is given as -1, expected 0.002 to 1 s" in outside
+    ask = ("fit-tf", answered, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "--fix")
+    for held, words in (
+        ("tau=-1", "expected 0 to 0.5 s"), ("omega_pole=-3", "expected above 0 rad/s"),
+        ("zeta_pole=-3", "expected -2 to 10 in the form 1/2"), ("K=0", "expected other than 0"),
+    ):  # fmt: skip
+        assert words in one_message(swash(*ask, held))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'Ba = {value = 0.0, unit = "1"}',
+            'Ba = {value = 0.0, unit = "furlong"}',
+            "parameters.Ba.unit: unit 'furlong'",
+        ),
+        ('b = "rad"', 'b = "1/fortnight"', "states.b: unit '1/fortnight' is not known"),
+        ('b = "rad"', "b = 3", "states.b: unit 3 is not known"),
+        ('mixer_roll = "1"\n', 'mixer_roll = "%"\n', "inputs.mixer_roll: unit is '%', expected '1'"),
+        (
+            '[outputs.p]\nunit = "rad/s"',
+            '[outputs.p]\nunit = "deg/s"',
+            "outputs.p.unit: unit is 'deg/s', expected 'rad/s'",
+        ),
+    ],
+)
+def test_a_unit_that_is_none_is_named(folder: Path, answered: Path, old: str, new: str, words: str) -> None:
+    from importlib import resources
+
+    ready = (resources.files("swashplate.identification") / "structures" / "rotor_body.toml").read_text("utf-8")
+    assert old in ready
+    bad = folder / "unit.toml"
+    bad.write_text(ready.replace(old, new, 1), encoding="utf-8")
+    assert words in one_message(swash("fit-ss", bad, answered))
 
 
 def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: Path) -> None:
@@ -224,3 +264,21 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     assert "NOT A HOLD-OUT" not in page
     assert "is no method" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
     assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))
+
+
+def test_a_channel_of_another_name_is_flown_along_where_asked_or_where_the_responses_say_so(
+    folder: Path, flown: Path
+) -> None:
+    other = folder / "other.csv"
+    other.write_text(flown.read_text(encoding="utf-8").replace(",p [rad/s]", ",p_gyro [rad/s]"), encoding="utf-8")
+    renamed = folder / "renamed"
+    ask = ("--inputs", "mixer_roll,mixer_pitch", "--outputs", "p=p_gyro,q", "--band", "0.2-12")
+    assert swash("respond", other, *ask, "--out", renamed).code == 0
+    fitted = swash("fit-ss", "rotor_body", renamed, "--starts", "1", "--hold-out", other, "--out", renamed)
+    assert fitted.code == 0, fitted.err
+    checked = ("validate", "--model", renamed / "model.toml", "--flight", other)
+    assert "  p   " not in swash(*checked).out
+    done = swash(*checked, "--rename", "p=p_gyro")
+    assert done.code == 0, done.err
+    assert "  p   " in done.out
+    assert "Did you mean 'p_gyro'?" in one_message(swash(*checked, "--rename", "p=p_gyr"))

@@ -174,3 +174,27 @@ def test_slow_commands_beside_fast_motion_keep_their_size() -> None:
     out = resample(flight, rate=100.0)
     assert np.allclose(out.values("servo_pitch"), np.interp(out.time("servo_pitch"), slow, command), atol=1e-12)
     assert np.max(np.abs(out.values("theta") - np.sin(out.time("theta")))) < 2e-3
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.013])
+def test_a_spline_keeps_what_lines_between_slow_samples_lose(offset: float) -> None:
+    t, slow = np.arange(2000) / 100.0, offset + np.arange(480) / 25.0
+    hertz = 25.0 / 3.0
+    flight = Flight({"fast": stream(t, {"x": t}), "slow": stream(slow, {"az": np.sin(2 * np.pi * hertz * slow)})})
+
+    def gain(method: str) -> float:
+        out = resample(flight, rate=100.0, method=method)
+        assert out.history[-1].details["slower"] == {"az": 25.0}
+        time = out.time("az")
+        inner = (time > 2.0) & (time < 17.0)
+        return 20 * np.log10(np.abs(2 * np.mean((out.values("az") * np.exp(-2j * np.pi * hertz * time))[inner])))
+
+    assert abs(gain("spline")) < 0.2
+    assert gain("linear") < -2.5
+
+
+def test_a_spline_does_not_swing_across_a_hole() -> None:
+    t = np.arange(1000) / 100.0
+    flight = without(Flight({"a": stream(t, {"x": np.where(t < 5.0, 0.0, 100.0)})}), 4.0, 6.0)
+    x = resample(flight, rate=100.0, method="spline")
+    assert np.all(np.isclose(x.values("x"), 0.0) | np.isclose(x.values("x"), 100.0))

@@ -18,12 +18,12 @@ import pytest
 import swashplate as sp
 from swashplate.errors import ExportError
 from swashplate.export import fmu as fmu_module
-from swashplate.export.base_units import base_units
 from swashplate.export.compiler import compiler
 from swashplate.export.fmu import fmu, fmu_platform, internal_step
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
 from swashplate.export.traced import Traced, trace_linear, trace_vehicle
+from swashplate.flights.base_units import base_units, gain_unit, is_unit
 from swashplate.identification.state_space_file import structure
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -291,3 +291,14 @@ def test_every_unit_of_every_card_is_known() -> None:
 
     units = {p.unit for card in packaged_cards().values() for p in card.parameters.values()}
     assert [unit for unit in sorted(units) if base_units(unit) is None] == []
+
+
+def test_what_is_a_unit_and_the_unit_of_a_gain() -> None:
+    assert all(map(is_unit, ("deg/s", "%", "rad/(m s)", "ft/s^2/in", "m/s²", "rad/s^2/%")))
+    assert not any(map(is_unit, ("furlong/s", "1/fortnight", "rad/(m s", "")))
+    assert gain_unit("rad/s", "1", 2) == "rad/s^3"
+    assert gain_unit("m/s^2", "1", 0) == "m/s^2"
+    assert gain_unit("rad", "rad/s", 1) == "1"
+    assert gain_unit("m/s", "rad", -1) == "m/rad"
+    assert gain_unit("rad/s", "m", 1) == "rad/(s^2 m)"
+    assert gain_unit("furlong", "1", 0) == ""

@@ -203,3 +203,45 @@ def test_file_and_control_round_trip(tmp_path: Path) -> None:
     (tmp_path / "bad.nc").write_bytes(b"no")
     with pytest.raises(FlightError, match="does not hold frequency responses"):
         FrequencyResponse.load(tmp_path / "bad.nc")
+
+
+def test_a_slowly_logged_output_ends_the_band_and_is_right_below() -> None:
+    n = 12000
+    u = coloured(5, n)
+    y = plant(u, 2.0, 1.5, 0.4)
+    t = np.arange(n) / RATE
+    units = {"stick": "1"}
+    log = Flight({"fast": stream(t, {"stick": u}, units), "slow": stream(t[3::4], {"r": y[3::4]})})
+    found = respond(
+        log.condition(rate=RATE, cutoff=0, method="spline"), inputs=["stick"], outputs=["r"], band=(0.2, 15)
+    )
+    assert any("'r' was logged 25 times a second: the band ends at 8.33 Hz, not at 15 Hz" in w for w in found.warnings)
+    assert found.omega[-1] == pytest.approx(2 * np.pi * 25 / 3)
+    h, _, _ = found.pair("r", "stick")
+    low = found.omega < 2 * np.pi * 6.0
+    assert np.max(np.abs(20 * np.log10(np.abs(h / true_response(found.omega, 2.0, 1.5, 0.4))))[low]) < 0.3
+
+
+def test_an_unasked_band_begins_at_two_periods_of_the_longest_window() -> None:
+    u = coloured(6, 6000)
+    flight = made({"stick": u, "r": plant(u, 1.0, 1.0, 0.5)})
+    free = respond(flight, inputs=["stick"], outputs=["r"])
+    assert free.omega[0] == pytest.approx(2 * np.pi * 2.0 / max(free.windows))
+    asked = respond(flight, inputs=["stick"], outputs=["r"], band=(0.01, 5.0))
+    assert asked.omega[0] == pytest.approx(2 * np.pi * 1.0 / max(asked.windows))
+
+
+def test_commands_without_units_are_bystanders_and_a_loops_own_answer_is_none() -> None:
+    sweep = coloured(7, 12000)
+    answer = coloured(8, 12000)
+    both = {
+        "lateral": sweep,
+        "pedal": 0.6 * sweep + answer,
+        "r": plant(sweep, 1.0, 1.0, 0.5) + plant(answer, 3.0, 1.0, 0.5),
+    }
+    bare = Flight({"uniform": stream(np.arange(12000) / RATE, both)})
+    found = respond(bare, inputs=["lateral"], outputs=["r"], band=(0.2, 8.0))
+    assert any("'pedal' moved along" in text for text in found.warnings)
+    injected = Flight({"uniform": stream(np.arange(12000) / RATE, {**both, "sid_target": sweep})})
+    closed = respond(injected, inputs=["sid_target"], outputs=["r"], band=(0.2, 8.0))
+    assert not any("moved along" in text for text in closed.warnings)

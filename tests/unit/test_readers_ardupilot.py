@@ -216,3 +216,14 @@ def test_the_longest_increasing_stamps_are_kept(times: list[float], kept: list[f
     found = stamps[clocked.longest_increasing(stamps)]
     assert len(found) == len(kept)
     assert np.all(np.diff(found) > 0)
+
+
+def test_the_autopilots_own_filters_and_a_missing_rate_message_are_said(tmp_path: Path) -> None:
+    rows = ardupilot_rows(until=25.0)
+    corner = ("PARM", (rows[0][1][0], "INS_GYRO_FILTER", 20.0, 20.0))
+    notes = _flight(tmp_path, dataflash([corner, *rows])).provenance.notes
+    # sqrt(2) / (2 pi 20 Hz): the phase of a second-order Butterworth at low frequency.
+    assert any("p q r of rates and inertial have passed INS_GYRO_FILTER, 20 Hz: 11.3 ms" in note for note in notes)
+    assert not any("no RATE message" in note or "INS_ACCEL" in note for note in notes)
+    bare = _flight(tmp_path, dataflash([row for row in rows if row[0] != "RATE"]))
+    assert any("no RATE message" in note and "LOG_BITMASK" in note for note in bare.provenance.notes)

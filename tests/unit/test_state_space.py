@@ -12,10 +12,12 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.linear_simulation import hold_matrices
 from swashplate.identification.reduction import reduce
+from swashplate.identification.response_cost import ParameterAccuracy, percent
 from swashplate.identification.start_values import from_linear_model, from_transfer_functions
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import parse, structure, structure_names, to_toml
 from swashplate.identification.state_space_fit import fit_state_space
+from swashplate.identification.state_space_words import words
 from swashplate.identification.transfer_function_fit import fit_transfer_function
 from swashplate.identification.vehicle_model import model_of
 from swashplate.identification.verification import verify
@@ -273,3 +275,17 @@ def test_verification_solves_for_biases_and_judges_the_rest() -> None:
     assert "J_rms" in repr(worse)
     with pytest.raises(FlightError, match="share no output"):
         verify(structure("heave"), flight)
+
+
+def test_parameters_that_are_told_only_together_are_named() -> None:
+    def one(name: str, bound: float) -> ParameterAccuracy:
+        return ParameterAccuracy(name, "", 1.0, 1.0, cramer_rao=bound, insensitivity=0.02)
+
+    correlation = np.array([[1.0, 0.2, 0.999], [0.2, 1.0, 0.2], [0.999, 0.2, 1.0]])
+    found = words(
+        [], [], [one("Nrfb", 30.0), one("Nr", 0.1), one("Kr", 30.0)], correlation, at_bound=(), converged=True
+    )
+    assert any("told only together" in text and "Nrfb and Kr. Hold one" in text for text in found), found
+    told = words([], [], [one("Nrfb", 0.1), one("Nr", 0.1), one("Kr", 0.1)], correlation, at_bound=(), converged=True)
+    assert told == []
+    assert percent(29120.5) == "   >9999"

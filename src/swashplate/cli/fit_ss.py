@@ -23,8 +23,8 @@ def fit_ss(
         str,
         typer.Argument(
             metavar="STRUCTURE",
-            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, thirteen_state, coaxial, "
-            "rotor_body, heave.",
+            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, eleven_state, "
+            "thirteen_state, coaxial, rotor_body, heave.",
         ),
     ],
     responses: flying.Responses,
@@ -52,6 +52,7 @@ def fit_ss(
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
+    rename: flying.Rename = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
@@ -76,15 +77,13 @@ def fit_ss(
 
     model = find(structure)
     found, limits = flying.load_responses(responses), flying.band(band)
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    channels = {**found.settings.get("channels", {}), **flying.renamed(rename, option="--rename")}
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         if start_from is not None:
             line.say("finding start values")
             model = _started(model, start_from, found, seed=seed)
-        values = {
-            n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
-        }
-        model = model.with_values(values).with_values(options.fixed_values(fix), free=False)
+        model = flying.with_given(model, start, fix)
         line.say("fitting")
         fit = fit_state_space(
             model,
@@ -100,8 +99,8 @@ def fit_ss(
         verification = None
         if hold_out:
             line.say("flying the model along what the fit has not seen")
-            channels = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
-            flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
+            wanted = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
+            flights = flying.flown(hold_out, wanted, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(fit.model, flights, band=limits), found.sources)
         suggested = suggest_gains(fit.model) if gains else ()
         if folder is not None:

@@ -38,6 +38,7 @@ def fit_tf(
     out: options.OutFolder = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
+    rename: flying.Rename = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
@@ -60,7 +61,8 @@ def fit_tf(
 
     found = flying.load_responses(responses)
     limits, wanted = flying.band(band), flying.names(outputs) or None
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    channels = {**found.settings.get("channels", {}), **flying.renamed(rename, option="--rename")}
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("fitting")
         trials: tuple = ()  # type: ignore[type-arg]
@@ -86,8 +88,8 @@ def fit_tf(
             line.say(str(error))
         if hold_out and model is not None:
             line.say("flying the model along what the fit has not seen")
-            channels = (*model.inputs, *model.outputs)
-            flights = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how)
+            flown = (*model.inputs, *model.outputs)
+            flights = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(model, flights, band=limits), found.sources)
         if folder is not None:
             pairs = tuple(m.output for m in fit.models)

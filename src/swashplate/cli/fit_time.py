@@ -40,6 +40,7 @@ def fit_time(
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
+    rename: flying.Rename = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
@@ -63,15 +64,13 @@ def fit_time(
 
     model = find(structure)
     wanted = flying.names(outputs) or model.outputs
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
-    values = {
-        n: options.numbers(v, option="--start")[0] for n, v in options.assignments(start, option="--start").items()
-    }
-    model = model.with_values(values).with_values(options.fixed_values(fix), free=False)
+    channels = flying.renamed(rename, option="--rename")
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
+    model = flying.with_given(model, start, fix)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
         line.say("reading logs")
-        channels = (*model.inputs, *wanted)
-        flights = flying.flown(log, channels, rate=rate, cutoff=cutoff, how=how)
+        flown = (*model.inputs, *wanted)
+        flights = flying.flown(log, flown, rate=rate, cutoff=cutoff, how=how)
         line.say("fitting")
         fit = fit_in_time(
             model,
@@ -84,7 +83,7 @@ def fit_time(
             progress=lambda i, cost: line.say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
         )
         line.say("flying the model")
-        unseen = flying.flown(hold_out, channels, rate=rate, cutoff=cutoff, how=how) if hold_out else flights
+        unseen = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how) if hold_out else flights
         verification = flying.seen_before(verify(fit.model, unseen, outputs=wanted), fit.sources)
         if folder is not None:
             line.say("writing the report")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli import options
 from swashplate.cli.guard import Exit, complain
 from swashplate.errors import SwashError
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from swashplate.cli.reading import Reading
     from swashplate.flights.flight import Flight
     from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.state_space import StateSpaceModel
     from swashplate.identification.verification import Verification
 
 RESPONSES = "responses.nc"
@@ -24,6 +26,12 @@ RESPONSES = "responses.nc"
 BandOption = Annotated[str | None, typer.Option("--band", metavar="LOW-HIGH", help="Limits in Hz, for example 0.1-10.")]
 Responses = Annotated[
     Path, typer.Argument(metavar="RESPONSES", help="What `swash respond` wrote: the file responses.nc or its folder.")
+]
+Rename = Annotated[
+    str,
+    typer.Option(
+        "--rename", help="NAME=CHANNEL, by commas: the log's CHANNEL as the model's NAME, for example az=az_sid."
+    ),
 ]
 Coherence = Annotated[float, typer.Option("--coherence", help="Least coherence that counts.", min=0.0, max=1.0)]
 
@@ -58,21 +66,26 @@ def renamed(text: str, *, option: str) -> dict[str, str]:
     return pairs
 
 
-def with_names(flights: Sequence[Flight], wanted: Mapping[str, str]) -> list[Flight]:
-    """The flights with channels under new names; a channel that had such a name makes way."""
+def with_names(flight: Flight, wanted: Mapping[str, str]) -> Flight:
+    """The flight with channels under new names; a channel that had such a name makes way.
+
+    Raises:
+        FlightError: a channel that the flight does not have.
+    """
     changed = {source: name for name, source in wanted.items() if name != source}
     if not changed:
-        return list(flights)
-    made = []
-    for flight in flights:
-        streams = {
-            home: data.drop_vars([n for n in changed.values() if n in data.data_vars]).rename(
-                {source: name for source, name in changed.items() if source in data.data_vars}
-            )
-            for home, data in flight.streams.items()
-        }
-        made.append(flight.with_streams(streams).done("rename", **changed))
-    return made
+        return flight
+    for source in changed:
+        flight.stream_of(source)
+    streams = {
+        home: data.drop_vars([n for n in changed.values() if n in data.data_vars]).rename(
+            {source: name for source, name in changed.items() if source in data.data_vars}
+        )
+        for home, data in flight.streams.items()
+    }
+    return flight.with_streams({home: data for home, data in streams.items() if data.data_vars}).done(
+        "rename", **changed
+    )
 
 
 def flown(
@@ -88,18 +101,38 @@ def flown(
 
     Nothing is cut at take-off and landing and no outlier is removed: sweeps are long, and what looks like an outlier to
     motion capture's rules is often a doublet. Channels that the log lacks are derived where attitude and place allow.
+    Between samples goes a spline: lines would take 3 dB off a channel at a third of its rate.
     """
     from swashplate.cli.reading import read
 
     made = []
     for text in texts:
         flight = read(text, how=how)
+        logged = {name: source for name, source in how.channels.items() if source in flight}
+        flight = with_names(flight, logged)
         whole = all(name in flight for name in channels)
         if whole:
             homes = {flight.stream_of(name) for name in (*channels, *also) if name in flight}
             flight = flight.with_streams({name: data for name, data in flight.streams.items() if name in homes})
-        made.append(flight.condition(rate=rate, cutoff=cutoff, outliers=False, trim_ground=False, derive=not whole))
+        flight = flight.condition(
+            rate=rate, cutoff=cutoff, outliers=False, trim_ground=False, derive=not whole, method="spline"
+        )
+        made.append(with_names(flight, {n: s for n, s in how.channels.items() if n not in logged}))
     return made
+
+
+def with_given(model: StateSpaceModel, start: Sequence[str] | None, fix: Sequence[str] | None) -> StateSpaceModel:
+    """The model with `--start NAME=VALUE` and, held, `--fix NAME=VALUE`.
+
+    Raises:
+        CardError: a name that the model does not have, or a value outside its bounds.
+    """
+    begun = options.assignments(start, option="--start").items()
+    values = {name: options.numbers(value, option="--start", count=1)[0] for name, value in begun}
+    held = options.fixed_values(fix)
+    given = model.with_values(values).with_values(held, free=False)
+    given.check_bounds((*values, *held))
+    return given
 
 
 def load_responses(path: Path) -> FrequencyResponse:

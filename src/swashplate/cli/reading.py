@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,11 +24,13 @@ class Reading:
         mapping: a file that maps columns to channels.
         units: units by channel or field.
         drop_bad_stamps: leave out samples whose time does not increase.
+        channels: the log's channel by the name that it gets instead.
     """
 
     mapping: Path | None = None
     units: dict[str, str] = field(default_factory=dict)
     drop_bad_stamps: bool = False
+    channels: Mapping[str, str] = field(default_factory=dict)
 
 
 def split_window(text: str) -> tuple[str, tuple[float, float] | None]:

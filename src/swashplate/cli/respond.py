@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -58,17 +59,17 @@ def respond(
     lengths = None if windows is None else options.numbers(windows, option="--windows")
     if lengths is not None and not all(0.0 < length < float("inf") for length in lengths):
         raise SwashError(f"'{windows}' are not all positive lengths in s.", channel="--windows")
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, ins | outs)
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
-        channels = (*ins.values(), *outs.values(), *refs)
-        flights = flying.flown(log, channels, rate=rate, cutoff=cutoff, how=how)
-        flights = flying.with_names(flights, ins | outs)
+        flights = flying.flown(log, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, how=how)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
             found = answer(
                 flights, inputs=tuple(ins), outputs=tuple(outs), references=refs, band=limits, windows=lengths
             )
+            renamed = {name: source for name, source in how.channels.items() if name != source}
+            found = replace(found, settings={**found.settings, "channels": renamed})
             if folder is not None:
                 line.say("writing the report")
                 found.save(folder / flying.RESPONSES)

@@ -24,8 +24,8 @@ def validate(
         str | None,
         typer.Option(
             "--published",
-            help="The card to compare with (by default the one that it was identified from); for a state-space model "
-            "also a model.",
+            help="The card to compare with (by default the one that it was identified from). Beside a state-space "
+            "model a vehicle flies linearised in hover, as that model does; another model may be given too.",
         ),
     ] = None,
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
@@ -36,6 +36,7 @@ def validate(
     band: flying.BandOption = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
+    rename: flying.Rename = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
@@ -56,7 +57,8 @@ def validate(
     from swashplate.identification.state_space_file import is_state_space
     from swashplate.vehicles.catalogue import vehicle as find
 
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    channels = flying.renamed(rename, option="--rename")
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
     if is_state_space(model):
         limits = flying.band(band)
         _verify(
@@ -113,7 +115,7 @@ def _other(name: str) -> StateSpaceModel:
     from swashplate.identification.vehicle_model import model_of
 
     aircraft = sp.vehicle(name)
-    return model_of(sp.linearize(aircraft), name=aircraft.name)
+    return model_of(sp.linearize(aircraft), name=f"{aircraft.name}, linearised in hover")
 
 
 def _verify(

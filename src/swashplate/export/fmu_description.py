@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from swashplate.export.base_units import base_units
 from swashplate.export.traced import Traced, Variable
+from swashplate.flights.base_units import base_units
 
 
 @dataclass(frozen=True)

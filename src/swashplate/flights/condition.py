@@ -60,6 +60,7 @@ def condition(
     outliers: bool = True,
     trim_ground: bool = True,
     derive: bool = True,
+    method: str = "linear",
 ) -> Flight:
     """A log as one uniform stream of clean channels: the chain in its order, each step with its counts in the history.
 
@@ -75,6 +76,7 @@ def condition(
         outliers: remove outliers.
         trim_ground: keep the flying part only.
         derive: add angles, body velocities, rates and specific force where position and attitude are there.
+        method: between samples: "linear", "pchip" or "spline" (`resample`).
 
     Raises:
         FlightError: nothing to condition, no piece long enough, a filter that does not fit.
@@ -83,7 +85,7 @@ def condition(
     out = remove_outliers(flight) if outliers else flight
     if trim_ground:
         out = trim(out)
-    out = resample(out, rate=rate, max_gap=max_gap)
+    out = resample(out, rate=rate, max_gap=max_gap, method=method)
     corner = min(DEFAULT_CUTOFF, 0.4 * rate) if cutoff is None else cutoff
     if corner:
         out = lowpass(out, cutoff=corner)

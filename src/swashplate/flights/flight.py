@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -107,6 +108,15 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
     return xr.Dataset(variables, coords={"time": ("time", stamps, {"units": "s"})})
 
 
+def did_you_mean(name: str, channels: Iterable[str]) -> str | None:
+    """A question after the channels that a name which is none may stand for; None where no channel is like it."""
+    among, small = tuple(channels), name.lower()
+    like = [c for c in among if len(small) > 1 and (small in c.lower() or c.lower() in small.split("_"))]
+    near = difflib.get_close_matches(small, among, n=2)
+    found = dict.fromkeys((*like, *near))
+    return f"Did you mean {' or '.join(repr(c) for c in list(found)[:3])}?" if found else None
+
+
 @dataclass(frozen=True)
 class Flight:
     """A flight: streams of channels, each stream at its native times.
@@ -151,6 +161,7 @@ class Flight:
             f"the flight has no such channel; it has {', '.join(self.channels) or 'none'}.",
             where=self.provenance.source or None,
             channel=name,
+            hint=did_you_mean(name, self.channels),
         )
 
     def time(self, name: str) -> Array:
@@ -244,7 +255,7 @@ class Flight:
         """One uniform stream of clean channels, ready for identification: see `swashplate.flights.condition`.
 
         Args:
-            options: rate [Hz], cutoff [Hz], max_gap [s], outliers, trim_ground, derive.
+            options: rate [Hz], cutoff [Hz], max_gap [s], outliers, trim_ground, derive, method.
         """
         from swashplate.flights.condition import condition  # it needs this class, and SciPy's filters take time to load
 

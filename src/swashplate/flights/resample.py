@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from swashplate.errors import FlightError
 from swashplate.flights.attitude import interpolate
@@ -52,6 +52,10 @@ def straightened(time: Array, *, width: int = 75) -> Array:
 
 
 _SLOWEST = 0.75  # Hz: a log with fewer samples a second is one whose time is in milliseconds
+
+METHODS = ("linear", "pchip", "spline")
+_QUINTIC = 5
+
 _OWN_STEPS = 2.5
 """Steps of a stream's own that are never a gap: one sample may go missing from a slow channel."""
 
@@ -72,10 +76,24 @@ def common(one: list[Interval], other: list[Interval]) -> list[Interval]:
     return sorted((start, stop) for start, stop in pieces if stop > start)
 
 
-def _at(data: xr.Dataset, grid: Array, method: str) -> dict[str, Array]:
-    """Every channel of a stream at the times `grid`."""
+def _between(time: Array, values: Array, grid: Array, method: str) -> Array:
+    """Samples of an unbroken run at the times `grid`.
+
+    A quintic spline keeps a sine of a third of the sample rate within 0.2 dB (lines: 3 dB; Unser 1999, box 2).
+    """
+    if method == "spline" and time.size > _QUINTIC:
+        return np.asarray(make_interp_spline(time, values, k=_QUINTIC)(grid))
+    return np.asarray(PchipInterpolator(time, values)(grid)) if method == "pchip" else np.interp(grid, time, values)
+
+
+def _at(data: xr.Dataset, grid: Array, method: str, *, max_gap: float) -> dict[str, Array]:
+    """Every channel of a stream at the times `grid`, which lie in one of its unbroken runs."""
     time = np.asarray(data["time"].values, dtype=np.float64)
-    values = {str(name): np.asarray(v.values, dtype=np.float64) for name, v in data.data_vars.items()}
+    runs = unbroken(time, max_gap=max(max_gap, _OWN_STEPS * float(np.median(np.diff(time)))))
+    first, last = next((run for run in runs if run[0] <= grid[0] <= run[1]), (time[0], time[-1]))
+    inside = (time >= first) & (time <= last)
+    time = time[inside]
+    values = {str(name): np.asarray(v.values, dtype=np.float64)[inside] for name, v in data.data_vars.items()}
     out: dict[str, Array] = {}
     if all(name in values for name in QUATERNION):
         q = interpolate(time, np.stack([values.pop(name) for name in QUATERNION], axis=-1), grid)
@@ -89,9 +107,7 @@ def _at(data: xr.Dataset, grid: Array, method: str) -> dict[str, Array]:
             )
         # NED yaw and roll wrap at half a turn; an interpolation across the wrap would invent a fast turn.
         smooth = np.unwrap(samples) if name in ("phi", "psi") else samples
-        out[name] = (
-            np.asarray(PchipInterpolator(time, smooth)(grid)) if method == "pchip" else np.interp(grid, time, smooth)
-        )
+        out[name] = _between(time, smooth, grid, method)
     return out
 
 
@@ -113,10 +129,10 @@ def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
 
 def _check(flight: Flight, *, rate: float, max_gap: float, method: str) -> None:
     where = flight.provenance.source or None
-    if not (rate > 0 and max_gap > 0) or method not in ("linear", "pchip"):
+    if not (rate > 0 and max_gap > 0) or method not in METHODS:
         raise FlightError(
             f"cannot resample with rate={rate}, max_gap={max_gap}, method='{method}'; expected positive numbers and "
-            "'linear' or 'pchip'.",
+            "'linear', 'pchip' or 'spline'.",
             where=where,
         )
     for name, data in flight.streams.items():
@@ -157,7 +173,8 @@ def resample(
         max_gap: longest step between samples [s] that is interpolated; a longer one splits the flight. A stream slower
             than that is allowed 2.5 of its own steps.
         shortest_piece: pieces below this [s] are dropped and recorded.
-        method: "linear" or "pchip"; attitude always goes by slerp.
+        method: "linear", "pchip" or "spline" (quintic: keeps what is fast, rings at steps); attitude always goes by
+            slerp.
         straighten: smooth the jitter of the stamps first (regular samples with irregular stamps only).
 
     Raises:
@@ -196,12 +213,12 @@ def resample(
         here: dict[str, Array] = {}
         for data in flight.streams.values():
             if _rate(data) > _FASTER * rate:
-                raw = _at(data, grid, method)
+                raw = _at(data, grid, method, max_gap=max_gap)
                 here |= {n: filtered(v, rate=fine, cutoff=ANTI_ALIAS * rate, order=4)[::factor] for n, v in raw.items()}
             else:
                 # Lines between slow samples are no signal of the fine grid: a filter would take them for one and shrink
                 # what is real (measured: 1.6 % of an input at 8 Hz, for 100 Hz commands beside 200 Hz motion).
-                here |= _at(data, coarse, method)
+                here |= _at(data, coarse, method, max_gap=max_gap)
         times.append(coarse)
         columns.append(here)
         segments.append((float(coarse[0]), float(coarse[-1])))
@@ -219,6 +236,12 @@ def resample(
         method=method,
         straighten=straighten,
         native_rate=round(native, 3),
+        slower={
+            str(name): round(_rate(data), 3)
+            for data in flight.streams.values()
+            if _FASTER * _rate(data) < rate
+            for name in data.data_vars
+        },
         anti_alias=ANTI_ALIAS * rate if factor > 1 else None,
         segments=len(segments),
         dropped_pieces=dropped,

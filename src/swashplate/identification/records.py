@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Array, Flight
+from swashplate.flights.flight import Array, Flight, did_you_mean
 from swashplate.flights.schema import ATTITUDE, POSITION
 from swashplate.physics.environment import Environment
 from swashplate.vehicles.vehicle import Vehicle
@@ -103,7 +103,8 @@ def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[A
             f"lacks what {who} needs; it has {', '.join(flight.channels) or 'nothing'}.",
             where=source,
             channel=", ".join(missing),
-            hint="Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
+            hint=did_you_mean(missing[0], flight.channels)
+            or "Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
         )
     table = flight.array(wanted)
     time = flight.time(wanted[0])

@@ -10,8 +10,9 @@ import numpy as np
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.response_cost import ParameterAccuracy
-from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET, fit_targets
+from swashplate.identification.state_space_fit import fit_targets
 from swashplate.identification.state_space_result import StateSpaceFit, Step
+from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
 
 GROWTH, LEAST_GROWTH = 0.05, 0.5
 """J_ave may grow by this share, or by this much, for a drop to stand."""

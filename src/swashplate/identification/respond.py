@@ -29,6 +29,8 @@ OVERLAP = 0.75
 """Hann windows that overlap so weigh every sample alike; less loses data, more only repeats."""
 INJECTED = ("sweep", "sid", "reference", "excitation")
 """Names of signals that a program adds to a command: they are part of an input, not another one."""
+SLOW = 1.0 / 3.0
+"""Share of a channel's own logging rate up to which it is used: beyond, samples fold and what is between is guessed."""
 SHORTEST = 0.2
 """Pieces shorter than this share of the longest are left out: they would shorten all windows."""
 PERIODS = 4.0
@@ -88,7 +90,8 @@ def respond(
         references: excitations that no loop feeds back (an autopilot's injected sweep): the joint input-output estimate
             is made, and compared with the direct one. One reference with as many flights as inputs counts as one
             reference per flight (one log per swept axis).
-        band: lowest and highest frequency [Hz]; by default one period of the longest window to a tenth of the rate.
+        band: lowest and highest frequency [Hz]; by default two periods of the longest window to a tenth of the rate. It
+            ends where the slowest channel's own rate does not carry further.
         windows: lengths [s]; by the book's rules where None, with a longer one where those blur a clear response.
         overlap: of neighbouring windows.
         bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
@@ -123,11 +126,19 @@ def respond(
         ]
     rate = 1.0 / pieces[0].dt
     highest = min(band[1], 0.499 * rate) if band else rate / 10.0
+    slow, slowest = _slowest(flights, (*inputs, *outputs, *references))
+    slow_words = []
+    if SLOW * slowest < highest:
+        slow_words = [
+            f"'{slow}' was logged {slowest:.3g} times a second: the band ends at {SLOW * slowest:.3g} Hz, not at "
+            f"{highest:.3g} Hz. Log it faster for more."
+        ]
+        highest = SLOW * slowest
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
     question = _Question(inputs, outputs, own[0].values.shape[1] - n)
-    limits = (band[0] if band else 0.0, highest)
+    limits = (band[0] if band else None, highest)
     estimate = _estimate(own, chosen.lengths, overlap, limits, question)
     half, words = min(piece.duration for piece in pieces) / 2.0, blur(estimate.blurred, estimate.made)
     blur_words: list[str] = []
@@ -141,12 +152,12 @@ def respond(
     omega, matrices, notes, blurred, made = estimate
     if scraps:
         notes.append(f"too short beside the longest record, left out: {', '.join(scraps)}.")
-    if band and band[1] > highest:
+    if band and band[1] > highest and not slow_words:
         notes.append(
             f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
         )
     made = replace(made, sources=tuple(piece.name for piece in pieces))
-    warnings, problems = [*chosen.warnings, *notes], response_warnings.damaged(flights)
+    warnings, problems = [*slow_words, *chosen.warnings, *notes], response_warnings.damaged(flights)
     problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
@@ -159,7 +170,9 @@ def respond(
     warnings += response_warnings.lead_words(made)
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
-    if others and not references:
+    if not references:
+        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED)
+    if others and not references and not all(name.startswith(INJECTED) for name in inputs):
         warnings += response_warnings.bystander_words(
             pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
         )
@@ -180,15 +193,21 @@ def respond(
 
 
 def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
-    """Other commands (unit "1") on the same time base in all flights, which may have moved with the named inputs."""
+    """Other commands on the same time base in all flights, which may have moved with the first of the named inputs.
+
+    A command has the unit "1", or none where that input has none (a table without units).
+    """
 
     def commands(flight: Flight) -> set[str]:
         home = flight.stream_of(named[0])
+        units = {"1", str(flight[named[0]].attrs.get("units", ""))} & {"1", ""}
         data = flight.streams[home]
         return {
             str(name)
             for name, values in data.data_vars.items()
-            if values.attrs.get("units") == "1" and np.all(np.isfinite(values.values)) and np.ptp(values.values) > 0.0
+            if values.attrs.get("units", "") in units
+            and np.all(np.isfinite(values.values))
+            and np.ptp(values.values) > 0.0
         }
 
     shared = set.intersection(*(commands(flight) for flight in flights))
@@ -214,11 +233,13 @@ def _estimate(
     pieces: Sequence[Signals],
     lengths: tuple[float, ...],
     overlap: float,
-    limits: tuple[float, float],
+    limits: tuple[float | None, float],
     question: _Question,
 ) -> _Estimate:
     """Responses in two passes, as the windows blur them and sharpened."""
-    lowest, highest = max(limits[0], 1.0 / lengths[0]), limits[1]
+    # What a loop makes of gusts rules below the sweep: unasked, the book's two periods; asked, down to one.
+    lowest = 2.0 / lengths[0] if limits[0] is None else max(limits[0], 1.0 / lengths[0])
+    highest = limits[1]
     if lowest >= highest:
         raise FlightError(
             f"the records tell nothing below {1.0 / lengths[0]:.3g} Hz, and {highest:.3g} Hz was asked as the "
@@ -232,6 +253,20 @@ def _estimate(
     guess = first_guess(blurred)
     rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
     return _Estimate(omega, matrices, notes, blurred, _composed(matrices, omega, question, guess=guess, rest=rest))
+
+
+def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
+    """The channel that was logged most slowly, by its flight's history, and its rate [Hz] (infinite for none)."""
+    rates = {
+        name: float(rate)
+        for flight in flights
+        for step in flight.history
+        if step.operation == "resample"
+        for name, rate in step.details.get("slower", {}).items()
+        if name in names
+    }
+    slow = min(rates, key=lambda name: rates[name], default="")
+    return slow, rates.get(slow, np.inf)
 
 
 def _unit(flight: Flight, name: str) -> str:

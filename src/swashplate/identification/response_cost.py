@@ -7,7 +7,7 @@ with the coherence g (Tischler and Remple 2012, eqs 11.2 and 11.3).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Target:
     @property
     def name(self) -> str:
         return f"{self.output} / {self.input}"
+
+    def above(self, omega: float) -> Target:
+        """The part from a frequency [rad/s] on."""
+        k = self.omega >= omega
+        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k])
 
     @property
     def weights(self) -> tuple[Array, Array]:
@@ -244,6 +249,11 @@ class ParameterAccuracy:
     @property
     def insensitivity_percent(self) -> float:
         return 100.0 * self.insensitivity / abs(self.value) if self.value else float("inf")
+
+
+def percent(value: float, *, width: int = 8) -> str:
+    """A figure in percent for a table; what is beyond all use keeps its column."""
+    return f"{value:>{width}.1f}" if value < 1e4 else f"{'>9999':>{width}}"
 
 
 def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:

@@ -128,6 +128,19 @@ def bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]
     return words
 
 
+def unused_references(flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...]) -> list[str]:
+    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one."""
+    shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
+    found = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
+    enough = len(found) >= len(inputs) or (len(found) == 1 and len(flights) >= len(inputs))
+    if not enough or any(name.startswith(names) for name in inputs):
+        return []
+    return [
+        f"the logs hold {', '.join(found)}: --references {','.join(found)} makes the estimate that no loop biases, "
+        "above all where little was swept."
+    ]
+
+
 def bystander_words(
     pieces: Sequence[Signals],
     omega: Array,

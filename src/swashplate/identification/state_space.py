@@ -9,7 +9,7 @@ which are exact to rounding for a grammar of arithmetic (Squire and Trapp 1998).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -142,6 +142,22 @@ class StateSpaceModel:
         return replace(
             made, parameters={**made.parameters, **{n: replace(made.parameters[n], value=v) for n, v in tied.items()}}
         )
+
+    def check_bounds(self, names: Iterable[str]) -> None:
+        """That parameters lie within their own bounds.
+
+        Raises:
+            CardError: naming the parameter, its value and its bounds.
+        """
+        for name in names:
+            p = self.parameters[name]
+            if not p.lower <= p.value <= p.upper:
+                raise CardError(
+                    f"is given as {p.value:g}, expected {p.lower:g} to {p.upper:g}{f' {p.unit}' if p.unit else ''}.",
+                    where=self.name,
+                    channel=name,
+                    hint="Give a value within the bounds of the model file, or change them there.",
+                )
 
     def matrices(self) -> dict[str, Array]:
         """M, F, G, H0, H1 and D as numbers."""

@@ -46,6 +46,8 @@ import numpy as np
 import tomli_w
 
 from swashplate.errors import CardError, ExpressionError
+from swashplate.flights.base_units import is_unit
+from swashplate.flights.schema import channel
 from swashplate.identification.expressions import Expression
 from swashplate.identification.state_space import Element, ModelParameter, StateSpaceModel
 
@@ -178,6 +180,7 @@ class _Reader:
             raise CardError(f"lower is {low:g}, above upper, {high:g}.", where=self.path, channel=name)
         if "tie" not in entry and not low <= value <= high:
             raise CardError(f"value {value:g} lies outside [{low:g}, {high:g}].", where=self.path, channel=name)
+        self._check_units({f"parameters.{name}.unit": entry.get("unit", "")})
         return ModelParameter(
             name=name,
             value=value,
@@ -270,6 +273,26 @@ class _Reader:
             if at[place] not in (0, "0", 0.0):
                 self._add("H1", row, self._state(rate, entry), f"{sign}({at[place]})", entry)
 
+    def _check_units(self, units: Mapping[str, Any]) -> None:
+        """That what stands for a unit is one, and that channels of flights are in the flights' own."""
+        for entry, unit in units.items():
+            if not isinstance(unit, str) or (unit and not is_unit(unit)):
+                raise CardError(
+                    f"unit {unit!r} is not known, expected a unit or a product of units.",
+                    where=self.path,
+                    channel=entry,
+                    hint='For example "rad/s", "m/s^2", "rad/(m s)" or "1"; "" where there is none.',
+                )
+            part, _, name = entry.removesuffix(".unit").partition(".")
+            wanted = channel(name).unit
+            if part in ("inputs", "outputs") and unit and wanted and unit != wanted:
+                raise CardError(
+                    f"unit is {unit!r}, expected {wanted!r}: flights hold '{name}' in {wanted}.",
+                    where=self.path,
+                    channel=entry,
+                    hint="Convert the model's numbers, or give the channel another name.",
+                )
+
     def _check_limits(self) -> None:
         for name, ends in self._table("limits").items():
             if name not in self.inputs:
@@ -300,11 +323,15 @@ class _Reader:
             row = self._state(name, f"equations.{name}")
             self._row(table, row, f"equations.{name}", of_states="F", of_inputs="G")
         units = {**self._table("states"), **self._table("inputs")}
+        self._check_units(
+            {f"{part}.{name}": u for part in ("states", "inputs") for name, u in self._table(part).items()}
+        )
         for row, (name, output) in enumerate(self._table("outputs").items()):
             entry = f"outputs.{name}"
             if not isinstance(output, Mapping) or set(output) - _OUTPUT:
                 raise CardError(f"may have only {', '.join(sorted(_OUTPUT))}.", where=self.path, channel=entry)
             units[name] = output.get("unit", "")
+            self._check_units({f"{entry}.unit": units[name]})
             self._row(output.get("of", {}), row, entry, of_states="H0", of_inputs="D")
             self._row(output.get("rates", {}), row, f"{entry}.rates", of_states="H1", of_inputs=None)
             if "specific_force" in output:

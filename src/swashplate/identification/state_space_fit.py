@@ -27,9 +27,7 @@ from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.spectra import Complex
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_result import StateSpaceFit
-
-CR_TARGET, I_TARGET = 20.0, 10.0
-"""Percent of the value that a Cramér-Rao bound and an insensitivity should not exceed (Tischler and Remple 2012)."""
+from swashplate.identification.state_space_words import words
 
 FAST_GROWTH = 1.0
 """1/s: a start model with a mode that grows faster is no helicopter, but a wrong sign."""
@@ -50,6 +48,9 @@ _HARD, _TURNED = 0.4, 0.08
 
 _ENOUGH = 1e-4
 """Share of the cost that an iteration has to gain for it to go on."""
+
+_UPPER, _POINTS = 3.0, 5
+"""Times the lowest frequency from which a fit to the upper ones begins, and how many points a response keeps there."""
 
 _VERY_WRONG = 3e4
 """J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
@@ -210,7 +211,7 @@ def fit_targets(
         )
         for name, p in found.parameters.items()
     )
-    warnings += _words(targets, costs, parameters, optimum)
+    warnings += words(targets, costs, parameters, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
     over = [c.name for c, above in zip(ceilings, every[len(targets) :], strict=True) if above > ACCEPTABLE]
     if over:
         warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
@@ -342,8 +343,10 @@ def _best(
             f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
         )
     best = min(ends, key=lambda end: end.cost)
+    if starts > 1 and iterations > _ROUGH and _bad(cost, best):
+        best = _from_above(model, cost, best, starts=starts, seed=seed)
     for turn in range(RESCUES if starts > 1 and iterations > _ROUGH else 0):
-        if np.mean(cost.each(best.row)) <= ACCEPTABLE:
+        if not _bad(cost, best):
             break
         before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
         if best.cost > _HOPE * before.cost:
@@ -352,6 +355,26 @@ def _best(
         cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
     )
     return replace(final, history=(*best.history, *final.history[1:])), cost
+
+
+def _bad(cost: ResponseCost, best: Optimum) -> bool:
+    """Whether the responses that were seen (not those that may not be exceeded) are badly fitted on average."""
+    seen = [j for j, t in zip(cost.each(best.row), cost.targets, strict=True) if not t.ceiling]
+    return float(np.mean(seen)) > ACCEPTABLE
+
+
+def _from_above(model: StateSpaceModel, cost: ResponseCost, best: Optimum, *, starts: int, seed: int) -> Optimum:
+    """A better end than a bad one, from a fit to the upper frequencies: slow responses are the least sure, and can hold
+    a search where the fast modes are wrong."""
+    least = _UPPER * min(float(t.omega[0]) for t in cost.targets)
+    upper = [part for t in cost.targets if (part := t.above(least)).omega.size >= _POINTS]
+    if all(t.ceiling for t in upper):
+        return best
+    end, other = _best(model, upper, starts=starts, iterations=_ROUGH, seed=seed, progress=None)
+    row = end.row * other.row.scale / cost.row.scale
+    if not np.isfinite(cost.cost(row)):
+        return best
+    return min((best, minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
 
 
 def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
@@ -370,28 +393,6 @@ def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
     hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
     ends = [minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
     return min((best, *ends), key=lambda end: end.cost)
-
-
-def _words(
-    targets: Sequence[Target],
-    costs: Sequence[float],
-    parameters: Sequence[ParameterAccuracy],
-    optimum: Optimum,
-) -> list[str]:
-    words = [] if optimum.converged else ["the iterations ran out."]
-    poor = [f"{t.name} ({cost:.0f})" for t, cost in zip(targets, costs, strict=True) if cost > ACCEPTABLE]
-    if poor:
-        words.append(f"J above {ACCEPTABLE:g}: {', '.join(poor)}.")
-    moving = [p for p in parameters if not p.fixed and not p.tie]
-    blind = [p.name for p in moving if p.insensitivity_percent > I_TARGET]
-    vague = [p.name for p in moving if p.cramer_rao_percent > CR_TARGET]
-    if blind:
-        words.append(f"insensitivity above {I_TARGET:g} %: {', '.join(blind)}.")
-    if vague:
-        words.append(f"Cramér-Rao bound above {CR_TARGET:g} %: {', '.join(vague)}.")
-    if optimum.at_bound:
-        words.append(f"ended on a bound: {', '.join(optimum.at_bound)}.")
-    return words
 
 
 def frequencies(targets: Sequence[Target]) -> tuple[float, float]:

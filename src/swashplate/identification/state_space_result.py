@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.flights.flight import Array
-from swashplate.identification.response_cost import ParameterAccuracy, Target
+from swashplate.identification.response_cost import ParameterAccuracy, Target, percent
 from swashplate.identification.state_space import StateSpaceModel
 
 
@@ -99,7 +99,7 @@ class StateSpaceFit:
         lines.append(f"  {'parameter':<14}{'start':>12}{'value':>12}{'CR %':>8}{'I %':>8}  unit")
         for p in self.parameters:
             moving = not p.fixed and not p.tie
-            cells = f"{p.cramer_rao_percent:>8.1f}{p.insensitivity_percent:>8.1f}" if moving else " " * 16
+            cells = percent(p.cramer_rao_percent) + percent(p.insensitivity_percent) if moving else " " * 16
             remark = f"  = {p.tie}" if p.tie else "  fixed" if p.fixed else "  at its bound" if p.at_bound else ""
             lines.append(f"  {p.name:<14}{p.start:>12.5g}{p.value:>12.5g}{cells}  {p.unit}{remark}")
         for step in self.reduction:

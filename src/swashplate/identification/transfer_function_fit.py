@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import tomli_w
 
 from swashplate.errors import IdentificationError
+from swashplate.flights.base_units import gain_unit
 from swashplate.flights.flight import Array
 from swashplate.flights.schema import channel
 from swashplate.identification.frequency_response import FrequencyResponse
@@ -19,6 +20,7 @@ from swashplate.identification.response_cost import (
     Target,
     accuracy_of,
     cost_of,
+    percent,
     target,
 )
 from swashplate.identification.rows import Entry, Row
@@ -34,6 +36,9 @@ _ROUGH, _FOLLOWED = 12, 3
 
 _LONGEST_DELAY = 0.5
 """s: a longer one is no delay of a flying thing."""
+
+_DAMPING = (-2.0, 10.0)
+"""Of a pair of roots: from fast growing to far apart."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +88,11 @@ class TransferFunctionFit:
 
     def __repr__(self) -> str:
         lines = [f"{model!r}   J = {cost:.1f}" for model, cost in zip(self.models, self.costs, strict=True)]
-        lines.append(f"  {'parameter':<24}{'value':>12}{'CR %':>9}{'I %':>9}")
+        lines.append(f"  {'parameter':<24}{'value':>12}{'CR %':>9}{'I %':>9}  unit")
         for p in self.parameters:
-            cells = "    fixed" if p.fixed else f"{p.cramer_rao_percent:>9.1f}{p.insensitivity_percent:>9.1f}"
-            lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}")
+            free = percent(p.cramer_rao_percent, width=9) + percent(p.insensitivity_percent, width=9)
+            cells = f"{'fixed':>9}{'':>9}" if p.fixed else free
+            lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}  {p.unit}".rstrip())
         return "\n".join([*lines, *(f"! {text}" for text in self.warnings)])
 
 
@@ -128,7 +134,7 @@ def fit_transfer_function(
     """
     form = Form.parse(form) if isinstance(form, str) else form
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
-    return _fit(wanted, form, fixed=dict(fixed or {}), seed=seed)
+    return _with_gain_units(_fit(wanted, form, fixed=dict(fixed or {}), seed=seed), responses)
 
 
 def targets_of(
@@ -180,12 +186,40 @@ def suggest(
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
     trials = []
     for form in forms:
-        fit = _fit(wanted, form, fixed={}, seed=seed)
+        fit = _with_gain_units(_fit(wanted, form, fixed={}, seed=seed), responses)
         trials.append(Trial(form, len(fit.parameters), fit.cost, fit))
     trials.sort(key=lambda trial: (trial.parameters, trial.cost))
     least = min(trial.cost for trial in trials)
     good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]
     return good[0], tuple(trials)
+
+
+def _with_gain_units(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
+    """The fit with the unit of each gain: output / input / s^(poles and integrators less zeros)."""
+    if not responses.output_units:
+        return fit
+    below = fit.form.poles + fit.form.integrators - fit.form.zeros
+    units = {}
+    for t in fit.targets:
+        o, i = responses.place(t.output, t.input)
+        unit = gain_unit(responses.output_units[o] or "1", responses.input_units[i] or "1", below)
+        units["K" if len(fit.targets) == 1 else f"K {t.output}"] = unit
+    return replace(fit, parameters=tuple(replace(p, unit=units.get(p.name, p.unit)) for p in fit.parameters))
+
+
+def _check_fixed(form: Form, values: Mapping[str, float]) -> None:
+    """That held numbers can belong to something that flies; a negative damping is an unstable mode and may."""
+    for name, value in values.items():
+        kind = name.split(" ")[0].split("_")[0]
+        bounds = {"tau": (0.0, _LONGEST_DELAY), "omega": (0.0, np.inf), "zeta": _DAMPING}
+        low, high = bounds.get(kind, (-np.inf, np.inf))
+        if not low <= value <= high or (kind in ("omega", "K") and value == 0.0):
+            expected = {"K": "other than 0", "omega": "above 0 rad/s", "tau": f"{low:g} to {high:g} s"}
+            raise IdentificationError(
+                f"is held at {value:g}, expected {expected.get(kind, f'{low:g} to {high:g}')} in the form {form.text}.",
+                channel=name,
+                hint="Give another value, or let it be found.",
+            )
 
 
 def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed: int) -> TransferFunctionFit:
@@ -200,6 +234,7 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
         raise IdentificationError(
             f"is no parameter of the form {form.text}; it has {', '.join(names)}.", channel=", ".join(unknown)
         )
+    _check_fixed(form, spread)
     free = [name for name in names if name not in spread]
 
     def models(values: Mapping[str, float]) -> list[TransferFunction]:
@@ -289,7 +324,7 @@ def _entry(name: str, value: float, targets: Sequence[Target]) -> Entry:
     if kind == "tau":
         return Entry(name, "parameter", value, 0.05, 0.0, _LONGEST_DELAY)
     if kind == "zeta":
-        return Entry(name, "parameter", value, 0.3, -2.0, 10.0)
+        return Entry(name, "parameter", value, 0.3, *_DAMPING)
     if kind == "omega":
         return Entry(name, "parameter", value, max(abs(value), low) / 2.0, low / 100.0, high * 30.0)
     if kind in ("zero", "pole"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swashplate.atomic import write_text
 from swashplate.errors import SwashError
-from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
+from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import render
 from swashplate.reporting.sections_responses import ResponseMaterial

@@ -15,8 +15,8 @@ from swashplate.identification.linear_time_fit import LinearTimeFit
 from swashplate.identification.mismatch import mismatch
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
-from swashplate.identification.state_space_fit import CR_TARGET, I_TARGET
 from swashplate.identification.state_space_result import StateSpaceFit
+from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
 from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
 from swashplate.identification.verification import Verification
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues

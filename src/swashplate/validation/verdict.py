@@ -47,7 +47,7 @@ def _one(
     beaten = [c for c in model if model[c] <= rivals[c]]
     worst = min(model.values())
     if judged and not any(item.identifiable for item in judged):
-        return AxisVerdict(axis, "cannot be judged", f"Cannot be judged from this flight: {said} {judged[0].words}")
+        return AxisVerdict(axis, "cannot be judged", f"{said} {judged[0].words}")
     if worst >= THRESHOLDS["good"] and not beaten:
         return AxisVerdict(axis, "good", said)
     if worst >= THRESHOLDS["usable"] and not beaten:

@@ -132,7 +132,7 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
         )
-    notes += _remarks(found, streams)
+    notes += [*_filters(told.parameters, streams), *_remarks(found, streams)]
     damage = (*found.damage, *filter(None, (said,)), *told.damage)
     provenance = source.provenance(
         NAME,
@@ -206,6 +206,22 @@ def _with_suffix(channel: str, suffix: str) -> str | None:
     return name if suffix and is_known(name) else None
 
 
+_FILTERED = (
+    ("INS_GYRO_FILTER", ("rates", "inertial"), "p q r"),
+    ("INS_ACCEL_FILTER", ("inertial",), "ax ay az"),
+)
+
+
+def _filters(parameters: Mapping[str, float], streams: Mapping[str, xr.Dataset]) -> list[str]:
+    """The autopilot's own low-passes on what it logs: second-order Butterworth, late by sqrt(2) / (2 pi corner)."""
+    return [
+        f"{channels} of {' and '.join(there)} have passed {name}, {corner:g} Hz: "
+        f"{1e3 * 2**0.5 / (2 * np.pi * corner):.1f} ms of any delay found with them is the filter's"
+        for name, homes, channels in _FILTERED
+        if (corner := parameters.get(name, 0.0)) > 0.0 and (there := [home for home in homes if home in streams])
+    ]
+
+
 def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
     remarks = []
     if "system_identification" in streams:
@@ -218,5 +234,7 @@ def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
     }
     remarks += checks.constant_notes(inputs)
     counts = {name: len(table) for name, table in found.tables.items()}
+    if "rates" not in streams:
+        remarks.append("no RATE message, so no commands to the mixer: set ATTITUDE_MED or _FAST in LOG_BITMASK")
     remarks += clocked.unread(counts, (*_STORIES, *(message.name for message in _MESSAGES)))
     return remarks
