@@ -123,7 +123,7 @@ def main() -> int:
         for old in FOLDER.glob("*.json"):
             old.unlink()
         runs.append(ran(["-m", "benchmarks.run", "--out", str((FOLDER / "benchmarks.json").relative_to(ROOT))]))
-        runs.append(ran(["-m", "pytest", "-m", "proof", "-q"]))
+        runs.append(ran(["-m", "pytest", "-m", "proof", "-q", "-n", "2", "--dist", "loadfile"]))
     PAGE.parent.mkdir(exist_ok=True)
     PAGE.write_text(assemble(FOLDER, runs), encoding="utf-8")
     print(f"Written: {PAGE.relative_to(ROOT)}")
