@@ -12,7 +12,7 @@ WORKERS ?= 2
 help:
 	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
 	@echo "make test   ruff, mypy, import-linter, pytest and the benchmarks in short"
-	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (an hour)"
+	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (half an hour)"
 	@echo "make clean  remove .venv and everything that was built"
 
 # The stamp is written last, so that an interrupted installation is done again and a finished one is not.

@@ -1,4 +1,4 @@
-"""Runs every proof and writes docs/proof.md from what came out: `make proof` (up to an hour).
+"""Runs every proof and writes docs/proof.md from what came out: `make proof` (half an hour).
 
     python scripts/proof.py [--assemble-only]
 
