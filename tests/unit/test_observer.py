@@ -77,7 +77,7 @@ def test_with_constant_gains_it_is_as_sure_as_it_may_be(tmp_path: Path) -> None:
     controller = with_steady_gain(made())
     found = trial(controller.vehicle, controller, duration=12.0, seeds=range(2), gusts=INDOOR)
     for state in found.states:  # attitude too, although offsets are unknown at the start
-        assert state.within >= 0.97, found
+        assert state.within >= 0.98, found
         assert 0.5 < state.nees < 2.0, found
     assert np.sqrt(np.mean(found.place**2)) < 0.08
     save_controller(controller, tmp_path / "c.toml")

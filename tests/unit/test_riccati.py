@@ -87,7 +87,7 @@ def test_its_derivatives_are_the_differences(seed: int) -> None:
     step = 1e-5
     slope = (float(size(step)) - float(size(-step))) / (2.0 * step)
     _, tangent = jax.jvp(size, (0.0,), (1.0,))
-    assert float(tangent) == pytest.approx(slope, rel=1e-6)
+    assert float(tangent) == pytest.approx(slope, rel=1e-7)
 
 
 def test_the_derivative_of_what_nobody_sees_is_the_horizon() -> None:
