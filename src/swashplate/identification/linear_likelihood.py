@@ -5,7 +5,7 @@ Every derivative is taken by complex steps through matrix exponentials and recur
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,19 +13,16 @@ from scipy.linalg import expm
 
 from swashplate.flights.flight import Array
 from swashplate.identification.expressions import Expression
-from swashplate.identification.rows import Entry, Row
+from swashplate.identification.rows import Entry
 from swashplate.identification.state_space import StateSpaceModel
+from swashplate.identification.time_likelihood import TimeErrors, gain_entries
 
 STEP = 1e-30
 """Of the complex steps."""
 
-_FIRST_GAIN = 0.3
-_DIVERGED = 1e9
-_EXACT = 1e-6
 
-
-class OutputErrors:
-    """The likelihood of output errors or innovations; `refresh` takes their covariance anew for gradient and metric.
+class OutputErrors(TimeErrors):
+    """The likelihood of a linear model's output errors, or of its innovations.
 
     Args:
         model: structure and start values. outputs: channels to fit.
@@ -46,67 +43,26 @@ class OutputErrors:
         gain: bool,
     ) -> None:
         self.delays = delays
-        self.model, self.outputs, self.pieces = model, outputs, pieces
+        self.model, self._gained = model, gain
         self.rows_of = [model.outputs.index(o) for o in outputs]
-        m = len(model.inputs)
-        spread = np.std(np.concatenate([table[:, m:] for _, table in pieces]), axis=0) + 1e-12
-        self.floor = (_EXACT * spread) ** 2
-        self.covariance = np.diag((0.1 * spread) ** 2)
         entries = [
             Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper)
             for n in model.free
             for p in (model.parameters[n],)
         ]
-        size = {s: float(spread[outputs.index(s)]) if s in outputs else 1.0 for s in model.states}
-        for number in range(len(pieces)):
-            for s in model.states:
-                first = pieces[number][1][0, m + outputs.index(s)] if s in outputs else 0.0
-                entries.append(Entry(f"start {s}[{number}]", "initial", float(first), 0.3 * size[s]))
-                if shifts:
-                    entries.append(Entry(f"shift {s}[{number}]", "nuisance", 0.0, 0.1 * size[s]))
-            for o in biases:
-                entries.append(Entry(f"bias {o}[{number}]", "nuisance", 0.0, 0.1 * float(spread[outputs.index(o)])))
-        if gain:
-            entries += self._noise_entries(size, dict(zip(outputs, map(float, spread), strict=True)))
-        self._row = Row(tuple(entries))
-        self._place = {name: i for i, name in enumerate(self._row.names)}
+        super().__init__(
+            entries, states=model.states, outputs=outputs, pieces=pieces, rest={}, shifts=shifts, biases=biases
+        )
 
-    def _noise_entries(self, size: dict[str, float], spread: dict[str, float]) -> list[Entry]:
-        """What the gain is made of, from the sizes of states and outputs."""
-        return [
-            Entry(f"gain {s}/{o}", "noise", _FIRST_GAIN * (s == o), 0.1 * size[s] / spread[o])
-            for s in self.model.states
-            for o in self.outputs
-        ]
+    def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
+        return gain_entries(self.model.states, size, spread) if self._gained else []
 
-    @property
-    def row(self) -> Row:
-        return self._row
+    def _plain(self, row: Array) -> Array:
+        return np.asarray(self._errors(np.asarray(row * self.row.scale)[None])[0].real)
 
-    def refresh(self, row: Array) -> None:
-        errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-        if np.all(np.isfinite(errors)) and np.max(np.abs(errors)) < _DIVERGED:
-            self.covariance = self._covariance(errors)
-
-    def _covariance(self, errors: Array) -> Array:
-        return np.asarray(errors.T @ errors / len(errors) + np.diag(self.floor))
-
-    def cost(self, row: Array) -> float:
-        """Negative log-likelihood at its own covariance, without constants: n/2 log det S."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            errors = self._errors(np.asarray(row * self.row.scale)[None])[0].real
-        if not np.all(np.isfinite(errors)) or np.max(np.abs(errors)) > _DIVERGED:
-            return float("inf")
-        return 0.5 * len(errors) * float(np.linalg.slogdet(self._covariance(errors))[1])
-
-    def scores(self, row: Array) -> tuple[float, Array, Array]:
+    def _with_slopes(self, row: Array) -> tuple[Array, Array]:
         errors = self._errors(self._stepped(row))
-        plain, slopes = errors[0].real, errors[1:].imag / STEP * self.row.scale[:, None, None]
-        metric = np.linalg.inv(self.covariance)
-        weighted = slopes @ metric
-        gradient = np.einsum("pti,ti->p", weighted, plain)
-        information = np.einsum("pti,qti->pq", weighted, slopes, optimize=True)
-        return 0.5 * len(plain) * float(np.linalg.slogdet(self._covariance(plain))[1]), gradient, information
+        return errors[0].real, errors[1:].imag / STEP * self.row.scale[:, None, None]
 
     def _stepped(self, row: Array) -> Any:
         """A row's numbers, plain and with a complex step in each."""

@@ -11,70 +11,29 @@ The covariance of the errors alternates with Fisher scoring; derivatives by comp
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Array, Flight
+from swashplate.flights.flight import Flight
 from swashplate.identification.expressions import Expression
 from swashplate.identification.linear_filter import FilterErrors
 from swashplate.identification.linear_likelihood import OutputErrors
 from swashplate.identification.records import uniform_table
-from swashplate.identification.response_cost import ParameterAccuracy
-from swashplate.identification.scoring import Optimum, minimise
 from swashplate.identification.state_space import StateSpaceModel
-
-METHODS = ("output-error", "filter-error", "prediction-error")
-
-VAGUE = 50.0
-"""Percent of a value that a standard deviation may have before it is said."""
+from swashplate.identification.time_fit import TimeFit, check_method, solve
 
 
-@dataclass(frozen=True)
-class LinearTimeFit:
-    """A model fitted to records in time.
-
-    Attributes:
-        model: identified. parameters: with standard deviations in `cramer_rao` (from the Fisher information).
-        covariance: of the output errors (or innovations). method: one of `METHODS`.
-        constants: start states, shifts and biases that were solved for, by name and record.
-        history: cost after each iteration. converged: False where the iterations ran out.
-    """
-
-    model: StateSpaceModel
-    parameters: tuple[ParameterAccuracy, ...]
-    covariance: Array
-    constants: Mapping[str, float]
-    history: tuple[float, ...]
-    converged: bool
-    method: str = "output-error"
-    warnings: tuple[str, ...] = ()
-    sources: tuple[str, ...] = ()
-
-    def __getitem__(self, name: str) -> ParameterAccuracy:
-        return next(p for p in self.parameters if p.name == name)
-
-    def __repr__(self) -> str:
-        rows = [f"  {p.name:<12}{p.value:>12.5g} +- {p.cramer_rao:.2g}  {p.unit}" for p in self.parameters]
-        told = [f"! {text}" for text in self.warnings]
-        return "\n".join([f"{self.model.name} fitted in time by {self.method}", *rows, *told])
+@dataclass(frozen=True, repr=False)
+class LinearTimeFit(TimeFit[StateSpaceModel]):
+    """A state-space model fitted to records in time or over frequencies."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Numbers and words as JSON types."""
+        """Numbers and words as JSON types, with the eigenvalues."""
         return {
-            "kind": "time-fit",
-            "model": self.model.name,
-            "method": self.method,
-            "parameters": [vars(p) for p in self.parameters],
-            "constants": dict(self.constants),
-            "covariance": self.covariance.tolist(),
+            **super().as_dict(),
             "eigenvalues": [[float(v.real), float(v.imag)] for v in self.model.eigenvalues()],
-            "converged": self.converged,
-            "warnings": list(self.warnings),
-            "sources": list(self.sources),
         }
 
 
@@ -108,8 +67,7 @@ def fit_in_time(
     """
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     names = tuple(outputs or model.outputs)
-    if method not in METHODS:
-        raise IdentificationError(f"'{method}' is no method; there are {', '.join(METHODS)}.", channel="method")
+    check_method(method)
     if not model.free:
         raise IdentificationError("has no free parameter.", channel=model.name)
     unknown = [o for o in (*names, *biases) if o not in model.outputs]
@@ -124,54 +82,19 @@ def fit_in_time(
             sources.append(f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s")
     kind = FilterErrors if method == "filter-error" else OutputErrors
     likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
-    optimum = minimise(likelihood, iterations=iterations, tolerance=0.02, progress=progress)
-    numbers = optimum.row * likelihood.row.scale
-    spread = np.sqrt(np.diag(np.linalg.pinv(optimum.information, hermitian=True))) * likelihood.row.scale
-    logarithmic = likelihood.row.column("logarithmic") > 0.0
-    named = dict(
-        zip(
-            likelihood.row.names,
-            np.where(logarithmic, np.exp(np.where(logarithmic, numbers, 0.0)), numbers),
-            strict=True,
-        )
-    )
-    found = model.with_values({n: float(named[n]) for n in model.free})
-    k = len(model.free)
-    parameters = tuple(
-        ParameterAccuracy(
-            n,
-            model.parameters[n].unit,
-            model.parameters[n].value,
-            float(named[n]),
-            float(spread[i]),
-            1.0 / float(np.sqrt(optimum.information[i, i])) * float(likelihood.row.scale[i]),
-            at_bound=n in optimum.at_bound,
-        )
-        for i, n in enumerate(model.free)
-    )
-    kept = {n: float(v) for n, v in list(named.items())[k:]}
+    units = [model.parameters[n].unit for n in model.free]
+    solved = solve(likelihood, units, iterations=iterations, progress=progress)
     return LinearTimeFit(
-        found,
-        parameters,
-        likelihood.covariance,
-        kept,
-        optimum.history,
-        optimum.converged,
-        method,
-        _words(parameters, optimum),
-        tuple(sources),
+        model=model.with_values({n: solved.numbers[n] for n in model.free}),
+        parameters=solved.parameters,
+        covariance=likelihood.covariance,
+        constants=solved.constants,
+        history=solved.optimum.history,
+        converged=solved.optimum.converged,
+        method=method,
+        warnings=solved.warnings,
+        sources=tuple(sources),
     )
-
-
-def _words(parameters: Sequence[ParameterAccuracy], optimum: Optimum) -> tuple[str, ...]:
-    words = [] if optimum.converged else ["the iterations ran out."]
-    vague = [p.name for p in parameters if not p.cramer_rao_percent <= VAGUE]
-    if vague:
-        words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
-    stopped = [p.name for p in parameters if p.at_bound]
-    if stopped:
-        words.append(f"ended on a bound: {', '.join(stopped)}.")
-    return tuple(words)
 
 
 def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:
