@@ -125,12 +125,24 @@ def spectral_matrix(
     return SpectralMatrix(n * dt, averages, values, tuple(piece.name for piece in long_enough))
 
 
+_BLOCK = 64
+"""Samples of a kernel that are made at once: few enough to stay in a processor's cache."""
+
+
 def _kernel(omega: Array, taper: Array, dt: float) -> Array:
     """Columns of cosines and minus sines under the taper, blind to a constant, shape (n, 2 n_frequencies)."""
     # e^(-j omega dt n) with n = 64 b + a as a product of two small tables: sines are dear, products are not.
-    fine = np.exp(-1j * dt * np.outer(np.arange(64), omega))
-    coarse = np.exp(-64j * dt * np.outer(np.arange(-(-taper.size // 64)), omega))
-    wave = (coarse[:, None, :] * fine).reshape(-1, omega.size)[: taper.size]
-    kernel = np.concatenate([wave.real, wave.imag], axis=1) * taper[:, None]
+    fine = np.exp(-1j * dt * np.outer(np.arange(_BLOCK), omega))
+    coarse = np.exp(-1j * dt * _BLOCK * np.outer(np.arange(-(-taper.size // _BLOCK)), omega))
+    kernel = np.empty((taper.size, 2 * omega.size))
+    blocks = [slice(first, first + _BLOCK) for first in range(0, taper.size, _BLOCK)]
+    for start, block in zip(coarse, blocks, strict=True):
+        weight = taper[block, None]
+        wave = start * fine[: len(weight)]
+        np.multiply(wave.real, weight, out=kernel[block, : omega.size])
+        np.multiply(wave.imag, weight, out=kernel[block, omega.size :])
     # The tapered mean is taken out of every window: at the lowest line it would leak in from frequency zero.
-    return np.asarray(kernel - np.outer(taper / taper.sum(), kernel.sum(axis=0)))
+    mean = kernel.sum(axis=0) / taper.sum()
+    for block in blocks:
+        kernel[block] -= taper[block, None] * mean
+    return kernel
