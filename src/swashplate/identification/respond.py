@@ -81,6 +81,7 @@ def respond(
     windows: Sequence[float] | None = None,
     overlap: float = OVERLAP,
     bystanders: Sequence[str] | None = None,
+    lines: int = LINES_PER_DECADE,
 ) -> FrequencyResponse:
     """Frequency responses of outputs to inputs, all inputs conditioned on each other, composite over windows.
 
@@ -96,6 +97,7 @@ def respond(
         overlap: of neighbouring windows.
         bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
             in the flights. They only warn.
+        lines: frequencies per decade.
 
     Raises:
         FlightError: no channel or no record to work on; messages name them.
@@ -137,7 +139,7 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    question = _Question(inputs, outputs, own[0].values.shape[1] - n)
+    question = _Question(inputs, outputs, own[0].values.shape[1] - n, lines)
     limits = (band[0] if band else None, highest)
     estimate = _estimate(own, chosen.lengths, overlap, limits, question)
     half, words = min(piece.duration for piece in pieces) / 2.0, blur(estimate.blurred, estimate.made)
@@ -219,6 +221,7 @@ class _Question:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     references: int
+    lines: int
 
 
 class _Estimate(NamedTuple):
@@ -247,7 +250,7 @@ def _estimate(
             where=", ".join(piece.name for piece in pieces),
             hint="Give longer records or a higher band.",
         )
-    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
+    omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(question.lines * np.log10(highest / lowest))))
     matrices, notes = _matrices(pieces, omega, lengths, overlap)
     blurred = _composed(matrices, omega, question)
     guess = first_guess(blurred)
