@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from swashplate.identification.state_space_file import structure
     from swashplate.identification.state_space_fit import fit_state_space
     from swashplate.identification.transfer_function_fit import fit_transfer_function
+    from swashplate.identification.vehicle_time_fit import fit_vehicle
     from swashplate.identification.verification import verify
     from swashplate.reporting.report import report
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
@@ -61,6 +62,7 @@ __all__ = [
     "autopilot",
     "fit_state_space",
     "fit_transfer_function",
+    "fit_vehicle",
     "hover_hold",
     "identify",
     "inspect",
@@ -102,6 +104,7 @@ _LIGHT: Mapping[str, tuple[str, str]] = {
 _COMPUTING: Mapping[str, tuple[str, str]] = {
     "Sensors": ("swashplate.simulation.sensors", "Sensors"),
     "autopilot": ("swashplate.control.autopilot", "autopilot"),
+    "fit_vehicle": ("swashplate.identification.vehicle_time_fit", "fit_vehicle"),
     "hover_hold": ("swashplate.control.hold", "hover_hold"),
     "identify": ("swashplate.identification.identify", "identify"),
     "linearize": ("swashplate.simulation.linearize", "linearize"),
