@@ -60,6 +60,11 @@ def test_trex_tells_what_it_cannot(shared_data: Path) -> None:
     assert band is not None
     assert 0.9 < band[1] / (2 * np.pi) < 2.0
     assert any("p / stick_lateral" in text and "runs ahead" in text for text in found.warnings)
+    # A fit of it says so too: it may be all that somebody reads.
+    assert any(
+        "runs ahead" in text
+        for text in fit_transfer_function(found, "0/1", input="stick_lateral", outputs=["p"]).warnings
+    )
     assert found.band("p", "stick_collective") is None
 
 

@@ -42,6 +42,8 @@ _UNITS: dict[str, tuple[str, float]] = {
     "rad/s": ("rad/s", 1.0),
     "deg/s": ("rad/s", _DEGREE),
     "rpm": ("rad/s", _TURN / 60.0),
+    "rad/s^2": ("rad/s^2", 1.0),
+    "deg/s^2": ("rad/s^2", _DEGREE),
     "1": ("1", 1.0),
     "%": ("1", 1e-2),
     "V": ("V", 1.0),
@@ -64,6 +66,8 @@ _SPELLINGS = {
     "kt": "kn", "kts": "kn", "knots": "kn", "kph": "km/h",
     "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad",
     "deg/sec": "deg/s", "°/s": "deg/s", "dps": "deg/s", "rad/sec": "rad/s", "r/min": "rpm", "1/min": "rpm",
+    "rad/s2": "rad/s^2", "rad/s²": "rad/s^2", "deg/s2": "deg/s^2", "deg/s²": "deg/s^2", "°/s²": "deg/s^2",
+    "rad/sec2": "rad/s^2", "deg/sec2": "deg/s^2",
     "-": "1", "percent": "%", "volt": "V", "volts": "V",
 }  # fmt: skip
 

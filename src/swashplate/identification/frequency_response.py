@@ -208,7 +208,7 @@ class FrequencyResponse:
     def __repr__(self) -> str:
         low, high = self.omega[0] / TWO_PI, self.omega[-1] / TWO_PI
         lines = [
-            f"FrequencyResponse ({self.method}): {len(self.outputs)} outputs, {len(self.inputs)} inputs, "
+            f"FrequencyResponse ({self.method}): {_counted(self.outputs, 'output')}, {_counted(self.inputs, 'input')}, "
             f"{self.omega.size} lines {low:.3g}-{high:.3g} Hz, windows {', '.join(f'{w:.3g}' for w in self.windows)} s"
         ]
         lines.append(f"  {'output / input':<32}{'coherent band [Hz]':>20}{'coherence':>11}{'error [dB]':>12}")
@@ -243,3 +243,7 @@ def unwrapped_degrees(h: Complex) -> Array:
         degrees = np.degrees(np.unwrap(np.angle(h[known])))
         phase[known] = degrees - (360.0 if degrees[0] > 90.0 + 1e-9 else 0.0)
     return phase
+
+
+def _counted(names: tuple[str, ...], what: str) -> str:
+    return f"{len(names)} {what}{'s' * (len(names) != 1)}"

@@ -134,7 +134,7 @@ def fit_transfer_function(
     """
     form = Form.parse(form) if isinstance(form, str) else form
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
-    return _with_gain_units(_fit(wanted, form, fixed=dict(fixed or {}), seed=seed), responses)
+    return _as_told(_fit(wanted, form, fixed=dict(fixed or {}), seed=seed), responses)
 
 
 def targets_of(
@@ -186,12 +186,19 @@ def suggest(
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
     trials = []
     for form in forms:
-        fit = _with_gain_units(_fit(wanted, form, fixed={}, seed=seed), responses)
+        fit = _as_told(_fit(wanted, form, fixed={}, seed=seed), responses)
         trials.append(Trial(form, len(fit.parameters), fit.cost, fit))
     trials.sort(key=lambda trial: (trial.parameters, trial.cost))
     least = min(trial.cost for trial in trials)
     good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]
     return good[0], tuple(trials)
+
+
+def _as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
+    """The fit with its gains' units, and with what its responses were warned of: it is no better than they are."""
+    pairs = tuple(f"{t.output} / {t.input}:" for t in fit.targets)
+    heard = tuple(words for words in (*responses.warnings, *responses.problems) if words.startswith(pairs))
+    return _with_gain_units(replace(fit, warnings=(*fit.warnings, *heard)), responses)
 
 
 def _with_gain_units(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:

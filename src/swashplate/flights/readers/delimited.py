@@ -151,12 +151,13 @@ def _check_units(columns: Mapping[str, _Column], options: Options, source: Sourc
     ]
     if lacking:
         name, unit = lacking[0], _expected(lacking[0])
+        every = " ".join(f"--unit {each}={_expected(each)}" for each in lacking)
         raise UnitError(
             f"{'has' if len(lacking) == 1 else 'have'} no unit, expected [{'], ['.join(map(_expected, lacking))}] "
             "or what can be converted to it.",
             where=source.name,
             channel=", ".join(lacking),
-            hint=f"Write it in the header, as '{name} [{unit}]', or give --unit {name}={unit} "
+            hint=f"Write it in the header, as '{name} [{unit}]', or give what it is, as {every} "
             f"(in Python units={{'{name}': '{unit}'}}).",
         )
 
