@@ -90,6 +90,29 @@ def test_derivatives_are_exact() -> None:
             np.testing.assert_allclose(slope[:, k], expected, atol=size)
 
 
+def test_an_output_without_a_unit_has_its_states_or_the_schemas() -> None:
+    """Without one an angle would be judged in radians, and hardly any model would be bad."""
+    text = """
+    kind = "state-space"
+    name = "short period"
+    [states]
+    alpha = "rad"
+    [inputs]
+    elevator = "rad"
+    [equations]
+    alpha = {alpha = "-1", elevator = "1"}
+    [outputs.alpha]
+    of = {alpha = "1"}
+    [outputs.az]
+    of = {alpha = "-60"}
+    [outputs.load]
+    of = {alpha = "6"}
+    [parameters]
+    """
+    model = parse(text)
+    assert {name: model.units[name] for name in model.outputs} == {"alpha": "rad", "az": "m/s^2", "load": ""}
+
+
 def test_accelerometer_away_from_the_centre_of_gravity() -> None:
     """ay = vdot - g phi + x_s rdot - z_s pdot (hover)."""
     plain = structure("six_dof")

@@ -330,7 +330,7 @@ class _Reader:
             entry = f"outputs.{name}"
             if not isinstance(output, Mapping) or set(output) - _OUTPUT:
                 raise CardError(f"may have only {', '.join(sorted(_OUTPUT))}.", where=self.path, channel=entry)
-            units[name] = output.get("unit", "")
+            units[name] = output.get("unit", units.get(name, "") or channel(name).unit)  # a state's, or the schema's
             self._check_units({f"{entry}.unit": units[name]})
             self._row(output.get("of", {}), row, entry, of_states="H0", of_inputs="D")
             self._row(output.get("rates", {}), row, f"{entry}.rates", of_states="H1", of_inputs=None)
