@@ -37,8 +37,8 @@ def test_build_up_is_automatic_differentiation(name: str, course: dict[str, floa
 
 
 FORMS = [
-    ({"in_plane": "thrust-tilt", "inflow": "uniform", "bar": True}, {"speed": 12.0}),
-    ({"yaw_at_blades": True}, {"speed": 15.0, "turn": 0.3}),
+    ({"in_plane": "thrust-tilt", "inflow": "uniform", "bar": True, "yaw_at_hub": False}, {"speed": 12.0}),
+    ({"yaw_at_blades": True, "precession_torque": True}, {"speed": 15.0, "turn": 0.3}),
     ({"yaw_at_blades": True, "coning": False, "in_plane": "thrust-tilt", "rotation": "cw"}, {"speed": 25.0}),
 ]
 

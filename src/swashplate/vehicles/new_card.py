@@ -68,7 +68,8 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             note="",
         )
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
-    options = {**pattern.options, "rotation": rotation, "yaw_at_blades": True}
+    parts = {name: value for name, value in pattern.options.items() if name not in ("in_plane", "yaw_at_hub")}
+    options = {**parts, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}
     return Card("conventional", title, trust, options, parameters)
 
 
