@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate.errors import TrimError
 from swashplate.physics.environment import Environment
 from swashplate.simulation.derivatives import options_of
 from swashplate.simulation.trim import Trim, trim
@@ -37,9 +38,10 @@ class Assumption:
     """One thing that a report may assume, in the words of the command line."""
 
     words: str
-    option: tuple[str, Any] | None
-    zero: str | None
-    new_trim: bool
+    option: tuple[str, Any] | None = None
+    zero: str | None = None
+    new_trim: bool = False
+    mixes: bool = False  # the other kind of roll and yaw rows
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def hold_against(vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, 
         vehicle: a single-rotor card with inflow "glauert" or "uniform" and no phase lag.
         at: its trim, in straight flight.
         published: by the names of `DerivativeTable`, SI.
-        primed: the published roll and yaw rows are mixed by the product of inertia.
+        primed: the published roll and yaw rows are taken to be mixed by the product of inertia.
 
     Raises:
         SwashError: for a vehicle without a build-up.
@@ -92,27 +94,33 @@ def hold_against(vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, 
     scale = _scale(published)
     comparison = Comparison(published, scale, ())
 
-    def step(words: str, flown: Vehicle, where: Trim) -> Step:
+    def step(words: str, flown: Vehicle, where: Trim, mixed: bool) -> Step:
         table = build_up(flown, where.state, where.inputs, where.environment)
-        if primed:
+        if mixed:
             card = flown.card.values()
             table = table.primed(**{name: card[name] for name in ("inertia_xx", "inertia_zz", "inertia_xz")})
         off = np.abs(list(comparison.differences(table).values()))
         return Step(words, table, float(np.mean(np.minimum(off, 1.0))), int(np.sum(off <= 0.1)))
 
-    steps, here = [step("", vehicle, at)], (vehicle, at)
-    left = list(_assumptions(vehicle))
+    here = (vehicle, at, primed)
+    steps, left = [step("", *here)], list(_assumptions(vehicle, primed))
     while left:
         tried = []
         for assumption in left:
             flown = _with(here[0], assumption)
-            where = _again(flown, here[1]) if assumption.new_trim else here[1]
-            tried.append((step(assumption.words, flown, where), flown, where, assumption))
-        best, flown, where, taken = min(tried, key=lambda each: each[0].mean)
+            try:
+                where = _again(flown, here[1]) if assumption.new_trim else here[1]
+            except TrimError:  # it cannot fly with this one: no explanation
+                continue
+            there = (flown, where, here[2] != assumption.mixes)
+            tried.append((step(assumption.words, *there), there, assumption))
+        if not tried:
+            break
+        best, there, taken = min(tried, key=lambda each: each[0].mean)
         if best.mean > steps[-1].mean - _WORTH:
             break
         steps.append(best)
-        here = (flown, where)
+        here = there
         left.remove(taken)
     return replace(comparison, steps=tuple(steps))
 
@@ -126,16 +134,18 @@ def _scale(published: Mapping[str, float]) -> dict[str, float]:
     return {name: max(abs(value), _SMALL * kinds[kind[name]], 1e-12) for name, value in published.items()}
 
 
-def _assumptions(vehicle: Vehicle) -> Iterable[Assumption]:
+def _assumptions(vehicle: Vehicle, primed: bool) -> Iterable[Assumption]:
     options, card = options_of(vehicle), vehicle.card.values()
+    if card.get("inertia_xz"):
+        yield Assumption("without --primed" if primed else "--primed", mixes=True)
     for name, values, new_trim in _SWITCHES:
         for value in values:
             if getattr(options, name, value) != value:
                 words = f"--option {name}={str(value).lower()}"
-                yield Assumption(words, (name, value), None, new_trim)
+                yield Assumption(words, option=(name, value), new_trim=new_trim)
     for name, new_trim in _ZEROS:
         if card.get(name):
-            yield Assumption(f"--set {name}=0", None, name, new_trim)
+            yield Assumption(f"--set {name}=0", zero=name, new_trim=new_trim)
 
 
 def _with(vehicle: Vehicle, assumption: Assumption) -> Vehicle:
