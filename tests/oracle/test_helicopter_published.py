@@ -111,24 +111,37 @@ def test_the_lynxs_torque_has_no_drag_of_the_thrust() -> None:
     assert math.degrees(bank) == pytest.approx(-3.051, abs=0.01)
 
 
-FUSELAGE = {
-    "fuselage_area_x": 24.0 * 0.04233,
-    "fuselage_area_y": 32.0 * 0.488,
-    "fuselage_pitch_volume": 288.0 * 0.058,
-    "fuselage_yaw_volume": 384.0 * 0.0465,
-    "fuselage_pitch_zero": -288.0 * 0.00747,
-}
-"""The public model's tables of the fuselage about straight ahead: reference areas and volumes times slopes per rad."""
-AT_SPEED = "Xq Xp XB1 XA1 Ztheta0 Mq Mp MB1 MA1 Yp YB1 YA1 Lw Lq Lv Lp Ltheta0 LB1 LA1 NA1 Xw Xv Yw Mv Zw"
+AT_SPEED = "Xq Xp XB1 XA1 Ztheta0 Mp MB1 MA1 Yp YB1 YA1 Lw Lq Lv Lp Ltheta0 LB1 LA1 NA1 Xv Yw Mv Mq Zw"
 
 
 @pytest.mark.parametrize("knots", [20, 40, 60])
 def test_the_lynx_at_speed(knots: int) -> None:
-    """The main rotor's own derivatives within 3.5 %; Z_w, M_v and what is small within 6.5 %."""
-    found, published = lynx(speed=knots * KNOT, **FUSELAGE), lynx_published(knots)
+    """The main rotor's own derivatives within 2.5 %; M_q, Z_w and what is small within 6.5 %."""
+    found, published = lynx(speed=knots * KNOT), lynx_published(knots)
     names = AT_SPEED.split()
     for name in names:
-        assert found[name] == pytest.approx(published[name], rel=0.065 if name in names[-5:] else 0.035), name
+        assert found[name] == pytest.approx(published[name], rel=0.065 if name in names[-5:] else 0.025), name
+
+
+@pytest.mark.parametrize("knots", [20, 40, 60])
+def test_the_lynxs_airframe_at_speed_is_four_numbers(knots: int) -> None:
+    """Drag area, slopes of tailplane and fin and the fuselage's volume that X_u, M_q, L_r and M_w at 60 kn ask for.
+
+    With them these four, N_r and M_theta0 are Padfield's at 20 and 40 kn too, and so is the pitch attitude: the forms
+    are right, the public model's numbers are not this table's.
+    """
+    airframe = {
+        "fuselage_area_x": 1.95,
+        "tailplane_lift_slope": 3.42,
+        "fin_lift_slope": 4.09,
+        "fuselage_pitch_volume": 18.2,
+    }
+    found, published = lynx(speed=knots * KNOT, **airframe), lynx_published(knots)
+    for name, within in (("Xu", 0.05), ("Mq", 0.005), ("Lr", 0.01), ("Mw", 0.04), ("Nr", 0.03), ("Mtheta0", 0.02)):
+        assert found[name] == pytest.approx(published[name], rel=within), name
+    plain = lynx(speed=knots * KNOT)
+    assert abs(plain["Xu"] / published["Xu"] - 1.0) > 0.25
+    assert abs(plain["Lr"] / published["Lr"] - 1.0) > 0.2
 
 
 def test_the_lynxs_yaw_column_is_a_main_rotor_that_does_not_feel_the_yaw() -> None:

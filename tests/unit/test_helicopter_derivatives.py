@@ -58,6 +58,8 @@ def test_build_up_of_the_other_forms(options: dict[str, object], course: dict[st
             "tail_flap_frequency": 1.03,
             "tailplane_incidence": -0.03,
             "tailplane_drop": 0.8,
+            "tailplane_wake": 1.2,
+            "fuselage_wake": 0.7,
             "fin_incidence": 0.05,
             "fin_wake": 0.5,
             "fuselage_area_x": 1.0,

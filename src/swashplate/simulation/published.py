@@ -29,7 +29,13 @@ _SWITCHES: tuple[tuple[str, tuple[Any, ...], bool], ...] = (
     ("precession_torque", (True, False), False),
 )
 """Option, its values, and whether the trim of a straight flight changes with it."""
-_ZEROS = (("wake_distortion", False), ("rotor_drag_thrust", True), ("fin_wake", True))
+_ZEROS = (
+    ("wake_distortion", False),
+    ("rotor_drag_thrust", True),
+    ("fin_wake", True),
+    ("tailplane_wake", True),
+    ("fuselage_wake", True),
+)
 """Number that reports leave out, and whether the trim changes with it."""
 
 
