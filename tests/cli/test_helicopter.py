@@ -247,13 +247,13 @@ def test_a_card_that_is_written_wrongly(new_card: str, change: Callable[[str], s
 
 
 def test_a_card_like_the_lynx_cones_feels_the_yaw_and_takes_a_fuselage() -> None:
-    """What the Lynx leaves out is 0 on its card; the bounds of a card like it leave room for a real number."""
+    """What the Lynx's table leaves out is on in a card like it, whose bounds leave room for a real number."""
     card = new_card_of("A report's", mass=2200.0, radius=4.9, rotation="cw", like="lynx")
     felt = {"yaw_at_blades": True, "precession_torque": True}
     assert dict(card.options) == {"rotation": "cw", "coning": True, **felt}
-    for name, real in (("fuselage_area_x", 1.2), ("fuselage_area_y", 8.0), ("bar_gain", 0.8)):
+    assert (card.values()["tailplane_wake"], card.values()["fuselage_wake"]) == (1.5, 1.0)
+    for name, real in (("fuselage_area_x", 1.2), ("fuselage_area_z", 8.0), ("bar_gain", 0.8)):
         entry = card.parameters[name]
-        assert entry.value == 0.0
         assert entry.lower is not None
         assert entry.upper is not None
         assert entry.lower <= real <= entry.upper
