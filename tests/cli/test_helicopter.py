@@ -16,6 +16,8 @@ from swashplate.vehicles.catalogue import vehicle
 from swashplate.vehicles.helicopter_parameters import ADDED, MEANING
 from swashplate.vehicles.new_card import new_card as new_card_of
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 def test_trim_at_one_speed_and_over_a_range(tmp_path: Path) -> None:
     assert "theta0" in swash("trim", "raptor50", "--speed", "5").out
@@ -245,12 +247,13 @@ def test_a_card_that_is_written_wrongly(new_card: str, change: Callable[[str], s
 
 
 def test_a_card_like_the_lynx_cones_feels_the_yaw_and_takes_a_fuselage() -> None:
-    """What the Lynx leaves out is 0 on its card; the bounds of a card like it leave room for a real number."""
+    """What the Lynx's table leaves out is on in a card like it, whose bounds leave room for a real number."""
     card = new_card_of("A report's", mass=2200.0, radius=4.9, rotation="cw", like="lynx")
-    assert dict(card.options) == {"rotation": "cw", "coning": True, "yaw_at_blades": True}
-    for name, real in (("fuselage_area_x", 1.2), ("fuselage_area_y", 8.0), ("bar_gain", 0.8)):
+    felt = {"yaw_at_blades": True, "precession_torque": True}
+    assert dict(card.options) == {"rotation": "cw", "coning": True, **felt}
+    assert (card.values()["tailplane_wake"], card.values()["fuselage_wake"]) == (1.5, 1.0)
+    for name, real in (("fuselage_area_x", 1.2), ("fuselage_area_z", 8.0), ("bar_gain", 0.8)):
         entry = card.parameters[name]
-        assert entry.value == 0.0
         assert entry.lower is not None
         assert entry.upper is not None
         assert entry.lower <= real <= entry.upper
@@ -316,3 +319,20 @@ def test_a_simulation_that_cannot_be_leaves_no_file(arguments: tuple[str, ...], 
 def test_a_page_of_a_trim_that_is_refused_is_not_written(arguments: tuple[str, ...], tmp_path: Path) -> None:
     assert swash("trim", "raptor50", *arguments, tmp_path / "x.html", "--set", "rotor_chord=55").code == 2
     assert not list(tmp_path.iterdir())
+
+
+def test_a_card_beside_published_matrices() -> None:
+    """Padfield's Lynx: what its table leaves out is found, in the card's own words, and the table comes nearer."""
+    report = ROOT / "tests" / "oracle" / "lynx" / "padfield_00kn.csv"
+    found = json.loads(swash("derivatives", "lynx", "--primed", "--published", report, "--json").out)
+    assert [step["with"] for step in found["steps"]] == ["", "--set rotor_drag_thrust=0"]
+    assert found["steps"][1]["within 10 %"] >= 52
+    assert found["steps"][1]["mean"] < found["steps"][0]["mean"] < 0.07
+    assert found["derivatives"]["Ntheta0"]["off"] == pytest.approx([0.045, 0.0], abs=0.006)
+    assert found["derivatives"]["Zr"]["small"]
+    shown = swash("derivatives", "lynx", "--published", report).out
+    assert "--primed" in shown
+    assert "--set rotor_drag_thrust=0" in shown
+    assert "small" in shown
+    for bad in (("--turn", "5"), ("--imperial",), ("--speed", "0-8/4")):
+        assert "--published" in one_message(swash("derivatives", "lynx", "--published", report, *bad))

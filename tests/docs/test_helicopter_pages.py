@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -22,7 +23,10 @@ PAGES = (
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_of_a_page(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    lines = [line.strip() for line in (DOCS / page).read_text(encoding="utf-8").splitlines()]
+    text = (DOCS / page).read_text(encoding="utf-8")
+    for name, content in re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", text, re.DOTALL):
+        Path(name).write_text(content, encoding="utf-8")
+    lines = [line.strip() for line in text.splitlines()]
     commands = [line.removeprefix("$ swash ") for line in lines if line.startswith("$ swash ")]
     assert commands
     for command in commands:

@@ -15,6 +15,7 @@ from swashplate.simulation.trim import Trim, trim
 from swashplate.vehicles.buildup import build_up
 from swashplate.vehicles.catalogue import vehicle
 from swashplate.vehicles.derivatives import DerivativeTable
+from swashplate.vehicles.published import read_published
 from swashplate.vehicles.vehicle import Vehicle
 
 AIR = Environment(air_density=1.225, gravity=9.81)
@@ -25,11 +26,11 @@ def table(flown: Vehicle, **course: float) -> tuple[DerivativeTable, Trim]:
     return build_up(flown, found.state, found.inputs, AIR), found
 
 
-def lynx(in_plane: str, **numbers: float) -> DerivativeTable:
-    flown = vehicle("lynx", in_plane=in_plane).with_values(numbers)
+def lynx(speed: float = 0.0, options: dict[str, object] | None = None, **numbers: float) -> DerivativeTable:
+    flown = vehicle("lynx", **(options or {})).with_values(numbers)
     card = flown.card.values()
     inertia = {f"inertia_{axis}": card[f"inertia_{axis}"] for axis in ("xx", "zz", "xz")}
-    return table(flown)[0].primed(**inertia)
+    return table(flown, speed=speed)[0].primed(**inertia)
 
 
 def lynx_rows(shared_data: Path) -> dict[str, dict[str, float]]:
@@ -37,9 +38,29 @@ def lynx_rows(shared_data: Path) -> dict[str, dict[str, float]]:
         return {row.pop("deriv"): {k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)}
 
 
-def test_lynx_as_near_to_the_published_as_the_reference_calculation(shared_data: Path) -> None:
-    """State figures of PHYSICS 4.1: each within the reference calculation's distance of Padfield's, plus 1 %."""
-    found, published = lynx("blade-element"), lynx_rows(shared_data)
+KNOT = 1.689 * 0.3048
+"""m/s, as Padfield's U_0 in Y_r has it."""
+
+
+def lynx_published(knots: int) -> dict[str, float]:
+    """Padfield's A and B without their kinematic terms; the attitude is in A's gravity terms."""
+    path = Path(__file__).parent / "lynx" / f"padfield_{knots:02d}kn.csv"
+    with path.open(encoding="utf-8") as lines:
+        gravity = {row[""]: row for row in csv.DictReader(line for line in lines if not line.startswith("#"))}
+    roll = -math.atan2(float(gravity["w"]["phi"]), float(gravity["v"]["phi"]))
+    pitch = math.asin(-float(gravity["w"]["theta"]) / 9.81 / math.cos(roll))
+    speed = knots * KNOT
+    flight = {"u": speed * math.cos(pitch), "v": 0.0, "w": speed * math.sin(pitch) * math.cos(roll)}
+    return read_published(path, flight=flight)
+
+
+def test_blade_elements_are_as_near_to_the_published_as_the_reference_calculation(shared_data: Path) -> None:
+    """State figures of PHYSICS 4.1: each within the reference calculation's distance of Padfield's, plus 1 %.
+
+    With that calculation's centre of gravity, 2 cm behind the hub; it is 12.7 cm (next test).
+    """
+    forms = {"in_plane": "blade-element", "yaw_at_hub": True, "precession_torque": False}
+    found, published = lynx(options=forms, hub_x=0.0198, tail_arm=7.66), lynx_rows(shared_data)
     for name in ("Xu", "Zw", "Mu", "Mv", "Lu", "Lv", "Lp", "Mq", "Lq", "Mp", "Yv"):
         ours, row = found[name], published[name]
         reference = abs(row["calc_glauert"] - row["Padfield_recalled"])
@@ -48,31 +69,129 @@ def test_lynx_as_near_to_the_published_as_the_reference_calculation(shared_data:
     assert found["LA1"] == pytest.approx(155.7, rel=2e-3)
 
 
-def test_the_lynxs_weak_spots_are_the_thrust_perpendicular_to_the_disc(shared_data: Path) -> None:
-    """With that form X_q, X_p, Y_q, Y_p and all rate and speed derivatives come within 2.5 % of Padfield's."""
-    found, published = lynx("thrust-tilt"), lynx_rows(shared_data)
-    names = ("Xq", "Xp", "Yq", "Yp", "Xv", "Yu", "Mq", "Mp", "Lp", "Lq", "Lu", "Lv", "Mu", "Mv", "Np", "Nu", "Zw")
+def test_the_lynxs_centre_of_gravity_is_a_fiftieth_of_the_radius_behind_the_hub() -> None:
+    """x_cg = -0.0198 is of the radius. As metres it turns M_theta0 and M_w round and puts the tail's arm 1.5 % too far.
+
+    The arm needs no rotor: N and L of the tail's collective over its Y, with the inertias, are 7.533 and 1.143 m.
+    """
+    found, published = lynx(), lynx_published(0)
+    for name in ("Xtheta0", "Mtheta0", "Xw"):
+        assert found[name] == pytest.approx(published[name], rel=0.02), name
+    metres = lynx(hub_x=0.0198)
+    for name in ("Mtheta0", "Mw"):
+        assert metres[name] * published[name] < 0.0 < found[name] * published[name], name
+    card = vehicle("lynx").card.values()
+    ixx, izz, ixz = (card[f"inertia_{axis}"] for axis in ("xx", "zz", "xz"))
+    whole = (ixx * izz - ixz**2) / card["mass"] / published["Ytheta0T"]
+    height, arm = np.linalg.solve([[izz, -ixz], [ixz, -ixx]], [whole * published[f"{axis}theta0T"] for axis in "LN"])
+    assert arm == pytest.approx(7.66 - 0.0198 * 6.4, abs=2e-3)
+    assert height == pytest.approx(1.146, abs=4e-3)
+
+
+ROTOR = "Xu Xw Xq Xv Xp Xtheta0 XB1 XA1 Zw Ztheta0 Mu Mq Mv Mp MB1 MA1 Yu Yq Yp YB1 YA1 Lu Lq Lv Lp LB1 LA1 Nu NB1 NA1"
+
+
+def test_the_lynx_in_hover_is_padfields_table() -> None:
+    """Every derivative of the main rotor above 2 % of its kind: thirty within 1.3 %, N_q and N_p with them."""
+    found, published = lynx(), lynx_published(0)
+    for name in (*ROTOR.split(), "Nq", "Np"):
+        assert found[name] == pytest.approx(published[name], rel=0.0135), name
+    for name in ("Xr", "Zr", "Mr"):
+        assert found[name] == published[name] == 0.0, name
+
+
+def test_the_lynxs_torque_has_no_drag_of_the_thrust() -> None:
+    """Without delta_2 C_T^2 the torque's own derivatives, 5 and 30 % off, and the bank come within 1.5 %."""
+    published, card = lynx_published(0), vehicle("lynx")
+    plain, without = lynx(), lynx(rotor_drag_thrust=0.0)
+    for name, off in (("Ntheta0", 0.045), ("Ltheta0", 0.045), ("Nw", 0.28)):
+        assert abs(plain[name] / published[name] - 1.0) > off, name
+        assert without[name] == pytest.approx(published[name], rel=0.015), name
+    bank = trim(card.with_values({"rotor_drag_thrust": 0.0}), environment=AIR).states()["phi"]
+    assert math.degrees(bank) == pytest.approx(-3.051, abs=0.01)
+
+
+AT_SPEED = "Xq Xp XB1 XA1 Ztheta0 Mp MB1 MA1 Yp YB1 YA1 Lw Lq Lv Lp Ltheta0 LB1 LA1 NA1 Xv Yw Mv Mq Zw"
+
+
+@pytest.mark.parametrize("knots", [20, 40, 60])
+def test_the_lynx_at_speed(knots: int) -> None:
+    """The main rotor's own derivatives within 2.5 %; M_q, Z_w and what is small within 6.5 %."""
+    found, published = lynx(speed=knots * KNOT), lynx_published(knots)
+    names = AT_SPEED.split()
     for name in names:
-        assert found[name] == pytest.approx(published[name]["Padfield_recalled"], rel=0.025), name
+        assert found[name] == pytest.approx(published[name], rel=0.065 if name in names[-5:] else 0.025), name
 
 
-def test_the_lynxs_yaw_column_is_the_tilt_of_the_shaft(shared_data: Path) -> None:
+@pytest.mark.parametrize("knots", [20, 40, 60])
+def test_the_lynxs_airframe_at_speed_is_four_numbers(knots: int) -> None:
+    """Drag area, slopes of tailplane and fin and the fuselage's volume that X_u, M_q, L_r and M_w at 60 kn ask for.
+
+    With them these four, N_r and M_theta0 are Padfield's at 20 and 40 kn too, and so is the pitch attitude: the forms
+    are right, the public model's numbers are not this table's.
+    """
+    airframe = {
+        "fuselage_area_x": 1.95,
+        "tailplane_lift_slope": 3.42,
+        "fin_lift_slope": 4.09,
+        "fuselage_pitch_volume": 18.2,
+    }
+    found, published = lynx(speed=knots * KNOT, **airframe), lynx_published(knots)
+    for name, within in (("Xu", 0.05), ("Mq", 0.005), ("Lr", 0.01), ("Mw", 0.04), ("Nr", 0.03), ("Mtheta0", 0.02)):
+        assert found[name] == pytest.approx(published[name], rel=within), name
+    plain = lynx(speed=knots * KNOT)
+    assert abs(plain["Xu"] / published["Xu"] - 1.0) > 0.25
+    assert abs(plain["Lr"] / published["Lr"] - 1.0) > 0.2
+
+
+def test_the_lynxs_yaw_column_is_a_main_rotor_that_does_not_feel_the_yaw() -> None:
     """The references leave out that yaw about the body's axis rolls a shaft which leans forward by 4 deg.
 
-    p_shaft = p cos + r sin brings L_r = L_p sin(4 deg), of the main rotor, and N_r with it through the product of
-    inertia. Without the lean L_r lies between Padfield's and RHM's, X_r and M_r vanish as in RHM, and N_r and Y_r are
-    within 8 % of Padfield's (0.107 and -0.296 against 0.0995 and -0.274), both by the same factor: their ratio, the
-    tail's arm, is within 0.5 %, so what differs is the slope of the tail rotor's thrust alone.
+    p_shaft = p cos + r sin brings L_r = L_p sin(4 deg), and N_r with it through the product of inertia; the hub 12.7 cm
+    ahead of the CG brings M_r = M_v x. Both references have X_r = M_r = 0. Without it L_r is Padfield's, and N_r is
+    within 5 % (-0.286 against -0.274). Of Y_r (0.106 against 0.0995) 0.002 is no derivative: N_r and L_r over the arms
+    that the tail's collective shows are 0.1018 and 0.1014.
     """
-    upright, leaning, published = lynx("thrust-tilt", shaft_tilt=0.0), lynx("thrust-tilt"), lynx_rows(shared_data)
-    assert published["Lr"]["RHM_Skogestad_SI"] < upright["Lr"] < published["Lr"]["Padfield_recalled"]
-    for name in ("Nr", "Yr"):
-        assert upright[name] == pytest.approx(published[name]["Padfield_recalled"], rel=0.08), name
-    arm, reference = (t("Nr") / t("Yr") for t in (upright.__getitem__, lambda n: published[n]["Padfield_recalled"]))
-    assert arm == pytest.approx(reference, rel=0.005)
-    assert max(abs(upright["Xr"]), abs(upright["Mr"])) < 2e-3
-    rotor = upright.parts["main_rotor"][3, 3]
-    assert leaning["Lr"] - upright["Lr"] == pytest.approx(rotor * math.sin(math.radians(4.0)), rel=0.06)
+    without, published = lynx(), lynx_published(0)
+    at = trim(vehicle("lynx"), environment=AIR)
+    whole = build_up(vehicle("lynx", yaw_at_hub=True), at.state, at.inputs, AIR)
+    assert without["Lr"] == pytest.approx(published["Lr"], rel=0.03)
+    assert without["Nr"] == pytest.approx(published["Nr"], rel=0.05)
+    arms = {axis: published[f"{axis}theta0T"] / published["Ytheta0T"] for axis in "LN"}
+    sides = [published[f"{axis}r"] / arms[axis] for axis in "LN"]
+    assert sides[0] == pytest.approx(sides[1], rel=0.005)
+    assert without["Yr"] == pytest.approx(sides[1], rel=0.05)
+    card, rotor = vehicle("lynx").card.values(), whole.parts["main_rotor"]
+    lean, across = rotor[3, 3] * math.sin(card["shaft_tilt"]), rotor[3, 1] * card["hub_x"]
+    assert rotor[3, 5] == pytest.approx(lean + across, rel=0.06)
+
+
+def test_the_lynxs_tail_rotor_in_padfields_table_is_one_of_nearly_twice_the_delta_3() -> None:
+    """Tail collective and tail slope at four speeds, eight numbers: up to 14 % off, with k_3 = -1.8 at most 5 %.
+
+    The slope of the tail's thrust by inflow is in L_r and N_r; at speed they hold the fin's too, told apart by its
+    height. A lower lift slope or a larger blockage, fitted, leave 6 % and need a quarter less thrust than the trim.
+    """
+    card = vehicle("lynx").card.values()
+    ixx, izz, ixz = (card[f"inertia_{axis}"] for axis in ("xx", "zz", "xz"))
+    whole = (ixx * izz - ixz**2) / card["mass"]
+
+    def arms(back: float, up: float) -> list[float]:
+        return [(izz * up - ixz * back) / whole, (ixz * up - ixx * back) / whole]
+
+    places = np.array([arms(card["tail_arm"], 1.143), arms(card["fin_arm"], card["fin_height"])]).T
+    worst = {}
+    for k3 in (-1.0, -1.8):
+        off = []
+        for knots in (0, 20, 40, 60):
+            published = lynx_published(knots)
+            ours = lynx(speed=knots * KNOT, tail_delta3=k3, rotor_drag_thrust=0.0)
+            slope = np.linalg.solve(places, [published["Lr"], published["Nr"]])[0]
+            off += [ours["Ytheta0T"] / published["Ytheta0T"] - 1.0]
+            off += [ours.parts["tail_rotor"][1, 5] / slope - 1.0]
+        worst[k3] = max(map(abs, off))
+    assert worst[-1.0] > 0.12
+    assert worst[-1.8] < 0.055
 
 
 RHM_TAIL = {"Y": 0.234842 * 0.3048, "L": -0.0178888, "N": -0.206742}
@@ -83,26 +202,23 @@ def test_rhms_yaw_column_is_ours_and_a_yaw_damper(shared_data: Path) -> None:
     """Y_r 0.254, L_r -0.064 and N_r -0.735 are ours and 0.037 rad of tail collective per rad/s of yaw.
 
     A side force at the tail that answers to yaw rate and not to sideslip (RHM's Y_v and N_v leave no room for it) is no
-    geometry. One number explains three entries: Y within 2 %, N within 0.5 %, L within 0.006. RHM's own tail collective
-    column is ours within 7 %, and so is the tail's thrust: RHM hovers at 3.06 deg of bank, this card at 3.09.
+    geometry. One number explains three entries. RHM's own tail collective column is ours within 2 % (Y) and 5 % (N).
     """
-    upright, published = lynx("thrust-tilt", shaft_tilt=0.0), lynx_rows(shared_data)
+    found, published = lynx(), lynx_rows(shared_data)
     tail = {axis: value * 180.0 / math.pi for axis, value in RHM_TAIL.items()}
-    for axis, value in tail.items():
-        assert upright[f"{axis}theta0T"] == pytest.approx(value, rel=0.07), axis
-    missing = {axis: published[f"{axis}r"]["RHM_Skogestad_SI"] - upright[f"{axis}r"] for axis in tail}
+    for axis, within in (("Y", 0.025), ("N", 0.05)):
+        assert found[f"{axis}theta0T"] == pytest.approx(tail[axis], rel=within), axis
+    missing = {axis: published[f"{axis}r"]["RHM_Skogestad_SI"] - found[f"{axis}r"] for axis in tail}
     gain = sum(missing[axis] * tail[axis] for axis in tail) / sum(value**2 for value in tail.values())
-    assert gain == pytest.approx(0.037, abs=5e-4)
-    explained = {axis: upright[f"{axis}r"] + gain * tail[axis] for axis in tail}
-    for axis, within in (("Y", 0.005), ("N", 0.003), ("L", 0.006)):
+    assert gain == pytest.approx(0.0378, abs=5e-4)
+    explained = {axis: found[f"{axis}r"] + gain * tail[axis] for axis in tail}
+    for axis, within in (("Y", 0.01), ("N", 0.004), ("L", 0.006)):
         assert explained[axis] == pytest.approx(published[f"{axis}r"]["RHM_Skogestad_SI"], abs=within), axis
-    bank = trim(vehicle("lynx", in_plane="thrust-tilt"), environment=AIR).states()["phi"]
-    assert math.degrees(bank) == pytest.approx(-3.06, abs=0.05)
 
 
 def test_lynx_hover_modes() -> None:
     """RHM (Skogestad and Postlethwaite): 0.234 +- 0.551j, -0.159 +- 0.599j, heave -0.292."""
-    flown = vehicle("lynx", in_plane="thrust-tilt")
+    flown = vehicle("lynx")
     modes = np.array([mode.eigenvalue for mode in linearize(flown, trim(flown, environment=AIR)).modes()])
     for published, within in ((0.234 + 0.551j, 0.02), (-0.159 + 0.599j, 0.03)):
         assert np.min(np.abs(modes - published)) < within

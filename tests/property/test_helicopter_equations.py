@@ -34,7 +34,7 @@ EVERYTHING = {
 FORMS = [
     {},
     {"inflow": "pitt-peters-static", "phase_lag": True, "in_plane": "thrust-tilt"},
-    {"inflow": "uniform", "rotor_speed": "governed", "yaw_at_blades": True},
+    {"inflow": "uniform", "rotor_speed": "governed", "yaw_at_blades": True, "precession_torque": True},
     EVERYTHING,
 ]
 MIRRORED = ("y", "v", "phi", "psi", "p", "r", "b1", "d", "lam_s", "r_gyro", "A1_servo", "A1", "A1_late", "A1_late_rate")

@@ -37,8 +37,8 @@ def test_build_up_is_automatic_differentiation(name: str, course: dict[str, floa
 
 
 FORMS = [
-    ({"in_plane": "thrust-tilt", "inflow": "uniform", "bar": True}, {"speed": 12.0}),
-    ({"yaw_at_blades": True}, {"speed": 15.0, "turn": 0.3}),
+    ({"in_plane": "thrust-tilt", "inflow": "uniform", "bar": True, "yaw_at_hub": False}, {"speed": 12.0}),
+    ({"yaw_at_blades": True, "precession_torque": True}, {"speed": 15.0, "turn": 0.3}),
     ({"yaw_at_blades": True, "coning": False, "in_plane": "thrust-tilt", "rotation": "cw"}, {"speed": 25.0}),
 ]
 
@@ -58,6 +58,8 @@ def test_build_up_of_the_other_forms(options: dict[str, object], course: dict[st
             "tail_flap_frequency": 1.03,
             "tailplane_incidence": -0.03,
             "tailplane_drop": 0.8,
+            "tailplane_wake": 1.2,
+            "fuselage_wake": 0.7,
             "fin_incidence": 0.05,
             "fin_wake": 0.5,
             "fuselage_area_x": 1.0,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import swashplate as sp
 from flown_by_hand import U, X, Y, Z, fly, fresh, holds_what_is_held, moves_its_way
@@ -79,7 +80,7 @@ def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(coax: World
 
 def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> None:
     for name in ("raptor50", "lynx"):  # rotors of both senses
-        world = World(sp.vehicle(name))
+        world = World(sp.vehicle(name, in_plane="blade-element"))
         mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
         model = sp.linearize(world.vehicle, world.trim)
         matrix = static_decoupling(
@@ -92,6 +93,18 @@ def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> Non
         B = model.B[[world.vehicle.index("r"), world.vehicle.index("w")]] @ mixing[:, 2:]
         assert B[0, 0] > 0.0
         assert B[1, 1] < 0.0
+
+
+def test_axes_that_first_derivatives_do_not_tell_apart_are_decoupled_a_moment_later() -> None:
+    """With the thrust perpendicular to the disc collective pitches at once and the cyclic does not: half a second."""
+    world = World(sp.vehicle("lynx"))
+    mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
+    model = sp.linearize(world.vehicle, world.trim)
+    n, m = model.B.shape
+    step = scipy.linalg.expm(0.5 * np.block([[model.A, model.B], [np.zeros((m, n + m))]]))[:n, n:]
+    moved = step[[world.vehicle.index(name) for name in ("phi", "theta", "psi", "z")]] @ mixing
+    assert np.allclose(moved, np.diag(np.diag(moved)), atol=1e-9 * np.abs(moved).max())
+    assert (np.sign(np.diag(moved)) == [1.0, -1.0, 1.0, -1.0]).all()
 
 
 def test_modes_change_in_flight_without_a_jump(coax: World) -> None:

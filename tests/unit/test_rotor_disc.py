@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from swashplate.physics import blade_element, flapping, inflow
 from swashplate.physics.backend import FloatBackend, JaxBackend
@@ -302,3 +303,24 @@ def test_first_and_second_derivatives_through_the_inflow_are_exact() -> None:
     assert float(first(at)) == pytest.approx((values[2] - values[0]) / (2 * h), rel=1e-5)
     slopes = [float(first(at + k * h)) for k in (-1, 1)]
     assert float(second(at)) == pytest.approx((slopes[1] - slopes[0]) / (2 * h), rel=1e-4)
+
+
+def test_the_precession_torque_is_what_the_blades_masses_need() -> None:
+    """Rods that turn, tilted, on a shaft that rolls and pitches: mass times acceleration times arm, along the shaft."""
+    a1, b1, p, q, omega, length, step = 2e-3, -3e-3, 0.7, -0.4, 35.0, 2.0, 1e-4
+    psi = np.arange(4) * np.pi / 2.0 + 0.3
+    radii, weights = np.polynomial.legendre.leggauss(4)
+    radii, weights = 0.5 * length * (radii + 1.0), 0.5 * length * weights  # one kilogram a metre
+
+    def place(t: float) -> np.ndarray:
+        """Inertial axes, (blade, element, 3): azimuth from the tail, counter-clockwise from above; z down."""
+        at = psi + omega * t
+        rods = np.stack([-np.cos(at), np.sin(at), a1 * np.cos(at) + b1 * np.sin(at)], axis=-1)
+        turned = Rotation.from_rotvec([p * t, q * t, 0.0]).apply(rods)
+        return np.asarray(radii[None, :, None] * turned[:, None, :])
+
+    acceleration = (place(step) - 2.0 * place(0.0) + place(-step)) / step**2
+    needed = float((np.cross(place(0.0), acceleration)[..., 2] * weights).sum())
+    polar = 4.0 * length**3 / 3.0
+    found = flapping.precession_torque(Flapping(a1, b1), p, q, inertia=polar, omega=omega)
+    assert needed == pytest.approx(found, rel=1e-4)

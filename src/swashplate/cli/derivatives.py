@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -22,6 +23,12 @@ def derivatives(
         bool,
         typer.Option("--primed", help="Roll and yaw rows mixed by the product of inertia, as most published tables."),
     ] = False,
+    published: Annotated[
+        Path | None,
+        typer.Option(
+            "--published", metavar="FILE.csv", help="Beside a report's: name,value[,unit], or A and B as a matrix."
+        ),
+    ] = None,
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
     ] = False,
@@ -40,8 +47,19 @@ def derivatives(
         raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
     if uncertainty and primed:
         raise SwashError("has no bounds.", channel="--primed", hint="Leave out --uncertainty or --primed.")
+    if published is not None and (uncertainty or plot is not None or imperial or len(asked.speeds) > 1):
+        raise SwashError(
+            "takes one speed, and no --uncertainty, --plot or --imperial.",
+            channel="--published",
+            hint="Units are in the file.",
+        )
     found = asked.trims()
     remarks = asked.doubts(found)
+    if published is not None:
+        from swashplate.cli.published import compare
+
+        compare(asked, found[0], published, primed=primed, json=json)
+        return
     tables = [derivative_table(asked.vehicle, at) for at in found]
     if primed:
         card = asked.vehicle.card.values()

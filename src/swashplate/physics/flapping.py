@@ -143,3 +143,19 @@ def faded_wake_distortion(hover: Scalar, mu2: Scalar, fade: Scalar, xp: Backend)
     """
     rest = xp.maximum(0.0, 1.0 - mu2 / (fade * fade))
     return hover * rest * rest
+
+
+def precession_torque(disc: Flapping, p: Scalar, q: Scalar, *, inertia: Scalar, omega: Scalar) -> Scalar:
+    """Torque [N m] that a tilted rotor takes off its shaft when the shaft rolls and pitches: I Omega (p b1 + q a1).
+
+    The angular momentum I Omega of the turning blades points along the tip-path plane's normal; carried around by p and
+    q it changes along the shaft (the vertical part of rates x H). The blades' aerodynamic torque holds this part (the
+    moment that precesses the disc, leaning with it), but not the shaft, to which blades pass only what is left.
+
+    Args:
+        disc: tip-path plane, counter-clockwise axes.
+        p, q: rates of the shaft [rad/s], counter-clockwise axes.
+        inertia: of all blades about the shaft [kg m^2].
+        omega: rotor speed [rad/s].
+    """
+    return inertia * omega * (p * disc.b1 + q * disc.a1)

@@ -9,16 +9,24 @@ ROUNDED = 0.05
 
 
 def wake_on_tailplane(
-    u: Scalar, w: Scalar, induced: Scalar, *, near: Scalar, far: Scalar, drop: Scalar, xp: Backend
+    u: Scalar,
+    w: Scalar,
+    induced: Scalar,
+    *,
+    near: Scalar,
+    far: Scalar,
+    drop: Scalar,
+    most: Scalar,
+    xp: Backend,
 ) -> Scalar:
-    """Downwash [m/s] of the main rotor at the tailplane: 0 to 1.5 times its induced velocity.
+    """Downwash [m/s] of the main rotor at the tailplane: 0 to `most` (1.5) times its induced velocity.
 
     The wake's edges reach a tail at distances `near` (front edge) and `far` behind the hub's rim and `drop` below it
     when the wake is swept back by u / (induced - w); in between the share rises linearly.
     """
     down = xp.maximum(induced - w, 1e-3)
     swept = u / down
-    share = 1.5 * xp.minimum(1.0, xp.maximum(0.0, (swept * drop - near) / (far - near)))
+    share = most * xp.minimum(1.0, xp.maximum(0.0, (swept * drop - near) / (far - near)))
     return share * induced
 
 

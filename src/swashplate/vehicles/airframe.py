@@ -77,6 +77,7 @@ def airframe(
         near=rim - par.tail_radius,
         far=rim + par.tail_radius,
         drop=par.tailplane_drop,
+        most=par.tailplane_wake,
         xp=xp,
     )
     tailplane = tail_surfaces.inclined_force(
@@ -98,9 +99,10 @@ def airframe(
         xp=xp,
     )
     areas = Vector(par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
+    through = par.fuselage_wake * wake
     turned = fuselage.slender_body_moment(
         air,
-        wake,
+        through,
         pitch=par.fuselage_pitch_volume,
         yaw=par.fuselage_yaw_volume,
         pitch_zero=par.fuselage_pitch_zero,
@@ -115,6 +117,6 @@ def airframe(
             Vector(fin[0], fin[1], 0.0),
             Vector(par.fin_height * fin[1], -par.fin_height * fin[0], -par.fin_arm * fin[1]),
         ),
-        Contribution(fuselage.flat_plate_drag(air, wake, areas=areas, density=density, xp=xp), turned),
+        Contribution(fuselage.flat_plate_drag(air, through, areas=areas, density=density, xp=xp), turned),
         tail.torque,
     )

@@ -116,7 +116,8 @@ class _Surface:
 def tailplane_slopes(air: Vector, rates: Vector, wake: Wake, par: Any, density: float) -> Array:
     rim = par.tail_arm - par.rotor_radius
     near, far, drop = rim - par.tail_radius, rim + par.tail_radius, par.tailplane_drop
-    shown = tail_surfaces.wake_on_tailplane(air.x, air.z, wake.main, near=near, far=far, drop=drop, xp=_XP)
+    most = par.tailplane_wake
+    shown = tail_surfaces.wake_on_tailplane(air.x, air.z, wake.main, near=near, far=far, drop=drop, most=most, xp=_XP)
     along, across = air.x, air.z + par.tailplane_arm * rates.y - shown
     surface = _Surface(
         along,
@@ -128,14 +129,14 @@ def tailplane_slopes(air: Vector, rates: Vector, wake: Wake, par: Any, density: 
     )
     down = max(wake.main - air.z, 1e-3)
     swept = (air.x / down * drop - near) / (far - near)
-    share = 1.5 * min(1.0, max(0.0, swept))
+    share = most * min(1.0, max(0.0, swept))
     loads = np.zeros((6, len(COLUMNS)))
     for i, change in enumerate(changes()):
         v = change.velocity
         dshare = 0.0
         if 0.0 < swept < 1.0:
             ddown = wake.main_change[i] - v.z
-            dshare = 1.5 * drop / (far - near) * (v.x - air.x / down * ddown) / down
+            dshare = most * drop / (far - near) * (v.x - air.x / down * ddown) / down
         dacross = v.z + par.tailplane_arm * change.rates.y - share * wake.main_change[i] - dshare * wake.main
         dX, dZ = surface.change(v.x, dacross)
         loads[:, i] = _about_cg(Vector(-par.tailplane_arm, 0.0, 0.0), Vector(dX, 0.0, dZ))
@@ -158,11 +159,11 @@ def fin_slopes(air: Vector, rates: Vector, wake: Wake, par: Any, density: float,
 
 def fuselage_slopes(air: Vector, wake: Wake, par: Any, density: float) -> Array:
     areas = (par.fuselage_area_x, par.fuselage_area_y, par.fuselage_area_z)
-    seen = (air.x, air.y, air.z - wake.main)
+    seen = (air.x, air.y, air.z - par.fuselage_wake * wake.main)
     speed = float(np.sqrt(sum(s * s for s in seen) + 1e-9))
     loads = np.zeros((6, len(COLUMNS)))
     for i, change in enumerate(changes()):
-        moved = (change.velocity.x, change.velocity.y, change.velocity.z - wake.main_change[i])
+        moved = (change.velocity.x, change.velocity.y, change.velocity.z - par.fuselage_wake * wake.main_change[i])
         dspeed = sum(s * d for s, d in zip(seen, moved, strict=True)) / speed
         loads[:3, i] = [
             -0.5 * density * area * (dspeed * s + speed * d) for area, s, d in zip(areas, seen, moved, strict=True)

@@ -60,6 +60,8 @@ def main_rotor_slopes(
 
     def flow(velocity: Vector, turning: Vector) -> tuple[float, float, float, float, float]:
         """Velocity of the hub and rates of the shaft, dimensionless, counter-clockwise axes; linear."""
+        if not options.yaw_at_hub:
+            turning = Vector(turning.x, turning.y, 0.0)
         there = velocity + turning.cross(hub)
         return (
             (there.x * ct + there.z * st) / tip,
@@ -164,6 +166,9 @@ def main_rotor_slopes(
         dCT, dCQ = change_of.CT + 2.0 * quicker * trimmed.CT, change_of.CQ + 2.0 * quicker * trimmed.CQ
         dCX, dCY = dCX + 2.0 * quicker * trimmed.CX, dCY + 2.0 * quicker * trimmed.CY
         thrust, ahead, yaw = pressure * dCT, pressure * dCX, sense * pressure * par.rotor_radius * dCQ
+        if options.precession_torque:
+            turned = 2.0 * quicker * (p * own.b1 + q * own.a1) + dp * own.b1 + p * db1 + dq * own.a1 + q * da1
+            yaw -= sense * par.rotor_blades * par.blade_inertia * omega * omega * turned
         force = Vector(ahead * ct + thrust * st, sense * pressure * dCY, ahead * st - thrust * ct)
         stiffer = 2.0 * quicker * (held.moment - par.hub_stiffness)
         roll, nose = sense * (held.moment * db1 + stiffer * own.b1), held.moment * da1 + stiffer * own.a1

@@ -37,7 +37,8 @@ def _stand_in(name: str, option: str | None, value: float | str, card: Card) -> 
     if isinstance(value, str):
         known = card.parameters.get(value)
         return Parameter(known.value if known else math.nan, UNITS[name], f"{source}{value} stands for it", "assumed")
-    meant = "this leaves it out" if option is None else "without its option it has no effect"
+    usual = "this leaves it out" if not value else "this is what was there before"
+    meant = usual if option is None else "without its option it has no effect"
     return Parameter(value, UNITS[name], source + meant, "assumed")
 
 

@@ -27,6 +27,10 @@ class HelicopterOptions(NamedTuple):
         in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
         yaw_at_blades: the blades meet the air at the rotor's speed less the yaw rate, as they do on any shaft whose
             speed is kept against the fuselage; most published tables and the packaged cards leave it out.
+        yaw_at_hub: the hub feels the yaw rate, which rolls a shaft that leans forward and carries a hub ahead of the CG
+            sideways; Padfield (2007) and what follows him leave both out.
+        precession_torque: the shaft carries the torque with which a tilted rotor answers pitch and roll rates
+            (`flapping.precession_torque`); the packaged cards, whose tables leave it out, do too.
     """
 
     rotation: str = "ccw"
@@ -42,6 +46,8 @@ class HelicopterOptions(NamedTuple):
     phase_lag: bool = False
     in_plane: str = "blade-element"
     yaw_at_blades: bool = False
+    yaw_at_hub: bool = True
+    precession_torque: bool = False
 
     @property
     def sense(self) -> float:
@@ -59,7 +65,19 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "rotor_speed": ("fixed", "governed", "throttle"),
     "in_plane": ("blade-element", "thrust-tilt"),
     **dict.fromkeys(
-        ("coning", "bar", "gyro", "servos", "delay", "engine_lag", "ground", "phase_lag", "yaw_at_blades"),
+        (
+            "coning",
+            "bar",
+            "gyro",
+            "servos",
+            "delay",
+            "engine_lag",
+            "ground",
+            "phase_lag",
+            "yaw_at_blades",
+            "yaw_at_hub",
+            "precession_torque",
+        ),
         (True, False),
     ),
 }

@@ -54,6 +54,11 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("tailplane_arm", "m", "horizontal tail behind the CG"),
     ("tailplane_drop", "m", "main rotor hub above the horizontal tail: as far as the rotor's wake sinks to reach it"),
     (
+        "tailplane_wake",
+        "1",
+        "downwash on the horizontal tail in the wake over the rotor's induced velocity: 1.5; 0 for none",
+    ),
+    (
         "tailplane_incidence",
         "rad",
         "horizontal tail's incidence, leading edge up; with camber, less its zero-lift angle",
@@ -67,6 +72,7 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("fuselage_area_x", "m^2", "drag area ahead: c_D times frontal area"),
     ("fuselage_area_y", "m^2", "drag area sideways"),
     ("fuselage_area_z", "m^2", "drag area downwards"),
+    ("fuselage_wake", "1", "share of the rotor's induced velocity that the fuselage is in: 1; 0 for none"),
     (
         "fuselage_pitch_volume",
         "m^3",
@@ -123,6 +129,8 @@ ADDED: Mapping[str, tuple[str | None, float | str]] = {
     "fuselage_pitch_volume": (None, 0.0),
     "fuselage_yaw_volume": (None, 0.0),
     "fuselage_pitch_zero": (None, 0.0),
+    "tailplane_wake": (None, 1.5),
+    "fuselage_wake": (None, 1.0),
 }
 """What the first cards lack: the option that needs it, and the number or parameter that stood for it before."""
 
@@ -173,6 +181,8 @@ NOT_NEGATIVE = (
     "fin_blockage",
     "tailplane_area",
     "tailplane_lift_slope",
+    "tailplane_wake",
+    "fuselage_wake",
     "fin_area",
     "fin_lift_slope",
     "fuselage_area_x",

@@ -56,15 +56,16 @@ def main_rotor(
     """
     sense = options.sense
     hub = Vector(par.hub_x, par.hub_y, -par.hub_height)
-    at_hub = air + rates.cross(hub)
     ct, st = xp.cos(par.shaft_tilt), xp.sin(par.shaft_tilt)
     if options.yaw_at_blades:
         omega = omega - sense * (rates.z * ct - rates.x * st)
+    felt = rates if options.yaw_at_hub else Vector(rates.x, rates.y, 0.0)
+    at_hub = air + felt.cross(hub)
     tip = omega * par.rotor_radius
     mu_x = (at_hub.x * ct + at_hub.z * st) / tip
     mu_y = sense * at_hub.y / tip
     mu_z = (at_hub.z * ct - at_hub.x * st) / tip
-    p, q = sense * (rates.x * ct + rates.z * st), rates.y
+    p, q = sense * (felt.x * ct + felt.z * st), felt.y
     theta0, A1, B1 = blades
     cp, sp = xp.cos(par.cyclic_phase), xp.sin(par.cyclic_phase)
     A1, B1 = sense * A1 * cp - B1 * sp, B1 * cp + sense * A1 * sp
@@ -151,6 +152,9 @@ def main_rotor(
     pressure = density * _PI * par.rotor_radius * par.rotor_radius * tip * tip
     thrust, ahead = pressure * coefficients.CT, pressure * coefficients.CX
     torque = pressure * par.rotor_radius * coefficients.CQ
+    if options.precession_torque:
+        polar = par.rotor_blades * par.blade_inertia
+        torque = torque - flapping.precession_torque(own, p, q, inertia=polar, omega=omega)
     force = Vector(ahead * ct + thrust * st, sense * pressure * coefficients.CY, ahead * st - thrust * ct)
     roll, yaw = held.moment * disc.b1, sense * torque
     moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * disc.a1, roll * st + yaw * ct)

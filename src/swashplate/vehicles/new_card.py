@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from swashplate.errors import CardError
 from swashplate.vehicles.card import Card, packaged_cards
-from swashplate.vehicles.helicopter_parameters import MEANING
+from swashplate.vehicles.helicopter_parameters import ADDED, MEANING
 
 _SCALE: Mapping[str, Callable[[float, float], float]] = {
     "m": lambda size, weight: size,
@@ -23,6 +23,10 @@ _SCALE: Mapping[str, Callable[[float, float], float]] = {
 }
 """How numbers of a unit grow with size and weight: geometry, and tip speed and lean angles alike."""
 
+_TABLES = ("in_plane", "yaw_at_hub")
+"""Options with which a packaged card repeats its published table; a new card flies without them."""
+_WAKES = ("tailplane_wake", "fuselage_wake")
+"""And numbers."""
 _GUESS = 0.15
 """One sigma of what is only scaled, as a share of it."""
 
@@ -48,13 +52,14 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
     known = pattern.values()
     size, weight = radius / known["rotor_radius"], mass / known["mass"]
     given = {"mass": mass, "rotor_radius": radius}
+    usual = {name: float(ADDED[name][1]) for name in _WAKES}
     parameters = {}
     for name, parameter in pattern.parameters.items():
         scale = _SCALE.get(parameter.unit)
         factor = 1.0 if scale is None else scale(size, weight)
         if name == "rotor_speed":
             factor = 1.0 / size
-        value = given.get(name, float(f"{parameter.value * factor:.4g}"))
+        value = {**given, **usual}.get(name, float(f"{parameter.value * factor:.4g}"))
         parameters[name] = replace(
             parameter,
             value=value,
@@ -68,7 +73,8 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             note="",
         )
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
-    options = {**pattern.options, "rotation": rotation, "yaw_at_blades": True}
+    parts = {name: value for name, value in pattern.options.items() if name not in _TABLES}
+    options = {**parts, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}
     return Card("conventional", title, trust, options, parameters)
 
 

@@ -79,17 +79,26 @@ def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
         travel = np.minimum(travel, _ENOUGH / np.abs(reached))
     scale = np.sign(reached) * _SENSE * travel
     # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
-    matrix = _soon_decoupled(moved, vehicle) if vehicle.name == LINEAR else _at_once_decoupled(model, directions)
+    matrix = None if vehicle.name == LINEAR else _at_once_decoupled(model, directions)
+    if matrix is None:
+        matrix = _soon_decoupled(moved, vehicle)
     mixing = {True: directions @ matrix @ np.diag(scale), False: directions @ np.diag(scale)}
     amplitude = dict(zip(STICKS, (_EXCITED / _SHARES * travel).tolist(), strict=True))
     return Axes(directions, 2.0 / _SHARES * travel, mixing, amplitude, excited)
 
 
-def _at_once_decoupled(model: LinearModel, directions: Array) -> Array:
-    """Axes that leave each other's rates alone at first, shape (4, 4)."""
+def _at_once_decoupled(model: LinearModel, directions: Array) -> Array | None:
+    """Axes that leave each other's rates alone at first, shape (4, 4).
+
+    None where the first derivatives do not tell the axes apart: thrust perpendicular to the disc leaves the cyclic
+    nothing to do until the disc has tilted, while collective pitches at once.
+    """
     names = list(model.states)
     by_axis = control.ss(model.A, model.B @ directions, np.eye(len(names)), 0.0, inputs=list(STICKS), outputs=names)
-    return static_decoupling(by_axis, inputs=STICKS, outputs=_OUTPUTS).matrix
+    try:
+        return static_decoupling(by_axis, inputs=STICKS, outputs=_OUTPUTS).matrix
+    except SwashError:
+        return None
 
 
 def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
