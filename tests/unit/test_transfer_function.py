@@ -191,7 +191,7 @@ def test_margins_are_those_of_python_control() -> None:
     assert found.phase_margin.value == pytest.approx(pm, abs=0.05)
     assert found.omega_180.value == pytest.approx(w180, rel=1e-3)
     assert found.crossover.value == pytest.approx(cross, rel=1e-3)
-    assert found.phase_margin.sigma == pytest.approx(np.degrees(0.05), rel=1e-6)
+    assert found.phase_margin.sigma > np.degrees(0.05)  # the crossing moves too: see test_readings.py
 
 
 def test_reading_refuses_what_is_not_there() -> None:
