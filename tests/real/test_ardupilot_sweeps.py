@@ -139,3 +139,31 @@ def test_a_log_that_was_cut_off_is_named_and_what_is_left_is_used(shared_data: P
     )
     assert any("cut.BIN" in text and "cut off" in text for text in found.problems), found.problems
     assert found.band("p", "mixer_roll") is not None
+
+
+def test_the_error_filter_is_in_the_loop_that_flew(shared_data: Path) -> None:
+    """What the suggested gains take ArduPilot's controller to be, against what its log shows it did."""
+    log = flight(shared_data, "heli_sid_roll_mix.BIN", "mixer_roll", "p", "p_demand", "sid_target")
+    said = log.provenance.parameter
+    own = log.values("mixer_roll") - np.interp(log.time("p") - 0.0025, log.time("p"), log.values("sid_target"))
+    found = respond(
+        log.with_channel("own", own, like="p"),
+        inputs=["p"],
+        outputs=["own", "p_demand"],
+        band=(2.0, 6.0),
+        bystanders=(),
+    )
+    s = 1j * found.omega
+    at = {name: said(f"ATC_RAT_RLL_{name}", at=130.0) for name in ("P", "I", "D", "FF", "FLTE", "FLTT")}
+    assert at["FLTE"] == 20.0
+    wanted = found.pair("p_demand", "p")[0]
+    target, error = (1.0 / (1.0 + s / (2 * np.pi * at[name])) for name in ("FLTT", "FLTE"))
+    pid = (at["P"] + at["I"] / s + at["D"] * s) * (wanted - 1.0)
+    measured = found.pair("own", "p")[0]
+
+    def lag(said: np.ndarray) -> np.ndarray:
+        return np.abs(np.degrees(np.angle(said / measured)))
+
+    assert np.max(lag(at["FF"] * target * wanted + pid * error)) < 3.0
+    assert np.min(lag(at["FF"] * target * wanted + pid)) > 4.0
+    assert np.max(lag(at["FF"] * target * wanted + pid)) > 14.0

@@ -28,8 +28,12 @@ def fit_tf(
     band: flying.BandOption = None,
     coherence: flying.Coherence = 0.6,
     loop: Annotated[
-        bool, typer.Option("--margins", help="Crossover, gain and phase margin, the responses taken as broken loops.")
+        bool,
+        typer.Option(
+            "--margins", help="Margins, the responses taken as broken loops; bandwidth and phase delay of the attitude."
+        ),
     ] = False,
+    gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     rate: options.Rate = 100.0,
@@ -47,6 +51,7 @@ def fit_tf(
     """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
+    from swashplate.cli.gain_lines import gain_words, suggested
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import IdentificationError
     from swashplate.identification.readings import handling_lines, margin_lines
@@ -89,8 +94,10 @@ def fit_tf(
             flown = (*model.inputs, *model.outputs)
             flights = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(model, flights, band=limits), found.sources)
+        advice = suggested(fit, found) if gains else ()
         if folder is not None:
-            material = ResponseMaterial(found.select(pairs, (input,)), (fit,), trials, verification=verification)
+            measured = found.select(pairs, (input,))
+            material = ResponseMaterial(measured, (fit,), trials, verification=verification, gains=advice)
             response_report(material, path=folder / "report.html")
             write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
             if model is not None:
@@ -104,6 +111,7 @@ def fit_tf(
         document = {
             "fit": fit.as_dict(),
             "margins": [r.as_dict() for r in read],
+            "gains": [s.as_dict() for s in advice],
             "verification": verification and verification.as_dict(),
         }
         typer.echo(as_json({**document, "tried": [{"form": t.form.text, "J": t.cost} for t in trials]}))
@@ -116,5 +124,6 @@ def fit_tf(
             typer.echo(repr(line_of_margins))
         if verification is not None:
             typer.echo(f"\n{verification!r}")
+        typer.echo(gain_words(advice), nl=False)
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

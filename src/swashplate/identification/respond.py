@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -188,8 +189,20 @@ def respond(
             "overlap": overlap,
             "references": list(references),
             "averages": [m.averages for m in matrices],
+            **_autopilot(flights),
         },
     )
+
+
+def _autopilot(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
+    """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
+    said = [flight.provenance for flight in flights]
+    names = (
+        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[ED])|INS_GYRO_FILTER", n)
+    )
+    values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
+    same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
+    return {"autopilot": same} if same else {}
 
 
 def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:

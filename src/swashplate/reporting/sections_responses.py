@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swashplate.control.ardupilot_gains import Suggestion
+from swashplate.control.ardupilot_gains import PEAK, Suggestion
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.handling import Handling
 from swashplate.identification.linear_time_fit import LinearTimeFit
@@ -268,31 +268,41 @@ def excitation_section(r: FrequencyResponse) -> Section:
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:
-    """Suggested rate-loop gains in ArduPilot's names, and the margins that they give."""
+    """Suggested rate-loop gains in ArduPilot's names beside the flown ones, and the margins of both."""
     rows = tuple(
         (
             Cell(name),
-            Cell(f"{value:.4f}", number=True, strong=True),
-            Cell(
-                f"{g.margins.phase_margin.value:.0f}" if np.isfinite(g.margins.phase_margin.value) else "no crossing",
-                number=True,
-            ),
-            Cell(f"{g.margins.gain_margin.value:.1f}", number=True),
-            Cell(f"{g.peak:.2f}", number=True),
+            Cell(f"{g.parameters[name]:.4f}" if name in g.parameters else "–", number=True, strong=True),
+            Cell(f"{g.flown[name]:.4f}" if name in g.flown else "not logged", number=True),
         )
         for g in gains
-        for name, value in g.parameters.items()
+        for name in g.parameters or g.flown
     )
+    judged = [
+        (
+            Cell(g.axis),
+            Cell(which),
+            *(Cell(repr(r).replace("+-", "±"), number=True) for r in (m.crossover, m.phase_margin, m.gain_margin)),
+            Cell(f"{peak:.2f}", number=True, tone="bad" if peak > 2.0 * PEAK else "plain"),
+        )
+        for g in gains
+        for which, m, peak in (("suggested", g.margins, g.peak), ("flown", g.flown_margins, g.flown_peak))
+        if np.isfinite(peak)
+    ]
+    heads = ("axis", "gains", "crossover [rad/s]", "phase margin [deg]", "gain margin [dB]", "peak sensitivity")
     return Section(
         "gains",
         "Suggested rate-loop gains (ArduPilot)",
         (
+            Table("Gains", ("parameter", "suggested", "flown"), rows),
             Table(
-                "Gains and the margins they give on the identified model",
-                ("parameter", "value", "phase margin [deg]", "gain margin [dB]", "peak sensitivity"),
-                rows,
+                "Margins of the rate loop on the identified model",
+                heads,
+                tuple(judged),
+                note="The least of each where the loop crosses several times. ± is what the Cramér-Rao bounds of the "
+                "model's parameters make of it. FLTE and FLTD are filters of the controller, and count.",
             ),
-            Text(gains[0].words, tone="caution"),
+            *(Text(f"{g.axis}: {g.words}", tone="caution") for g in gains),
         ),
     )
 
