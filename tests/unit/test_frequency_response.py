@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import signal
 
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.flight import Event, Flight, Provenance, stream
 from swashplate.identification.composite import composite
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.respond import choose_windows, respond
@@ -142,6 +144,43 @@ def test_joint_estimate_is_unbiased_in_a_loop_where_the_direct_one_is_not() -> N
 
     assert off(joint) < 0.7 < 1.8 < off(direct)
     assert any("feedback biases the direct estimate" in text for text in joint.warnings)
+
+
+def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
+    """Two axes under loops that mix them, gusts in both, swept in turn within one record."""
+    n = 18_000
+    reference = np.column_stack([coloured(20, n), coloured(21, n)])
+    time = np.arange(n) / RATE
+    half = n / 2 / RATE
+    reference[time < half, 1] = reference[time >= half, 0] = 0.0
+    gust = 0.05 * np.column_stack([coloured(22, n), coloured(23, n)])
+    truth = np.array([[2.0, 0.5], [-0.4, 3.0]])
+    u, y, x = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(2)
+    for k in range(1, n):
+        x = x + (truth @ u[k - 1] - 2.0 * x) / RATE
+        y[k] = x + gust[k]
+        u[k] = reference[k] - np.array([[0.5, 0.2], [0.1, 0.5]]) @ y[k]
+    target = reference.sum(axis=1)
+    channels = {"roll": u[:, 0], "pitch": u[:, 1], "p": y[:, 0], "q": y[:, 1], "sid_target": target}
+    log = made(channels)
+
+    def sweeps(*axes: int) -> Flight:
+        events = tuple(
+            Event(i * half, "sweep", "", {"axis": a, "start": i * half, "stop": (i + 1) * half})
+            for i, a in enumerate(axes)
+        )
+        return replace(log, provenance=replace(log.provenance, events=events))
+
+    ask: dict[str, Any] = {"inputs": ["roll", "pitch"], "outputs": ["p", "q"], "band": (0.2, 3.0)}
+    found = respond(sweeps(10, 11), references=["sid_target"], **ask)
+    z = np.exp(1j * found.omega / RATE)[:, None, None]
+    off = np.abs(found.response / (truth / RATE / (z - 1.0 + 2.0 / RATE)) - 1.0)
+    assert np.median(off) < 0.06
+    assert (off < 4.0 * found.error + 0.03).mean() > 0.97
+    assert any("--references sid_target" in text for text in respond(sweeps(10, 11), **ask).warnings)
+    with pytest.raises(FlightError, match="1 sweep"):
+        respond(sweeps(10, 10), references=["sid_target"], **ask)
+    assert not any("--references" in text for text in respond(sweeps(10, 10), **ask).warnings)
 
 
 def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:

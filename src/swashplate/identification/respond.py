@@ -21,6 +21,7 @@ from swashplate.identification.conditioning import (
     random_error,
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.references import reference_columns, sweeps_of
 from swashplate.identification.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
 
@@ -89,8 +90,8 @@ def respond(
         flights: conditioned to one rate; each unbroken piece is a record.
         inputs, outputs: channel names.
         references: excitations that no loop feeds back (an autopilot's injected sweep): the joint input-output estimate
-            is made, and compared with the direct one. One reference with as many flights as inputs counts as one
-            reference per flight (one log per swept axis).
+            is made, and compared with the direct one. One reference that sweeps one axis after the other, in one flight
+            or several, counts as one per axis (`sweeps_of`).
         band: lowest and highest frequency [Hz]; by default two periods of the longest window to a tenth of the rate. It
             ends where the slowest channel's own rate does not carry further.
         windows: lengths [s]; by the book's rules where None, with a longer one where those blur a clear response.
@@ -112,15 +113,15 @@ def respond(
         )
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
-    owner = [number for number, flight in enumerate(flights) for _ in flight.split()]
+    sweep = sweeps_of(flights)
     longest = max(piece.duration for piece in pieces)
     kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
     scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
-    pieces, owner = [pieces[k] for k in kept], [owner[k] for k in kept]
+    pieces, sweep = [pieces[k] for k in kept], [sweep[k] for k in kept]
     n = len(inputs) + len(outputs)
     own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
     if references:
-        columns = _reference_columns(owner, pieces, n, len(references), inputs)
+        columns = reference_columns(sweep, pieces, n, len(references), inputs)
         own = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
             for piece, c in zip(own, columns, strict=True)
@@ -172,7 +173,8 @@ def respond(
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
     if not references:
-        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED)
+        axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
+        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED, axes=axes)
     if others and not references and not all(name.startswith(INJECTED) for name in inputs):
         warnings += response_warnings.bystander_words(
             pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
@@ -284,23 +286,6 @@ def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, floa
 
 def _unit(flight: Flight, name: str) -> str:
     return str(flight[name].attrs.get("units", "")) or channel(name).unit
-
-
-def _reference_columns(
-    owner: Sequence[int], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
-) -> list[Array]:
-    """The references of each piece; a single one is split by flight where that gives one per input."""
-    columns = [piece.values[:, first : first + count] for piece in pieces]
-    flown = sorted(set(owner))
-    if count == 1 and len(inputs) > 1 and len(flown) >= len(inputs):
-        columns = [column * (np.array(flown) == flight) for column, flight in zip(columns, owner, strict=True)]
-    if columns[0].shape[1] < len(inputs):
-        raise FlightError(
-            f"{columns[0].shape[1]} reference(s) cannot tell {len(inputs)} inputs apart.",
-            channel=", ".join(inputs),
-            hint="Give as many independent references as inputs, or one log per swept axis.",
-        )
-    return columns
 
 
 def _matrices(

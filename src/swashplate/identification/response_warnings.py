@@ -128,11 +128,16 @@ def bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]
     return words
 
 
-def unused_references(flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...]) -> list[str]:
-    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one."""
+def unused_references(
+    flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...], axes: int
+) -> list[str]:
+    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one.
+
+    One that swept several axes in turn counts once for each.
+    """
     shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
     found = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
-    enough = len(found) >= len(inputs) or (len(found) == 1 and len(flights) >= len(inputs))
+    enough = len(found) >= len(inputs) or (len(found) == 1 and axes >= len(inputs))
     if not enough or any(name.startswith(names) for name in inputs):
         return []
     return [
