@@ -153,7 +153,7 @@ def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
     time = np.arange(n) / RATE
     half = n / 2 / RATE
     reference[time < half, 1] = reference[time >= half, 0] = 0.0
-    gust = 0.05 * np.column_stack([coloured(22, n), coloured(23, n)])
+    gust = 0.03 * np.column_stack([coloured(22, n), coloured(23, n)])
     truth = np.array([[2.0, 0.5], [-0.4, 3.0]])
     u, y, x = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(2)
     for k in range(1, n):
