@@ -183,6 +183,21 @@ def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
     assert not any("--references" in text for text in respond(sweeps(10, 10), **ask).warnings)
 
 
+def test_inputs_that_are_nearly_one_in_a_part_of_the_band_are_named_there() -> None:
+    n = 24_000
+    low = signal.sosfilt(signal.butter(4, 0.5, output="sos", fs=RATE), np.random.default_rng(30).standard_normal(n))
+    one, other = 0.25 * low + 0.05 * coloured(31, n), 0.25 * low + 0.05 * coloured(32, n)
+    found = respond(
+        made({"stick1": one, "stick2": other, "out": plant(one, 1.0, 2.0, 0.5)}),
+        inputs=["stick1", "stick2"],
+        outputs=["out"],
+        band=(0.1, 8.0),
+    )
+    (text,) = (w for w in found.warnings if "nearly one" in w)
+    assert "0.1-" in text
+    assert not any("moved together" in w for w in found.warnings)
+
+
 def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:
     n = 20_000
     u, other = coloured(10, n), coloured(11, n)

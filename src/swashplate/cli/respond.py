@@ -17,7 +17,10 @@ def respond(
     log: Annotated[
         list[str], typer.Argument(metavar="LOG...", help="Logs of sweeps; FILE@5-30 takes seconds 5 to 30.")
     ],
-    inputs: Annotated[str, typer.Option("--inputs", help="Input channels, separated by commas: all that moved.")],
+    inputs: Annotated[
+        str,
+        typer.Option("--inputs", help="Input channels, separated by commas: all that moved; NAME=CHANNEL renames."),
+    ],
     outputs: Annotated[
         str, typer.Option("--outputs", help="Output channels, separated by commas; NAME=CHANNEL renames, as az=az_sid.")
     ],

@@ -15,6 +15,9 @@ from swashplate.identification.spectra import Signals, SpectralMatrix, spectral_
 MIXED = 0.5
 """Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
 
+NEARLY_ONE = 0.9
+"""Coherence between two inputs above which a tenth or less of one is its own: errors of a strong response go over."""
+
 CLEAR, EXPLAINED = 0.8, 0.2
 """Partial coherence from which a bystander counts, and the share of the noise that it may leave over."""
 
@@ -96,14 +99,24 @@ def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
 
 
 def mixing_words(found: FrequencyResponse) -> list[str]:
+    """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it."""
     words = []
     for i, one in enumerate(found.inputs):
         for j, other in enumerate(found.inputs[:i]):
-            mixed = found.input_coherence[:, i, j]
-            if np.isfinite(mixed).any() and np.nanmean(mixed) > MIXED:
+            mixed = np.nan_to_num(found.input_coherence[:, i, j])
+            told = np.isfinite(found.response[:, :, [i, j]]).any(axis=(1, 2))
+            mean = float(np.mean(mixed[told])) if told.any() else 0.0
+            if mean > MIXED:
                 words.append(
-                    f"'{other}' and '{one}' moved together (mean coherence {np.nanmean(mixed):.2f}, over {MIXED:g}): "
+                    f"'{other}' and '{one}' moved together (mean coherence {mean:.2f}, over {MIXED:g}): "
                     "conditioning tells them apart, with larger errors."
+                )
+            nearly = told & (mixed > NEARLY_ONE)
+            if nearly.any() and found.omega[nearly].max() >= found.omega[nearly].min() * 2.0**0.25:
+                words.append(
+                    f"'{other}' and '{one}' were nearly one at {_hertz(found.omega, nearly)} (coherence up to "
+                    f"{mixed[nearly].max():.2f}): what windows blur counts many times over there. Do not trust weak "
+                    "responses to either, however coherent; fly one log per axis."
                 )
     return words
 
