@@ -67,6 +67,7 @@ def fit_ss(
     from swashplate.cli.gain_lines import gain_words, suggested
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.reduction import reduce as reduced
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import structure as find
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.state_space_fit import fit_state_space
@@ -120,7 +121,7 @@ def fit_ss(
         typer.echo(gain_words(advice), nl=False)
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
-    flying.end_with(fit.problems)
+    flying.end_with([*fit.problems, *damaged(verification.flights if verification else ())])
 
 
 def _started(model: StateSpaceModel, source: str, responses: FrequencyResponse, *, seed: int) -> StateSpaceModel:

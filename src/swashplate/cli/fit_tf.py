@@ -55,6 +55,7 @@ def fit_tf(
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import IdentificationError
     from swashplate.identification.readings import handling_lines, margin_lines
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
     from swashplate.identification.verification import verify_inside
@@ -127,3 +128,4 @@ def fit_tf(
         typer.echo(gain_words(advice), nl=False)
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(damaged(verification.flights if verification else ()))
