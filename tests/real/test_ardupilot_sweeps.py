@@ -109,6 +109,12 @@ def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     assert values["tau"] == pytest.approx(0.0527, abs=0.003)
 
 
+def test_the_injected_sweep_is_offered_and_not_its_frequency(shared_data: Path) -> None:
+    log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
+    found = respond(log, inputs=["mixer_collective"], outputs=["az_sid"], band=(0.15, 8.0), windows=[28.0, 10.0])
+    assert any("the logs hold sid_target: --references sid_target makes" in text for text in found.warnings)
+
+
 def test_given_windows_that_blur_are_said(shared_data: Path) -> None:
     log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
     found = respond(log, inputs=["mixer_collective"], outputs=["az_sid"], band=(0.1, 8.0), windows=[11.5, 5.0, 2.5])

@@ -149,7 +149,8 @@ def unused_references(
     One that swept several axes in turn counts once for each.
     """
     shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
-    found = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
+    moving = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
+    found = [n for n in moving if flights[0][n].attrs.get("units") != "Hz"]  # not the sweep's own frequency
     enough = len(found) >= len(inputs) or (len(found) == 1 and axes >= len(inputs))
     if not enough or any(name.startswith(names) for name in inputs):
         return []

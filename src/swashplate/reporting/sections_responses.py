@@ -103,6 +103,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if fit.warnings:
         blocks.append(Points(fit.warnings, title="What to beware of"))
     blocks.append(parameter_table(fit.parameters))
+    if fit.nothing_to_drop:
+        blocks.append(Text("Structure reduction: nothing to take out, every parameter is within its targets."))
     if fit.reduction:
         blocks.append(
             Table(
@@ -302,7 +304,10 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
                 note="The least of each where the loop crosses several times. ± is what the Cramér-Rao bounds of the "
                 "model's parameters make of it. FLTE and FLTD are filters of the controller, and count.",
             ),
-            *(Text(f"{g.axis}: {g.words}", tone="caution") for g in gains),
+            *(
+                Text(f"{', '.join(g.axis for g in gains if g.words == words)}: {words}", tone="caution")
+                for words in dict.fromkeys(g.words for g in gains)
+            ),
         ),
     )
 
