@@ -92,6 +92,15 @@ def test_a_single_input_is_wrong_and_said_so(sweeps: list[Flight]) -> None:
     assert any("'mixer_pitch' moved along" in text for text in alone.warnings)
 
 
+def test_one_sweep_cannot_tell_two_inputs_apart_and_no_window_feigns_it(sweeps: list[Flight]) -> None:
+    """The pitch command is the loop's answer to the roll sweep; windows of 5 s see 1 to 3 % of it as its own."""
+    alone = respond(sweeps[0], inputs=INPUTS, outputs=OUTPUTS, band=(0.2, 10.0))
+    assert np.isfinite(alone.response).any(axis=(1, 2)).mean() < 0.1
+    assert all(alone.band(o, i) is None for o in OUTPUTS for i in INPUTS)
+    (text,) = alone.problems
+    assert "'mixer_pitch' and 'mixer_roll' move together" in text
+
+
 def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
     # One record with a dwell of 13 s at its lowest frequency: the rules' windows blur, and half the record is added.

@@ -13,7 +13,9 @@ from scipy import signal
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Event, Flight, Provenance, stream
 from swashplate.identification.composite import composite
+from swashplate.identification.conditioning import SINGULAR, condition_spectra
 from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.input_shares import own_shares
 from swashplate.identification.respond import choose_windows, respond
 from swashplate.identification.spectra import Signals, spectral_matrix
 
@@ -181,6 +183,26 @@ def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
     with pytest.raises(FlightError, match="1 sweep"):
         respond(sweeps(10, 10), references=["sid_target"], **ask)
     assert not any("--references" in text for text in respond(sweeps(10, 10), **ask).warnings)
+
+
+@pytest.mark.parametrize("own", [0.0, 0.03, 0.3])
+def test_what_is_an_inputs_own_is_found_behind_what_windows_blur(own: float) -> None:
+    """One input follows the other through a mode damped as a rotor's; beside it a known share is its own."""
+    n, hertz = 12_000, np.geomspace(0.5, 6.0, 40)
+    first = signal.chirp(np.arange(n) / RATE, 0.1, n / RATE, 8.0, method="log")
+    answer = plant(first, 1.0, 2.0, 0.12)
+    extra = signal.chirp(np.arange(n)[::-1] / RATE, 0.1, n / RATE, 8.0, method="log")  # the same power, elsewhere
+    followed = np.abs(true_response(2 * np.pi * hertz, 1.0, 2.0, 0.12)) ** 2
+    pieces = [Signals("a", 1 / RATE, np.column_stack([first, answer + own * extra]))]
+    found = [spectral_matrix(pieces, 2 * np.pi * hertz, window=w, overlap=0.75) for w in (20.0, 5.0)]
+    matrices = [m for m in found if m is not None]
+    plain = condition_spectra(matrices[1].values, 2, averages=matrices[1].averages).own_share[:, 1]
+    assert plain.max() > 0.04  # at the mode, whatever the share
+    expected = own**2 / (own**2 + followed)
+    apart = (hertz < 0.7) | (hertz > 1.1)  # between, both sweeps pass at the same time
+    for share in own_shares(pieces, matrices, 2 * np.pi * hertz, inputs=2, overlap=0.75):
+        assert share is not None
+        assert share[apart, 1] == pytest.approx(expected[apart], rel=0.2, abs=0.3 * SINGULAR)
 
 
 def test_inputs_that_are_nearly_one_in_a_part_of_the_band_are_named_there() -> None:

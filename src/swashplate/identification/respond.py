@@ -21,6 +21,7 @@ from swashplate.identification.conditioning import (
     random_error,
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.input_shares import own_shares
 from swashplate.identification.references import reference_columns, sweeps_of
 from swashplate.identification.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
@@ -163,7 +164,7 @@ def respond(
     problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
-        direct = _composed(matrices, omega, replace(question, references=0))
+        direct = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
         warnings += response_warnings.bias_words(blurred, direct)
     # The window that was added counts only where its own error says so.
     warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
@@ -264,10 +265,14 @@ def _estimate(
         )
     omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(LINES_PER_DECADE * np.log10(highest / lowest))))
     matrices, notes = _matrices(pieces, omega, lengths, overlap)
-    blurred = _composed(matrices, omega, question)
+    shares: list[Array | None] = [None] * len(matrices)
+    if not question.references:
+        shares = own_shares(pieces, matrices, omega, inputs=len(question.inputs), overlap=overlap)
+    blurred = _composed(matrices, omega, question, shares)
     guess = first_guess(blurred)
     rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
-    return _Estimate(omega, matrices, notes, blurred, _composed(matrices, omega, question, guess=guess, rest=rest))
+    sharpened = _composed(matrices, omega, question, shares, guess=guess, rest=rest)
+    return _Estimate(omega, matrices, notes, blurred, sharpened)
 
 
 def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
@@ -317,6 +322,7 @@ def _composed(
     matrices: Sequence[SpectralMatrix],
     omega: Array,
     question: _Question,
+    shares: Sequence[Array | None],
     *,
     guess: Complex | None = None,
     rest: Sequence[SpectralMatrix] | None = None,
@@ -324,12 +330,16 @@ def _composed(
     """The composite of the conditioned spectra of every window, of what a guess leaves of the outputs where given."""
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     parts = []
-    for matrix, left in zip(matrices, matrices if rest is None else rest, strict=True):
+    for matrix, left, share in zip(matrices, matrices if rest is None else rest, shares, strict=True):
         values = left.values
         if question.references:
             values = project_on_references(values, n_in, question.references)
         whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
-        parts.append(condition_spectra(values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole))
+        parts.append(
+            condition_spectra(
+                values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole, share=share
+            )
+        )
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
     weight = np.stack([_window_weight(part, matrix) for part, matrix in zip(parts, matrices, strict=True)])
     plain = [m.values for m in matrices]

@@ -15,6 +15,9 @@ from swashplate.identification.spectra import Signals, SpectralMatrix, spectral_
 MIXED = 0.5
 """Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
 
+MOST = 0.25
+"""Share of the lines that need a number for the lack of coherence to be the thing to say."""
+
 NEARLY_ONE = 0.9
 """Coherence between two inputs above which a tenth or less of one is its own: errors of a strong response go over."""
 
@@ -71,7 +74,8 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         together.setdefault(pair, []).append(_hertz(found.omega, lost))
     return [
         f"{_logs(found)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
-        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently."
+        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently, "
+        "best in a sweep of each."
         for (one, other), bands in together.items()
     ]
 
@@ -80,7 +84,8 @@ def incoherent(found: FrequencyResponse) -> list[str]:
     words = []
     for output in found.outputs:
         o = found.outputs.index(output)
-        if not np.isfinite(found.response[:, o, :]).any():
+        # Where the inputs could not be told apart nearly everywhere, that is what is said.
+        if np.isfinite(found.response[:, o, :]).any(axis=1).mean() < MOST:
             continue
         if all(found.band(output, name) is None for name in found.inputs):
             best = float(np.nanmax(found.coherence[:, o, :]))
