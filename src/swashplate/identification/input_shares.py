@@ -19,8 +19,8 @@ from swashplate.identification.conditioning import condition_spectra
 from swashplate.identification.resolution import coherent_guess, without
 from swashplate.identification.spectra import Signals, SpectralMatrix, spectral_matrix
 
-SUSPECT = 0.1
-"""Own share by the window's own spectra, below which it is looked at closely."""
+SUSPECT, OFTEN = 0.1, 0.05
+"""Own share by the window's own spectra, below which it is looked at closely, and at how many of the lines."""
 
 
 ENOUGH = 4.95
@@ -40,21 +40,29 @@ def own_shares(
     if inputs < 2:
         return [None] * len(matrices)
     plain = [condition_spectra(m.values[:, :inputs, :inputs], inputs, averages=m.averages).own_share for m in matrices]
-    if not any(np.any(share < SUSPECT) for share in plain):
+    suspects = [i for i in range(inputs) if any(np.mean(share[:, i] < SUSPECT) > OFTEN for share in plain)]
+    if not suspects:
         return [None] * len(matrices)
-    close = [_closely(pieces, m, omega, share, overlap) for m, share in zip(matrices, plain, strict=True)]
+    close = [_closely(pieces, m, omega, share, suspects, overlap) for m, share in zip(matrices, plain, strict=True)]
     # A share is the input's, not the window's, and blurring only adds to it; too few windows fit anything.
     sure = [share for share, m in zip(close, matrices, strict=True) if m.averages >= ENOUGH]
     least = np.fmin.reduce(sure) if sure else np.full(close[0].shape, np.nan)
     return [np.where(np.isfinite(share), np.fmin(share, least), np.nan) for share in close]
 
 
-def _closely(pieces: Sequence[Signals], matrix: SpectralMatrix, omega: Array, plain: Array, overlap: float) -> Array:
+def _closely(
+    pieces: Sequence[Signals],
+    matrix: SpectralMatrix,
+    omega: Array,
+    plain: Array,
+    suspects: Sequence[int],
+    overlap: float,
+) -> Array:
     """The smaller of a window's own share and what is left when the others' part was taken out of the record."""
     n = plain.shape[1]
     found = plain.copy()
     seen = np.isfinite(matrix.values[:, 0, 0])
-    for i in range(n):
+    for i in suspects:
         order = [*(j for j in range(n) if j != i), i]
         part = matrix.values[np.ix_(range(omega.size), order, order)]
         first = condition_spectra(part, n - 1, averages=matrix.averages)
