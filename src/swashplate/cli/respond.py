@@ -52,6 +52,7 @@ def respond(
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import SwashError
+    from swashplate.identification.readings import handling_lines
     from swashplate.identification.respond import respond as answer
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
@@ -73,13 +74,14 @@ def respond(
             )
             renamed = {name: source for name, source in how.channels.items() if name != source}
             found = replace(found, settings={**found.settings, "channels": renamed})
+            document = {**found.as_dict(), "handling": [one.as_dict() for one in handling_lines(found)]}
             if folder is not None:
                 line.say("writing the report")
                 found.save(folder / flying.RESPONSES)
-                write_text(folder / "responses.json", as_json(found.as_dict()) + "\n")
+                write_text(folder / "responses.json", as_json(document) + "\n")
                 response_report(ResponseMaterial(found), path=folder / "report.html")
     if json:
-        typer.echo(as_json(found.as_dict()))
+        typer.echo(as_json(document))
     elif not quiet:
         typer.echo(repr(found))
         if out is not None:
