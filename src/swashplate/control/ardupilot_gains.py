@@ -77,7 +77,7 @@ def suggest_gains(
     """Feed-forward and gains for every axis whose rate and mixer command the model joins.
 
     Feed-forward: one over the steady rate per command, so that a commanded rate is reached without an error; none where
-    the rate goes on growing (yaw without much damping). P, I and D: the largest P of a grid, with half the feed-forward
+    the rate settles slowly or not at all (yaw without much damping). P, I and D: the largest P of a grid, with half the feed-forward
     as I (a tenth of P without feed-forward) and D up to a fiftieth of P, that keeps 45 degrees, 6 dB and a sensitivity
     peak below two at every crossing with the model's own delay and the controller's filters. Other axes are left open:
     cross-coupling is not compensated.
@@ -180,7 +180,7 @@ def _suggest(loop: _Loop, known: Mapping[str, float]) -> Suggestion:
         "first with P, I and D at a third, then raise them."
     )
     if not steady:
-        words += " The rate goes on growing under a steady command: no feed-forward."
+        words += " Under a steady command the rate settles slowly or not at all: no feed-forward."
     if unstable:
         words += f" The slow mode that grows ({unstable:.2g} rad/s) is left to the attitude loop."
     return Suggestion(loop.axis, gains, *loop.margins(gains, omega), words, flown, *as_flown)
