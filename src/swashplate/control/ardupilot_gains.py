@@ -77,10 +77,10 @@ def suggest_gains(
     """Feed-forward and gains for every axis whose rate and mixer command the model joins.
 
     Feed-forward: one over the steady rate per command, so that a commanded rate is reached without an error; none where
-    the rate settles slowly or not at all (yaw without much damping). P, I and D: the largest P of a grid, with half the feed-forward
-    as I (a tenth of P without feed-forward) and D up to a fiftieth of P, that keeps 45 degrees, 6 dB and a sensitivity
-    peak below two at every crossing with the model's own delay and the controller's filters. Other axes are left open:
-    cross-coupling is not compensated.
+    the rate settles slowly or not at all (yaw without much damping). P, I and D: the largest P of a grid, with half the
+    feed-forward as I (a tenth of P without feed-forward) and D up to a fiftieth of P, that keeps 45 degrees, 6 dB and a
+    sensitivity peak below two at every crossing with the model's own delay and the controller's filters. Other axes are
+    left open: cross-coupling is not compensated.
 
     Args:
         model: a model, or a fit, whose bounds the margins then get.
