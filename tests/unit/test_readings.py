@@ -38,7 +38,11 @@ def drawn(fit: TransferFunctionFit, number: int) -> list[TransferFunction]:
     chosen = np.random.default_rng(5).multivariate_normal(
         [p.value for p in free], 0.01 * fit.correlation * np.outer(bounds, bounds), size=number
     )
-    return [fit.changed(dict(zip((p.name for p in free), map(float, row), strict=True)))[0] for row in chosen]
+    (model,) = fit.models
+    return [
+        replace(model, values={**model.values, **dict(zip((p.name for p in free), map(float, row), strict=True))})
+        for row in chosen
+    ]
 
 
 def test_bounds_of_margins_are_those_of_drawn_models(lag: tuple[FrequencyResponse, TransferFunctionFit]) -> None:
@@ -105,6 +109,14 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     free = replace(found, input_power=powers * np.nan, output_power=powers * np.nan)  # of a control.FRD
     assert [own_input(free, o) for o in found.outputs] == ["mixer_roll", "mixer_pitch"]
     fit = fit_state_space(model, found, starts=1)
+    # The same bounds by moving each parameter of the state-space model along its covariance's directions.
+    band, steps = answers(fit, "q", "mixer_roll", omega), []
+    bounds = np.array([fit[name].cramer_rao for name in fit.free])
+    for row in np.random.default_rng(6).multivariate_normal(np.zeros(bounds.size), fit.correlation, size=300):
+        moved = {n: fit[n].value + 0.1 * b * float(x) for n, b, x in zip(fit.free, bounds, row, strict=True)}
+        steps.append(np.log(fit.model.with_values(moved).response(omega)[:, 1, 0] / band.response))
+    assert band.gain == pytest.approx(10.0 * np.std(np.real(steps), axis=0), rel=0.2)
+    assert band.phase == pytest.approx(10.0 * np.std(np.imag(steps), axis=0), rel=0.2)
     lines = handling_lines(found, (fit,))
     assert [(a.response, a.source) for a in lines] == [
         ("phi / mixer_roll", "flight"), ("phi / mixer_roll", "model"),

@@ -125,7 +125,7 @@ class _Loop:
         if isinstance(self.model, StateSpaceModel):
             h = self.model.response(omega)
             return np.asarray(h[:, self.model.outputs.index(self.rate), self.model.inputs.index(self.command)])
-        return response_of(self.model, self.rate, self.command, omega, {})
+        return response_of(self.model, self.rate, self.command, omega)
 
     def controller(self, gains: Mapping[str, float], omega: Array) -> Complex:
         """From the rate to the command with its sign turned, gyro filter included where the model lacks it."""

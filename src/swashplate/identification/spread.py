@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,33 +41,27 @@ def has_pair(fit: Fitted, output: str, input: str) -> bool:
     return any((m.output, m.input) == (output, input) for m in fit.models)
 
 
-def response_of(fit: Fitted, output: str, input: str, omega: Array, changes: Mapping[str, float]) -> Complex:
-    """One response of a fitted model with some parameters at other values, shape (n,)."""
-    if isinstance(fit, StateSpaceFit):
-        model = fit.model.with_values(changes) if changes else fit.model
-        return model.response(omega)[:, model.outputs.index(output), model.inputs.index(input)]
-    return next(m for m in fit.changed(changes) if (m.output, m.input) == (output, input)).response(omega)
+def response_of(fit: Fitted, output: str, input: str, omega: Array) -> Complex:
+    """One response of a fitted model, shape (n,)."""
+    return _with_slopes(fit, output, input, omega)[0]
 
 
 def answers(fit: Fitted, output: str, input: str, omega: Array) -> Answers:
     """A response of a fitted model with the bounds of its gain and phase."""
-    h = response_of(fit, output, input, omega, {})
-
-    def read(other: Complex) -> Array:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = other / h
-            return np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)])
-
-    _, sigma = spread(fit, output, input, omega, read)
-    return Answers(omega, h, sigma[: omega.size], sigma[omega.size :])
+    h, slopes = _with_slopes(fit, output, input, omega)
+    if not slopes.shape[1]:
+        return Answers(omega, h, *[np.full(omega.size, np.nan)] * 2)
+    moved = slopes @ _root(_free(fit), fit.correlation)
+    return Answers(omega, h, np.sqrt((moved.real**2).sum(axis=1)), np.sqrt((moved.imag**2).sum(axis=1)))
 
 
 def spread(fit: Fitted, output: str, input: str, omega: Array, read: Callable[[Complex], Array]) -> tuple[Array, Array]:
     """Numbers read off one response of a fitted model, and what the parameters' bounds make of them.
 
-    With a square root L of the bounds' covariance (correlations included) every column moves all parameters together;
-    the squares of what each does add up. As the bounds themselves these figures order, they are no standard deviations
-    (Tischler and Remple 2012, ch. 12). NaN where a number vanishes on the way.
+    With a square root L of the bounds' covariance (correlations included) every column moves all parameters together,
+    and the response by its logarithm's slopes; the squares of what each does add up. As the bounds themselves these
+    figures order, they are no standard deviations (Tischler and Remple 2012, ch. 12). NaN where a number vanishes on
+    the way.
 
     Args:
         fit: a transfer-function or state-space fit.
@@ -77,18 +71,39 @@ def spread(fit: Fitted, output: str, input: str, omega: Array, read: Callable[[C
     Returns:
         The numbers and their bounds, shape (m,) each.
     """
-    value = np.asarray(read(response_of(fit, output, input, omega, {})), dtype=np.float64)
-    free = [p for p in fit.parameters if not p.fixed and not p.tie]
+    h, slopes = _with_slopes(fit, output, input, omega)
+    value = np.asarray(read(h), dtype=np.float64)
+    free = _free(fit)
+    if not free:
+        return value, np.full(value.shape, np.nan)
     total = np.zeros(value.shape)
-
-    def moved(column: Array) -> Array:
-        changes = {p.name: p.value + float(c) for p, c in zip(free, column, strict=True)}
-        return read(response_of(fit, output, input, omega, changes))
-
-    for column in _root(free, fit.correlation).T:
+    for column in (slopes @ _root(free, fit.correlation)).T:
         if column.any():
-            total += ((moved(_STEP * column) - moved(-_STEP * column)) / (2.0 * _STEP)) ** 2
-    return value, np.sqrt(total) if free else np.full(value.shape, np.nan)
+            total += ((read(h * np.exp(_STEP * column)) - read(h * np.exp(-_STEP * column))) / (2.0 * _STEP)) ** 2
+    return value, np.sqrt(total)
+
+
+def _free(fit: Fitted) -> list[ParameterAccuracy]:
+    return [p for p in fit.parameters if not p.fixed and not p.tie]
+
+
+def _with_slopes(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Complex, Complex]:
+    """H(j omega) (n,) and the derivatives of its logarithm by each free parameter (n, n_free)."""
+    free = [p.name for p in _free(fit)]
+    if isinstance(fit, StateSpaceFit):
+        model = fit.model
+        pair = (model.outputs.index(output), model.inputs.index(input), omega)
+        at = np.array([model.parameters[name].value for name in free])
+        (h,), (slopes,) = model.sensitivities(tuple(free), at, [pair])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return h, slopes / h[:, None]
+    model_of = next(m for m in fit.models if (m.output, m.input) == (output, input))
+    h, own = model_of.with_slopes(omega)
+    several = len(fit.models) > 1
+    by_name = {f"{n} {output}" if several and n in model_of.form.own_names else n: slope for n, slope in own.items()}
+    zero = np.zeros(omega.size, dtype=np.complex128)
+    columns = [by_name.get(name, zero) for name in free]
+    return h, np.stack(columns, axis=1) if columns else np.zeros((omega.size, 0), dtype=np.complex128)
 
 
 def _root(free: Sequence[ParameterAccuracy], correlation: Array) -> Array:

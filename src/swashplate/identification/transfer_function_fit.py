@@ -72,20 +72,6 @@ class TransferFunctionFit:
     def form(self) -> Form:
         return self.models[0].form
 
-    def changed(self, values: Mapping[str, float]) -> tuple[TransferFunction, ...]:
-        """The models with some parameters at other values, by the names in `parameters`."""
-        several = len(self.models) > 1
-        return tuple(
-            replace(
-                m,
-                values={
-                    n: values.get(f"{n} {m.output}" if several and n in m.form.own_names else n, v)
-                    for n, v in m.values.items()
-                },
-            )
-            for m in self.models
-        )
-
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types."""
         return {
