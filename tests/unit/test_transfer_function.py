@@ -104,6 +104,8 @@ def test_fixed_stays_and_unknown_is_refused() -> None:
         fit_transfer_function(exact(SECOND), "1/2", input="stick", fixed={"tua": 0.03})
     with pytest.raises(IdentificationError, match="nowhere over a quarter of an octave"):
         fit_transfer_function(exact(SECOND, coherence=0.5), "1/2", input="stick")
+    with pytest.raises(IdentificationError, match="nothing to fit"):
+        fit_transfer_function(exact(SECOND), "0/0", input="stick", fixed={"K": 1.0, "tau": 0.1})
 
 
 def test_suggestion_is_the_true_structure() -> None:

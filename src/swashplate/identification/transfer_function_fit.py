@@ -237,6 +237,10 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
         )
     _check_fixed(form, spread)
     free = [name for name in names if name not in spread]
+    if not free:
+        raise IdentificationError(
+            f"every parameter of the form {form.text} is held: there is nothing to fit.", hint="Let one move."
+        )
 
     def models(values: Mapping[str, float]) -> list[TransferFunction]:
         return [
