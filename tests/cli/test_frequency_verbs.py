@@ -163,6 +163,8 @@ def test_noise_is_not_a_response(folder: Path) -> None:
 
 def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: Path) -> None:
     ask = ("--inputs", "mixer_roll", "--outputs", "p")
+    assert "named as a reference" in one_message(swash("respond", flown, *ask, "--references", "p"))
+    assert "same stretch of the same log" in one_message(swash("respond", flown, flown, *ask))
     assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--windows", "500"))
     assert "are not all positive" in one_message(swash("respond", flown, *ask, "--windows", "0"))
     assert "the flight has no such channel" in one_message(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import flying, options
-from swashplate.cli.reading import Reading
+from swashplate.cli.reading import Reading, check_disjoint
 
 FILES = (flying.RESPONSES, "responses.json", "report.html")
 
@@ -67,6 +67,7 @@ def respond(
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
         flights = flying.flown(log, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, how=how)
+        check_disjoint(flights, log)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
             found = answer(

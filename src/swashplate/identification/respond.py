@@ -112,6 +112,12 @@ def respond(
             channel=", ".join(doubled) or None,
             hint="Name at least one of each, and no channel twice.",
         )
+    if mixed := set(references) & {*inputs, *outputs}:
+        raise FlightError(
+            "is named as a reference, and as an input or output: a loop feeds it back.",
+            channel=", ".join(sorted(mixed)),
+            hint="A reference is what a program adds to a command, such as sid_target.",
+        )
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
     sweep = sweeps_of(flights)

@@ -128,7 +128,7 @@ def _targets(
             f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
             where=f"model '{model.name}'"
             + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
-            hint=f"Name them as the model does: swash respond --inputs {model.inputs[0]}={responses.inputs[0]}",
+            hint="Name the channels as the model does (swash respond --inputs NAME=CHANNEL), or take another model.",
         )
     found, ceilings, missing = [], [], []
     for output in shared_out:
