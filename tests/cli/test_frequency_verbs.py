@@ -57,6 +57,10 @@ def answered(folder: Path, flown: Path) -> Path:
     assert done.code == 0, done.err
     assert "p / mixer_roll" in done.out
     assert {file.name for file in out.iterdir()} == {"responses.nc", "responses.json", "report.html"}
+    read = json.loads((out / "responses.json").read_text(encoding="utf-8"))["handling"]
+    assert [(one["response"], one["from"]) for one in read] == [
+        ("phi / mixer_roll", "flight"), ("theta / mixer_pitch", "flight"),
+    ]  # fmt: skip
     return out
 
 
@@ -105,12 +109,26 @@ def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answere
         assert done.code == 0, done.err
         assert f"{output} / {name} (flight): crossover" in done.out
         assert f"{output} / {name} (model): crossover" in done.out
+        assert f"{ {'p': 'phi', 'q': 'theta'}[output] } / {name} (model): bandwidth" in done.out
+        assert "+- 0 " not in done.out
     done = swash("fit-ss", "rotor_body", answered, "--start-from", ",".join(map(str, places)), "--json")
     assert done.code == 0, done.err
     found = {p["name"]: p["value"] for p in json.loads(done.out)["fit"]["parameters"]}
     assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
     refused = swash("fit-ss", "rotor_body", answered, "--start-from", str(folder / "nothing.toml"))
     assert "neither a vehicle's name nor a file" in one_message(refused)
+
+
+def test_gains_come_from_transfer_functions_too_and_their_lack_is_said(answered: Path) -> None:
+    ask = ("fit-tf", answered, "--input", "mixer_roll", "--form", "2/4")
+    done = swash(*ask, "--outputs", "p", "--gains", "--json")
+    assert done.code == 0, done.err
+    (roll,) = json.loads(done.out)["gains"]
+    assert roll["parameters"]["ATC_RAT_RLL_FLTE"] == 20.0
+    assert roll["margins"]["gain_margin"][0] >= 6.0
+    assert roll["margins"]["gain_margin"][1] > 0.0
+    assert roll["flown"] == {}  # a table holds no parameters of an autopilot
+    assert "joins no rate with its mixer command" in one_message(swash(*ask, "--outputs", "q", "--gains"))
 
 
 def test_the_fitted_flight_is_no_hold_out(answered: Path, flown: Path) -> None:
@@ -145,6 +163,8 @@ def test_noise_is_not_a_response(folder: Path) -> None:
 
 def test_what_a_user_can_get_wrong_is_said(folder: Path, flown: Path, answered: Path) -> None:
     ask = ("--inputs", "mixer_roll", "--outputs", "p")
+    assert "named as a reference" in one_message(swash("respond", flown, *ask, "--references", "p"))
+    assert "same stretch of the same log" in one_message(swash("respond", flown, flown, *ask))
     assert "shortest window 500 s" in one_message(swash("respond", flown, *ask, "--windows", "500"))
     assert "are not all positive" in one_message(swash("respond", flown, *ask, "--windows", "0"))
     assert "the flight has no such channel" in one_message(

@@ -8,6 +8,7 @@ from pathlib import Path
 from commands import one_message, swash
 
 from made_autopilot_logs import ardupilot_rows, dataflash, ulog
+from swashplate.identification.state_space_file import structure, to_toml
 
 
 def test_a_log_is_shown_with_rates_and_sweeps(tmp_path: Path) -> None:
@@ -51,3 +52,16 @@ def test_a_damaged_ulog_and_an_empty_log_are_refused_in_one_line(tmp_path: Path)
     assert "a.ulg: holds no flight" in one_message(swash("inspect", tmp_path / "a.ulg"))
     (tmp_path / "a.bin").write_bytes(dataflash([]))
     assert "a.bin: holds no flight" in one_message(swash("inspect", tmp_path / "a.bin"))
+
+
+def test_a_log_cut_off_is_named_where_a_model_is_held_against_it(tmp_path: Path) -> None:
+    path, model = tmp_path / "cut.bin", tmp_path / "model.toml"
+    whole = dataflash(ardupilot_rows())
+    path.write_bytes(whole[: len(whole) // 2])
+    model.write_text(to_toml(structure("rotor_body")), encoding="utf-8")
+    done = swash("validate", "--model", model, "--flight", path, "--out", tmp_path / "out")
+    assert done.code == 2
+    assert "cut off" in done.err
+    assert "what was read is used" in done.out  # the numbers come all the same, marked
+    assert "J_rms" in done.out
+    assert "cut off" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

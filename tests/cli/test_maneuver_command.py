@@ -61,6 +61,9 @@ def test_ardupilots_schedule_and_parameters(tmp_path: Path) -> None:
         (("sweep:tail,1-2Hz,60s", "--ardupilot"), "'tail' has no SID_AXIS"),
         ((SWEEP, "--ardupilot", "--sid-axis", "99"), "99 is no SID_AXIS"),
         ((SWEEP, "--sid-axis", "7"), "without --ardupilot"),
+        ((SWEEP, "--ardupilot", "--sid-axis", "12"), "12 is the yaw mixer, and the sweep is one of roll"),
+        (("sweep:heave,0.5-8Hz,60s", "--ardupilot", "--sid-axis", "10"), "the sweep is one of heave"),
+        (("sweep:roll,0.5-8Hz,60s,15", "--ardupilot"), "beyond the mixer's range"),
         (("sweep:roll,0.02-2Hz,300s", "--ardupilot"), "SID_T_REC"),
     ],
 )

@@ -92,6 +92,15 @@ def test_a_single_input_is_wrong_and_said_so(sweeps: list[Flight]) -> None:
     assert any("'mixer_pitch' moved along" in text for text in alone.warnings)
 
 
+def test_one_sweep_cannot_tell_two_inputs_apart_and_no_window_feigns_it(sweeps: list[Flight]) -> None:
+    """The pitch command is the loop's answer to the roll sweep; windows of 5 s see 1 to 3 % of it as its own."""
+    alone = respond(sweeps[0], inputs=INPUTS, outputs=OUTPUTS, band=(0.2, 10.0))
+    assert np.isfinite(alone.response).any(axis=(1, 2)).mean() < 0.1
+    assert all(alone.band(o, i) is None for o in OUTPUTS for i in INPUTS)
+    (text,) = alone.problems
+    assert "'mixer_pitch' and 'mixer_roll' move together" in text
+
+
 def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
     # One record with a dwell of 13 s at its lowest frequency: the rules' windows blur, and half the record is added.
@@ -107,6 +116,12 @@ def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     assert values["K"] == pytest.approx(-27.43, rel=0.03)
     assert values["pole"] == pytest.approx(2.25, rel=0.03)
     assert values["tau"] == pytest.approx(0.0527, abs=0.003)
+
+
+def test_the_injected_sweep_is_offered_and_not_its_frequency(shared_data: Path) -> None:
+    log = flight(shared_data, "heli_sid_coll_mix.BIN", "mixer_collective", "az_sid")
+    found = respond(log, inputs=["mixer_collective"], outputs=["az_sid"], band=(0.15, 8.0), windows=[28.0, 10.0])
+    assert any("the logs hold sid_target: --references sid_target makes" in text for text in found.warnings)
 
 
 def test_given_windows_that_blur_are_said(shared_data: Path) -> None:
@@ -139,3 +154,31 @@ def test_a_log_that_was_cut_off_is_named_and_what_is_left_is_used(shared_data: P
     )
     assert any("cut.BIN" in text and "cut off" in text for text in found.problems), found.problems
     assert found.band("p", "mixer_roll") is not None
+
+
+def test_the_error_filter_is_in_the_loop_that_flew(shared_data: Path) -> None:
+    """What the suggested gains take ArduPilot's controller to be, against what its log shows it did."""
+    log = flight(shared_data, "heli_sid_roll_mix.BIN", "mixer_roll", "p", "p_demand", "sid_target")
+    said = log.provenance.parameter
+    own = log.values("mixer_roll") - np.interp(log.time("p") - 0.0025, log.time("p"), log.values("sid_target"))
+    found = respond(
+        log.with_channel("own", own, like="p"),
+        inputs=["p"],
+        outputs=["own", "p_demand"],
+        band=(2.0, 6.0),
+        bystanders=(),
+    )
+    s = 1j * found.omega
+    at = {name: said(f"ATC_RAT_RLL_{name}", at=130.0) for name in ("P", "I", "D", "FF", "FLTE", "FLTT")}
+    assert at["FLTE"] == 20.0
+    wanted = found.pair("p_demand", "p")[0]
+    target, error = (1.0 / (1.0 + s / (2 * np.pi * at[name])) for name in ("FLTT", "FLTE"))
+    pid = (at["P"] + at["I"] / s + at["D"] * s) * (wanted - 1.0)
+    measured = found.pair("own", "p")[0]
+
+    def lag(said: np.ndarray) -> np.ndarray:
+        return np.abs(np.degrees(np.angle(said / measured)))
+
+    assert np.max(lag(at["FF"] * target * wanted + pid * error)) < 3.0
+    assert np.min(lag(at["FF"] * target * wanted + pid)) > 4.0
+    assert np.max(lag(at["FF"] * target * wanted + pid)) > 14.0

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import signal
 
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.flight import Event, Flight, Provenance, stream
 from swashplate.identification.composite import composite
+from swashplate.identification.conditioning import SINGULAR, condition_spectra
 from swashplate.identification.frequency_response import FrequencyResponse
+from swashplate.identification.input_shares import own_shares
 from swashplate.identification.respond import choose_windows, respond
 from swashplate.identification.spectra import Signals, spectral_matrix
 
@@ -142,6 +146,78 @@ def test_joint_estimate_is_unbiased_in_a_loop_where_the_direct_one_is_not() -> N
 
     assert off(joint) < 0.7 < 1.8 < off(direct)
     assert any("feedback biases the direct estimate" in text for text in joint.warnings)
+
+
+def test_one_log_that_sweeps_axis_after_axis_has_a_reference_for_each() -> None:
+    """Two axes under loops that mix them, gusts in both, swept in turn within one record."""
+    n = 18_000
+    reference = np.column_stack([coloured(20, n), coloured(21, n)])
+    time = np.arange(n) / RATE
+    half = n / 2 / RATE
+    reference[time < half, 1] = reference[time >= half, 0] = 0.0
+    gust = 0.03 * np.column_stack([coloured(22, n), coloured(23, n)])
+    truth = np.array([[2.0, 0.5], [-0.4, 3.0]])
+    u, y, x = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(2)
+    for k in range(1, n):
+        x = x + (truth @ u[k - 1] - 2.0 * x) / RATE
+        y[k] = x + gust[k]
+        u[k] = reference[k] - np.array([[0.5, 0.2], [0.1, 0.5]]) @ y[k]
+    target = reference.sum(axis=1)
+    channels = {"roll": u[:, 0], "pitch": u[:, 1], "p": y[:, 0], "q": y[:, 1], "sid_target": target}
+    log = made(channels)
+
+    def sweeps(*axes: int) -> Flight:
+        events = tuple(
+            Event(i * half, "sweep", "", {"axis": a, "start": i * half, "stop": (i + 1) * half})
+            for i, a in enumerate(axes)
+        )
+        return replace(log, provenance=replace(log.provenance, events=events))
+
+    ask: dict[str, Any] = {"inputs": ["roll", "pitch"], "outputs": ["p", "q"], "band": (0.2, 3.0)}
+    found = respond(sweeps(10, 11), references=["sid_target"], **ask)
+    z = np.exp(1j * found.omega / RATE)[:, None, None]
+    off = np.abs(found.response / (truth / RATE / (z - 1.0 + 2.0 / RATE)) - 1.0)
+    assert np.median(off) < 0.06
+    assert (off < 4.0 * found.error + 0.03).mean() > 0.97
+    assert any("--references sid_target" in text for text in respond(sweeps(10, 11), **ask).warnings)
+    with pytest.raises(FlightError, match="1 sweep"):
+        respond(sweeps(10, 10), references=["sid_target"], **ask)
+    assert not any("--references" in text for text in respond(sweeps(10, 10), **ask).warnings)
+
+
+@pytest.mark.parametrize("own", [0.0, 0.03, 0.3])
+def test_what_is_an_inputs_own_is_found_behind_what_windows_blur(own: float) -> None:
+    """One input follows the other through a mode damped as a rotor's; beside it a known share is its own."""
+    n, hertz = 12_000, np.geomspace(0.5, 6.0, 40)
+    first = signal.chirp(np.arange(n) / RATE, 0.1, n / RATE, 8.0, method="log")
+    answer = plant(first, 1.0, 2.0, 0.12)
+    extra = signal.chirp(np.arange(n)[::-1] / RATE, 0.1, n / RATE, 8.0, method="log")  # the same power, elsewhere
+    followed = np.abs(true_response(2 * np.pi * hertz, 1.0, 2.0, 0.12)) ** 2
+    pieces = [Signals("a", 1 / RATE, np.column_stack([first, answer + own * extra]))]
+    found = [spectral_matrix(pieces, 2 * np.pi * hertz, window=w, overlap=0.75) for w in (20.0, 5.0)]
+    matrices = [m for m in found if m is not None]
+    plain = condition_spectra(matrices[1].values, 2, averages=matrices[1].averages).own_share[:, 1]
+    assert plain.max() > 0.04  # at the mode, whatever the share
+    expected = own**2 / (own**2 + followed)
+    apart = (hertz < 0.7) | (hertz > 1.1)  # between, both sweeps pass at the same time
+    for share in own_shares(pieces, matrices, 2 * np.pi * hertz, inputs=2, overlap=0.75):
+        assert share is not None
+        assert share[apart, 1] == pytest.approx(expected[apart], rel=0.2, abs=0.3 * SINGULAR)
+
+
+def test_inputs_that_are_nearly_one_in_a_part_of_the_band_are_named_there() -> None:
+    n = 24_000
+    low = signal.sosfilt(signal.butter(4, 0.5, output="sos", fs=RATE), np.random.default_rng(30).standard_normal(n))
+    one, other = 0.25 * low + 0.05 * coloured(31, n), 0.25 * low + 0.05 * coloured(32, n)
+    found = respond(
+        made({"stick1": one, "stick2": other, "out": plant(one, 1.0, 2.0, 0.5)}),
+        inputs=["stick1", "stick2"],
+        outputs=["out"],
+        band=(0.1, 8.0),
+    )
+    (text,) = (w for w in found.warnings if "nearly one" in w)
+    assert "0.1-" in text
+    assert not any("moved together" in w for w in found.warnings)
 
 
 def test_doubled_and_dead_inputs_are_named_and_the_rest_is_kept() -> None:

@@ -66,6 +66,15 @@ def test_constant_missing_and_outlying_channels_are_named() -> None:
     assert len(found.problems) == 3
 
 
+def test_a_heading_that_passes_south_does_not_jump() -> None:
+    heading = np.pi + 0.2 * np.sin(2.0 * np.arange(N) / 100.0)
+    wrapped = np.remainder(heading + np.pi, 2.0 * np.pi) - np.pi
+    assert np.ptp(wrapped) > 6.0
+    assert inspect(_flight(psi=wrapped)).problems == ()
+    wrapped[200] += 1.0
+    assert any("psi: 2 jumps" in text for text in inspect(_flight(psi=wrapped)).problems)
+
+
 def test_a_command_may_step_but_not_spike_and_not_leave_its_range() -> None:
     stepped, spiked, wild = (0.001 * np.sin(np.arange(N)) for _ in range(3))
     stepped[100:200] += 0.2

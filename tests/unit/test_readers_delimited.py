@@ -75,6 +75,19 @@ def test_a_file_without_header_is_mapped_by_number(tmp_path: Path) -> None:
     )
 
 
+def test_bare_numbers_parted_by_spaces(tmp_path: Path) -> None:
+    path = tmp_path / "flight.asc"
+    path.write_text("   0.00   1.0e-01  2\n   0.10  -2.0e-01  3\n   0.20   3.0e-01  4\n", encoding="utf-8")
+    channels = {"time": {"column": 1, "unit": "s"}, "q": {"column": 2, "unit": "rad/s"}}
+    flight = read(path, mapping={"header": False, "channels": channels})
+    np.testing.assert_allclose(flight.values("q"), [0.1, -0.2, 0.3])
+    with pytest.raises(FlightError, match="header = false"):
+        read(path)
+    path.write_text("a letter\nto a friend\n", encoding="utf-8")
+    with pytest.raises(FlightError, match="no flight log that is known"):
+        read(path)
+
+
 def test_units_as_an_argument(tmp_path: Path) -> None:
     path = _file(tmp_path, "time,phi\n0,90\n1,0\n")
     # The whole option line is in the message, to be copied.

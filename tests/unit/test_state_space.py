@@ -216,6 +216,9 @@ def test_reduction_takes_out_what_is_not_there_and_keeps_what_is() -> None:
     assert not dropped & {"Lb", "Ma", "tau_f", "tau_roll"}
     assert smaller.model.parameters["Lp"].value == 0.0
     assert smaller.cost < fit.cost * 1.05 + 0.5 + 0.5
+    done = reduce(replace(smaller, reduction=()))
+    assert "nothing to take out" in repr(done)
+    assert "nothing to take out" not in repr(smaller)
 
 
 def test_what_no_response_sees_is_held_and_named() -> None:

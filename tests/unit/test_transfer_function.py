@@ -104,6 +104,8 @@ def test_fixed_stays_and_unknown_is_refused() -> None:
         fit_transfer_function(exact(SECOND), "1/2", input="stick", fixed={"tua": 0.03})
     with pytest.raises(IdentificationError, match="nowhere over a quarter of an octave"):
         fit_transfer_function(exact(SECOND, coherence=0.5), "1/2", input="stick")
+    with pytest.raises(IdentificationError, match="nothing to fit"):
+        fit_transfer_function(exact(SECOND), "0/0", input="stick", fixed={"K": 1.0, "tau": 0.1})
 
 
 def test_suggestion_is_the_true_structure() -> None:
@@ -191,7 +193,7 @@ def test_margins_are_those_of_python_control() -> None:
     assert found.phase_margin.value == pytest.approx(pm, abs=0.05)
     assert found.omega_180.value == pytest.approx(w180, rel=1e-3)
     assert found.crossover.value == pytest.approx(cross, rel=1e-3)
-    assert found.phase_margin.sigma == pytest.approx(np.degrees(0.05), rel=1e-6)
+    assert found.phase_margin.sigma > np.degrees(0.05)  # the crossing moves too: see test_readings.py
 
 
 def test_reading_refuses_what_is_not_there() -> None:

@@ -11,7 +11,6 @@ from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
 
 if TYPE_CHECKING:
-    from swashplate.control.ardupilot_gains import Suggestion
     from swashplate.identification.frequency_response import FrequencyResponse
     from swashplate.identification.state_space import StateSpaceModel
 
@@ -24,7 +23,7 @@ def fit_ss(
         typer.Argument(
             metavar="STRUCTURE",
             help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, eleven_state, "
-            "thirteen_state, coaxial, rotor_body, heave.",
+            "thirteen_state, coaxial, rotor_body, heave, yaw.",
         ),
     ],
     responses: flying.Responses,
@@ -65,9 +64,10 @@ def fit_ss(
     """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
+    from swashplate.cli.gain_lines import gain_words, suggested
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.control.ardupilot_gains import suggest_gains
     from swashplate.identification.reduction import reduce as reduced
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import structure as find
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.state_space_fit import fit_state_space
@@ -102,10 +102,10 @@ def fit_ss(
             wanted = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
             flights = flying.flown(hold_out, wanted, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(fit.model, flights, band=limits), found.sources)
-        suggested = suggest_gains(fit.model) if gains else ()
+        advice = suggested(fit, found) if gains else ()
         if folder is not None:
             line.say("writing the report")
-            material = ResponseMaterial(found, fit=fit, verification=verification, gains=suggested)
+            material = ResponseMaterial(found, fit=fit, verification=verification, gains=advice)
             response_report(material, path=folder / "report.html")
             write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
             write_text(folder / "model.toml", to_toml(fit.model))
@@ -113,15 +113,15 @@ def fit_ss(
                 write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
     if json:
         document = {"fit": fit.as_dict(), "verification": verification and verification.as_dict()}
-        typer.echo(as_json({**document, "gains": [vars(s) for s in suggested]}))
+        typer.echo(as_json({**document, "gains": [s.as_dict() for s in advice]}))
     elif not quiet:
         typer.echo(repr(fit))
         if verification is not None:
             typer.echo(f"\n{verification!r}")
-        typer.echo("".join(_gain_words(s) for s in suggested), nl=False)
+        typer.echo(gain_words(advice), nl=False)
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
-    flying.end_with(fit.problems)
+    flying.end_with([*fit.problems, *damaged(verification.flights if verification else ())])
 
 
 def _started(model: StateSpaceModel, source: str, responses: FrequencyResponse, *, seed: int) -> StateSpaceModel:
@@ -136,9 +136,3 @@ def _started(model: StateSpaceModel, source: str, responses: FrequencyResponse, 
     import swashplate as sp
 
     return from_linear_model(model, sp.linearize(sp.vehicle(source)))
-
-
-def _gain_words(s: Suggestion) -> str:
-    rows = "".join(f"  {name:<18}{value:>10.4f}\n" for name, value in s.parameters.items())
-    m = s.margins
-    return f"\n{s.axis}: phase margin {m.phase_margin!r} deg, gain margin {m.gain_margin!r} dB\n{rows}"

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
-
-if TYPE_CHECKING:
-    from swashplate.identification.frequency_response import FrequencyResponse
-    from swashplate.identification.transfer_function_fit import TransferFunctionFit
 
 FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
@@ -32,8 +28,12 @@ def fit_tf(
     band: flying.BandOption = None,
     coherence: flying.Coherence = 0.6,
     loop: Annotated[
-        bool, typer.Option("--margins", help="Crossover, gain and phase margin, the responses taken as broken loops.")
+        bool,
+        typer.Option(
+            "--margins", help="Margins, the responses taken as broken loops; bandwidth and phase delay of the attitude."
+        ),
     ] = False,
+    gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     rate: options.Rate = 100.0,
@@ -51,8 +51,11 @@ def fit_tf(
     """
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
+    from swashplate.cli.gain_lines import gain_words, suggested
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import IdentificationError
+    from swashplate.identification.readings import handling_lines, margin_lines
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
     from swashplate.identification.verification import verify_inside
@@ -79,6 +82,7 @@ def fit_tf(
                 fixed=options.fixed_values(fix),
                 least_coherence=coherence,
             )
+        pairs = tuple(m.output for m in fit.models)
         model = verification = None
         try:
             model = as_state_space(fit)
@@ -91,18 +95,26 @@ def fit_tf(
             flown = (*model.inputs, *model.outputs)
             flights = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(model, flights, band=limits), found.sources)
+        advice = suggested(fit, found) if gains else ()
         if folder is not None:
-            pairs = tuple(m.output for m in fit.models)
-            material = ResponseMaterial(found.select(pairs, (input,)), (fit,), trials, verification=verification)
+            measured = found.select(pairs, (input,))
+            material = ResponseMaterial(measured, (fit,), trials, verification=verification, gains=advice)
             response_report(material, path=folder / "report.html")
             write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
             if model is not None:
                 write_text(folder / "model.toml", to_toml(model))
             if verification is not None:
                 write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
-    read = _margins(found, fit) if loop else []
+    read = (
+        [*margin_lines(found, fit, fit.targets), *handling_lines(found.select(pairs, (input,)), (fit,))] if loop else []
+    )
     if json:
-        document = {"fit": fit.as_dict(), "margins": read, "verification": verification and verification.as_dict()}
+        document = {
+            "fit": fit.as_dict(),
+            "margins": [r.as_dict() for r in read],
+            "gains": [s.as_dict() for s in advice],
+            "verification": verification and verification.as_dict(),
+        }
         typer.echo(as_json({**document, "tried": [{"form": t.form.text, "J": t.cost} for t in trials]}))
     elif not quiet:
         if trials:
@@ -110,31 +122,10 @@ def fit_tf(
             typer.echo("Structures tried (zeros/poles):\n" + "\n".join(lines) + "\n")
         typer.echo(repr(fit))
         for line_of_margins in read:
-            typer.echo(line_of_margins["text"])
+            typer.echo(repr(line_of_margins))
         if verification is not None:
             typer.echo(f"\n{verification!r}")
+        typer.echo(gain_words(advice), nl=False)
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
-
-
-def _margins(responses: FrequencyResponse, fit: TransferFunctionFit) -> list[dict[str, Any]]:
-    """Margins of every response, by the flight (with random errors) and by its model."""
-    import numpy as np
-
-    from swashplate.identification.handling import margins
-
-    found: list[dict[str, Any]] = []
-    for model, wanted in zip(fit.models, fit.targets, strict=True):
-        h, _, error = responses.pair(wanted.output, wanted.input)
-        inside = (responses.omega >= wanted.omega[0]) & (responses.omega <= wanted.omega[-1]) & np.isfinite(h)
-        omega = responses.omega[inside]
-        wide = np.geomspace(omega[0] / 10.0, omega[-1] * 10.0, 800)
-        for source, m in (
-            ("flight", margins(omega, h[inside], error=error[inside])),
-            ("model", margins(wide, model.response(wide))),
-        ):
-            numbers = {k: [v.value, v.sigma] for k, v in vars(m).items()}
-            text = f"{wanted.name} ({source}): crossover {m.crossover!r} rad/s, phase margin {m.phase_margin!r} deg, "
-            text += f"gain margin {m.gain_margin!r} dB at {m.omega_180!r} rad/s"
-            found.append({"response": wanted.name, "from": source, **numbers, "text": text})
-    return found
+    flying.end_with(damaged(verification.flights if verification else ()))

@@ -56,6 +56,7 @@ def fit_time(
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.linear_time_fit import fit_in_time
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import structure as find
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.verification import verify
@@ -98,3 +99,4 @@ def fit_time(
         typer.echo(f"\n{verification!r}")
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(damaged([*flights, *(unseen if hold_out else [])]))

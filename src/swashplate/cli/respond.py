@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import flying, options
-from swashplate.cli.reading import Reading
+from swashplate.cli.reading import Reading, check_disjoint
 
 FILES = (flying.RESPONSES, "responses.json", "report.html")
 
@@ -17,7 +17,10 @@ def respond(
     log: Annotated[
         list[str], typer.Argument(metavar="LOG...", help="Logs of sweeps; FILE@5-30 takes seconds 5 to 30.")
     ],
-    inputs: Annotated[str, typer.Option("--inputs", help="Input channels, separated by commas: all that moved.")],
+    inputs: Annotated[
+        str,
+        typer.Option("--inputs", help="Input channels, separated by commas: all that moved; NAME=CHANNEL renames."),
+    ],
     outputs: Annotated[
         str, typer.Option("--outputs", help="Output channels, separated by commas; NAME=CHANNEL renames, as az=az_sid.")
     ],
@@ -49,6 +52,7 @@ def respond(
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import SwashError
+    from swashplate.identification.readings import handling_lines
     from swashplate.identification.respond import respond as answer
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
@@ -63,6 +67,7 @@ def respond(
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
         flights = flying.flown(log, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, how=how)
+        check_disjoint(flights, log)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
             found = answer(
@@ -70,13 +75,14 @@ def respond(
             )
             renamed = {name: source for name, source in how.channels.items() if name != source}
             found = replace(found, settings={**found.settings, "channels": renamed})
+            document = {**found.as_dict(), "handling": [one.as_dict() for one in handling_lines(found)]}
             if folder is not None:
                 line.say("writing the report")
                 found.save(folder / flying.RESPONSES)
-                write_text(folder / "responses.json", as_json(found.as_dict()) + "\n")
+                write_text(folder / "responses.json", as_json(document) + "\n")
                 response_report(ResponseMaterial(found), path=folder / "report.html")
     if json:
-        typer.echo(as_json(found.as_dict()))
+        typer.echo(as_json(document))
     elif not quiet:
         typer.echo(repr(found))
         if out is not None:

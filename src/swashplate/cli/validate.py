@@ -135,6 +135,7 @@ def _verify(
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
+    from swashplate.identification.response_warnings import damaged
     from swashplate.identification.state_space_file import structure
     from swashplate.identification.verification import verify_inside
     from swashplate.reporting.response_report import response_report
@@ -165,3 +166,4 @@ def _verify(
             typer.echo(f"\n{rival!r}")
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(damaged(found.flights))

@@ -246,6 +246,8 @@ def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
         outliers = _attitude_jumps(flight)
     else:
         changes = np.diff(values[np.isfinite(values)])
+        if name.startswith(("phi", "psi")) and inside == "rad":  # a whole turn is no jump
+            changes = np.remainder(changes + np.pi, 2.0 * np.pi) - np.pi
         steps = name in _COMMANDS or name.startswith(_STEPPING) or name.endswith("_demand")
         outliers = int(np.sum(_spikes(changes) if steps else _jumps(changes)))
     return ChannelSummary(

@@ -42,7 +42,13 @@ class Conditioned:
 
 
 def condition_spectra(
-    spectra: Complex, inputs: int, *, averages: float, removed: Complex | None = None, whole: Array | None = None
+    spectra: Complex,
+    inputs: int,
+    *,
+    averages: float,
+    removed: Complex | None = None,
+    whole: Array | None = None,
+    share: Array | None = None,
 ) -> Conditioned:
     """H = Gxx^-1 Gxy with partial and multiple coherence (Tischler and Remple 2012, ch. 9; Bendat and Piersol 2010).
 
@@ -55,6 +61,7 @@ def condition_spectra(
         averages: number of independent windows.
         removed: responses that were taken out of the outputs beforehand and are added here, shape
             (n_f, n_outputs, n_inputs). whole: spectra of the whole outputs then, shape (n_f, n_outputs).
+        share: of each input's power that is its own, where it is known better than by these spectra (`own_shares`).
     """
     gxx, gxy = spectra[:, :inputs, :inputs], spectra[:, :inputs, inputs:]
     gyy = np.diagonal(spectra[:, inputs:, inputs:], axis1=1, axis2=2).real
@@ -62,6 +69,7 @@ def condition_spectra(
     scale = np.sqrt(np.where(auto > 0.0, auto, 1.0))
     normal = gxx / (scale[:, :, None] * scale[:, None, :])
     own, inverse = _inverse(normal)
+    own = own if share is None else share
     inverse = inverse / (scale[:, :, None] * scale[:, None, :])
     h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
     explained = np.einsum("fio,fio->fo", gxy.conj(), h).real

@@ -18,12 +18,14 @@ from swashplate.identification.spectra import Complex
 
 @dataclass(frozen=True)
 class Reading:
-    """A number read off a response, with its standard deviation (NaN where unknown)."""
+    """A number read off a response (NaN where there is none), with its standard deviation (NaN where unknown)."""
 
     value: float
     sigma: float = float("nan")
 
     def __repr__(self) -> str:
+        if not np.isfinite(self.value):
+            return "none"
         return f"{self.value:.4g}" + (f" +- {self.sigma:.2g}" if np.isfinite(self.sigma) else "")
 
 
@@ -50,11 +52,11 @@ class Handling:
 
 @dataclass(frozen=True)
 class Margins:
-    """Of a broken loop.
+    """Of a broken loop, the least of each kind where it crosses several times; NaN where it never does.
 
     Attributes:
-        crossover: highest frequency of unit gain [rad/s]. phase_margin: there [deg].
-        omega_180: lowest frequency of -180 degrees [rad/s]. gain_margin: there [dB].
+        crossover: frequency of unit gain [rad/s]. phase_margin: there, -180 to 180 [deg].
+        omega_180: frequency of -180 degrees, or whole turns further [rad/s]. gain_margin: there [dB].
     """
 
     crossover: Reading
@@ -75,12 +77,18 @@ class _Curve:
 
     def crossing(self, values: Array, level: float, *, last: bool = False) -> float | None:
         """Where a curve first (last) falls through a level [rad/s], straight in log frequency."""
-        down = np.flatnonzero((values[:-1] >= level) & (values[1:] < level))
-        if not down.size:
-            return None
-        k = int(down[-1] if last else down[0])
-        share = (values[k] - level) / (values[k] - values[k + 1])
-        return float(self.omega[k] * (self.omega[k + 1] / self.omega[k]) ** share)
+        found = self.crossings(values, level, falling=True)
+        return None if not found else found[-1 if last else 0]
+
+    def crossings(self, values: Array, level: float, *, falling: bool = False) -> list[float]:
+        """Everywhere that a curve passes a level, or falls through it [rad/s]."""
+        above = values >= level
+        passes = above[:-1] & ~above[1:] if falling else above[:-1] != above[1:]
+        found = []
+        for k in np.flatnonzero(passes):
+            share = (values[k] - level) / (values[k] - values[k + 1])
+            found.append(float(self.omega[k] * (self.omega[k + 1] / self.omega[k]) ** share))
+        return found
 
     def at(self, values: Array, omega: float) -> float:
         return float(np.interp(np.log(omega), np.log(self.omega), values))
@@ -89,6 +97,13 @@ class _Curve:
         """Derivative over omega, from a tenth of an octave either way."""
         low, high = max(omega / 2**0.1, self.omega[0]), min(omega * 2**0.1, self.omega[-1])
         return float((self.at(values, high) - self.at(values, low)) / (high - low))
+
+    def sigma(self, omega: float, *, gain: bool = False) -> float:
+        """Standard deviation of a crossing [rad/s]: the random error over the curve's slope."""
+        error = self.at(self.error, omega)
+        spread = 20.0 * np.log10(1.0 + error) if gain else np.degrees(error)
+        slope = abs(self.slope(self.gain if gain else self.phase, omega))
+        return float(spread / slope) if slope > 0.0 else float("nan")
 
 
 def _curve(omega: Array, h: Complex, error: Array | None, coherence: Array | None) -> _Curve:
@@ -101,7 +116,7 @@ def _curve(omega: Array, h: Complex, error: Array | None, coherence: Array | Non
         omega,
         np.asarray(decibel(h[known])),
         np.degrees(np.unwrap(np.angle(h[known]))),
-        nothing if error is None else error[known],
+        nothing + np.nan if error is None else error[known],
         nothing + 1.0 if coherence is None else coherence[known],
     )
 
@@ -141,12 +156,12 @@ def handling_qualities(
             f"{curve.omega[-1] / 2 / np.pi:.3g} Hz): no bandwidth can be read off.",
             hint="Sweep to higher frequencies, or read it off the model.",
         )
-    s180 = _frequency_sigma(curve, w180)
+    s180 = curve.sigma(w180)
     by_phase = curve.crossing(curve.phase, -135.0)
     level = curve.at(curve.gain, w180) + 6.0
     by_gain = curve.crossing(np.where(curve.omega <= w180, curve.gain, -np.inf), level, last=True)
-    phase_reading = Reading(by_phase, _frequency_sigma(curve, by_phase)) if by_phase else Reading(float("nan"))
-    gain_reading = Reading(by_gain, _frequency_sigma(curve, by_gain, gain=True)) if by_gain else Reading(float("nan"))
+    phase_reading = Reading(by_phase, curve.sigma(by_phase)) if by_phase else Reading(float("nan"))
+    gain_reading = Reading(by_gain, curve.sigma(by_gain, gain=True)) if by_gain else Reading(float("nan"))
     both = [r for r in (phase_reading, gain_reading) if np.isfinite(r.value)]
     counted = phase_reading if command == "attitude" or not both else min(both, key=lambda r: r.value)
     two_point, line = _phase_delays(curve, w180)
@@ -174,34 +189,40 @@ def _phase_delays(curve: _Curve, w180: float) -> tuple[Reading, Reading]:
     return two_point, Reading(-slope / (57.3 * 2.0), sigma / (57.3 * 2.0))
 
 
-def _frequency_sigma(curve: _Curve, omega: float, *, gain: bool = False) -> float:
-    """Standard deviation of a crossing: the random error over the curve's slope."""
-    error = curve.at(curve.error, omega)
-    spread = 20.0 * np.log10(1.0 + error) if gain else np.degrees(error)
-    slope = abs(curve.slope(curve.gain if gain else curve.phase, omega))
-    return float(spread / slope) if slope > 0.0 else float("nan")
-
-
 def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Margins:
     """Crossover, phase and gain margin of a broken loop L, negative feedback (unit gain at -180 degrees is the limit).
 
     Args:
         omega: [rad/s].
         loop: L(j omega).
-        error: its random error.
+        error: its random error; None where it is not known.
     """
-    curve = _attitude_phase(_curve(omega, loop, error, None))
-    crossover = curve.crossing(curve.gain, 0.0, last=True)
-    w180 = curve.crossing(curve.phase, -180.0)
+    curve = _curve(omega, loop, error, None)
     nothing = Reading(float("nan"))
     pm = gm = cross = phase_cross = nothing
-    if crossover is not None:
-        cross = Reading(crossover, _frequency_sigma(curve, crossover, gain=True))
-        pm = Reading(180.0 + curve.at(curve.phase, crossover), float(np.degrees(curve.at(curve.error, crossover))))
-    if w180 is not None:
-        phase_cross = Reading(w180, _frequency_sigma(curve, w180))
-        gm = Reading(-curve.at(curve.gain, w180), float(20.0 * np.log10(1.0 + curve.at(curve.error, w180))))
+    margin = [(abs(_wrapped(curve.at(curve.phase, w) + 180.0)), w) for w in curve.crossings(curve.gain, 0.0)]
+    if margin:
+        at = min(margin)[1]
+        cross = Reading(at, curve.sigma(at, gain=True))
+        value = _wrapped(curve.at(curve.phase, at) + 180.0)
+        # Along the curve the phase at unit gain also moves as the crossing does.
+        turn = curve.slope(curve.phase, at) * curve.sigma(at, gain=True)
+        pm = Reading(value, float(np.hypot(np.degrees(curve.at(curve.error, at)), turn)))
+    turns = range(int(np.floor(curve.phase.min() / 360.0)) - 1, int(np.ceil(curve.phase.max() / 360.0)) + 1)
+    room = [(abs(curve.at(curve.gain, w)), w) for k in turns for w in curve.crossings(curve.phase, 180.0 + 360.0 * k)]
+    if room:
+        # Where it is unstable already, the gain that has to go.
+        unstable = pm.value < 0.0 if margin else float(np.median(curve.gain)) > 0.0
+        at = (min(room) if not unstable else min((-curve.at(curve.gain, w), w) for _, w in room))[1]
+        phase_cross = Reading(at, curve.sigma(at))
+        slide = curve.slope(curve.gain, at) * curve.sigma(at)
+        spread = 20.0 * np.log10(1.0 + curve.at(curve.error, at))
+        gm = Reading(-curve.at(curve.gain, at), float(np.hypot(spread, slide)))
     return Margins(cross, pm, phase_cross, gm)
+
+
+def _wrapped(degrees: float) -> float:
+    return -((180.0 - degrees) % 360.0) + 180.0
 
 
 def attitude_of(responses: FrequencyResponse, rate: str, input: str) -> tuple[Array, Complex, Array, Array]:

@@ -60,6 +60,7 @@ def reduce(fit: StateSpaceFit, *, progress: Callable[[int, float], None] | None 
         start=fit.start,
         parameters=parameters,
         reduction=tuple(history),
+        settings={**present.settings, "reduced": True},
         problems=fit.problems,
         seconds=fit.seconds + time.perf_counter() - began,
     )

@@ -51,12 +51,17 @@ def first_guess(found: FrequencyResponse) -> Complex:
     Returns:
         Shape (n_f, n_outputs, n_inputs).
     """
-    guess = np.zeros(found.response.shape, dtype=np.complex128)
-    x = np.log(found.omega)
-    for o in range(len(found.outputs)):
-        for i in range(len(found.inputs)):
-            h = found.response[:, o, i]
-            known = np.isfinite(h) & (found.coherence[:, o, i] >= LEAST_COHERENCE) & (np.abs(h) > 0.0)
+    return coherent_guess(found.omega, found.response, found.coherence)
+
+
+def coherent_guess(omega: Array, response: Complex, coherence: Array) -> Complex:
+    """As `first_guess`, of plain arrays: frequencies [rad/s], responses and coherences of shape (n_f, n_out, n_in)."""
+    guess = np.zeros(response.shape, dtype=np.complex128)
+    x = np.log(omega)
+    for o in range(response.shape[1]):
+        for i in range(response.shape[2]):
+            h = response[:, o, i]
+            known = np.isfinite(h) & (coherence[:, o, i] >= LEAST_COHERENCE) & (np.abs(h) > 0.0)
             if known.sum() >= 4:
                 gain = np.interp(x, x[known], np.log(np.abs(h[known])))
                 guess[:, o, i] = np.exp(gain + 1j * np.interp(x, x[known], np.unwrap(np.angle(h[known]))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,6 +21,8 @@ from swashplate.identification.conditioning import (
     random_error,
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.input_shares import own_shares
+from swashplate.identification.references import reference_columns, sweeps_of
 from swashplate.identification.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
 
@@ -89,8 +92,8 @@ def respond(
         flights: conditioned to one rate; each unbroken piece is a record.
         inputs, outputs: channel names.
         references: excitations that no loop feeds back (an autopilot's injected sweep): the joint input-output estimate
-            is made, and compared with the direct one. One reference with as many flights as inputs counts as one
-            reference per flight (one log per swept axis).
+            is made, and compared with the direct one. One reference that sweeps one axis after the other, in one flight
+            or several, counts as one per axis (`sweeps_of`).
         band: lowest and highest frequency [Hz]; by default two periods of the longest window to a tenth of the rate. It
             ends where the slowest channel's own rate does not carry further.
         windows: lengths [s]; by the book's rules where None, with a longer one where those blur a clear response.
@@ -111,17 +114,23 @@ def respond(
             channel=", ".join(doubled) or None,
             hint="Name at least one of each, and no channel twice.",
         )
+    if mixed := set(references) & {*inputs, *outputs}:
+        raise FlightError(
+            "is named as a reference, and as an input or output: a loop feeds it back.",
+            channel=", ".join(sorted(mixed)),
+            hint="A reference is what a program adds to a command, such as sid_target.",
+        )
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
-    owner = [number for number, flight in enumerate(flights) for _ in flight.split()]
+    sweep = sweeps_of(flights)
     longest = max(piece.duration for piece in pieces)
     kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
     scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
-    pieces, owner = [pieces[k] for k in kept], [owner[k] for k in kept]
+    pieces, sweep = [pieces[k] for k in kept], [sweep[k] for k in kept]
     n = len(inputs) + len(outputs)
     own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
     if references:
-        columns = _reference_columns(owner, pieces, n, len(references), inputs)
+        columns = reference_columns(sweep, pieces, n, len(references), inputs)
         own = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
             for piece, c in zip(own, columns, strict=True)
@@ -163,7 +172,7 @@ def respond(
     problems += response_warnings.dead(flights, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
-        direct = _composed(matrices, omega, replace(question, references=0))
+        direct = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
         warnings += response_warnings.bias_words(blurred, direct)
     # The window that was added counts only where its own error says so.
     warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
@@ -173,7 +182,8 @@ def respond(
     problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
     problems += response_warnings.incoherent(made)
     if not references:
-        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED)
+        axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
+        warnings += response_warnings.unused_references(flights, inputs, names=INJECTED, axes=axes)
     if others and not references and not all(name.startswith(INJECTED) for name in inputs):
         warnings += response_warnings.bystander_words(
             pieces, omega, inputs, outputs, others, window=chosen.lengths[len(chosen.lengths) // 2], overlap=overlap
@@ -190,8 +200,20 @@ def respond(
             "overlap": overlap,
             "references": list(references),
             "averages": [m.averages for m in matrices],
+            **_autopilot(flights),
         },
     )
+
+
+def _autopilot(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
+    """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
+    said = [flight.provenance for flight in flights]
+    names = (
+        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[ED])|INS_GYRO_FILTER", n)
+    )
+    values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
+    same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
+    return {"autopilot": same} if same else {}
 
 
 def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
@@ -252,10 +274,14 @@ def _estimate(
         )
     omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(question.lines * np.log10(highest / lowest))))
     matrices, notes = _matrices(pieces, omega, lengths, overlap)
-    blurred = _composed(matrices, omega, question)
+    shares: list[Array | None] = [None] * len(matrices)
+    if not question.references:
+        shares = own_shares(pieces, matrices, omega, inputs=len(question.inputs), overlap=overlap)
+    blurred = _composed(matrices, omega, question, shares)
     guess = first_guess(blurred)
     rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
-    return _Estimate(omega, matrices, notes, blurred, _composed(matrices, omega, question, guess=guess, rest=rest))
+    sharpened = _composed(matrices, omega, question, shares, guess=guess, rest=rest)
+    return _Estimate(omega, matrices, notes, blurred, sharpened)
 
 
 def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
@@ -274,23 +300,6 @@ def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, floa
 
 def _unit(flight: Flight, name: str) -> str:
     return str(flight[name].attrs.get("units", "")) or channel(name).unit
-
-
-def _reference_columns(
-    owner: Sequence[int], pieces: Sequence[Signals], first: int, count: int, inputs: tuple[str, ...]
-) -> list[Array]:
-    """The references of each piece; a single one is split by flight where that gives one per input."""
-    columns = [piece.values[:, first : first + count] for piece in pieces]
-    flown = sorted(set(owner))
-    if count == 1 and len(inputs) > 1 and len(flown) >= len(inputs):
-        columns = [column * (np.array(flown) == flight) for column, flight in zip(columns, owner, strict=True)]
-    if columns[0].shape[1] < len(inputs):
-        raise FlightError(
-            f"{columns[0].shape[1]} reference(s) cannot tell {len(inputs)} inputs apart.",
-            channel=", ".join(inputs),
-            hint="Give as many independent references as inputs, or one log per swept axis.",
-        )
-    return columns
 
 
 def _matrices(
@@ -322,6 +331,7 @@ def _composed(
     matrices: Sequence[SpectralMatrix],
     omega: Array,
     question: _Question,
+    shares: Sequence[Array | None],
     *,
     guess: Complex | None = None,
     rest: Sequence[SpectralMatrix] | None = None,
@@ -329,12 +339,16 @@ def _composed(
     """The composite of the conditioned spectra of every window, of what a guess leaves of the outputs where given."""
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     parts = []
-    for matrix, left in zip(matrices, matrices if rest is None else rest, strict=True):
+    for matrix, left, share in zip(matrices, matrices if rest is None else rest, shares, strict=True):
         values = left.values
         if question.references:
             values = project_on_references(values, n_in, question.references)
         whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
-        parts.append(condition_spectra(values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole))
+        parts.append(
+            condition_spectra(
+                values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole, share=share
+            )
+        )
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
     weight = np.stack([_window_weight(part, matrix) for part, matrix in zip(parts, matrices, strict=True)])
     plain = [m.values for m in matrices]

@@ -15,6 +15,12 @@ from swashplate.identification.spectra import Signals, SpectralMatrix, spectral_
 MIXED = 0.5
 """Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
 
+MOST = 0.25
+"""Share of the lines that need a number for the lack of coherence to be the thing to say."""
+
+NEARLY_ONE = 0.9
+"""Coherence between two inputs above which a tenth or less of one is its own: errors of a strong response go over."""
+
 CLEAR, EXPLAINED = 0.8, 0.2
 """Partial coherence from which a bystander counts, and the share of the noise that it may leave over."""
 
@@ -68,7 +74,8 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         together.setdefault(pair, []).append(_hertz(found.omega, lost))
     return [
         f"{_logs(found)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
-        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently."
+        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently, "
+        "best in a sweep of each."
         for (one, other), bands in together.items()
     ]
 
@@ -77,7 +84,8 @@ def incoherent(found: FrequencyResponse) -> list[str]:
     words = []
     for output in found.outputs:
         o = found.outputs.index(output)
-        if not np.isfinite(found.response[:, o, :]).any():
+        # Where the inputs could not be told apart nearly everywhere, that is what is said.
+        if np.isfinite(found.response[:, o, :]).any(axis=1).mean() < MOST:
             continue
         if all(found.band(output, name) is None for name in found.inputs):
             best = float(np.nanmax(found.coherence[:, o, :]))
@@ -96,14 +104,24 @@ def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
 
 
 def mixing_words(found: FrequencyResponse) -> list[str]:
+    """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it."""
     words = []
     for i, one in enumerate(found.inputs):
         for j, other in enumerate(found.inputs[:i]):
-            mixed = found.input_coherence[:, i, j]
-            if np.isfinite(mixed).any() and np.nanmean(mixed) > MIXED:
+            mixed = np.nan_to_num(found.input_coherence[:, i, j])
+            told = np.isfinite(found.response[:, :, [i, j]]).any(axis=(1, 2))
+            mean = float(np.mean(mixed[told])) if told.any() else 0.0
+            if mean > MIXED:
                 words.append(
-                    f"'{other}' and '{one}' moved together (mean coherence {np.nanmean(mixed):.2f}, over {MIXED:g}): "
+                    f"'{other}' and '{one}' moved together (mean coherence {mean:.2f}, over {MIXED:g}): "
                     "conditioning tells them apart, with larger errors."
+                )
+            nearly = told & (mixed > NEARLY_ONE)
+            if nearly.any() and found.omega[nearly].max() >= found.omega[nearly].min() * 2.0**0.25:
+                words.append(
+                    f"'{other}' and '{one}' were nearly one at {_hertz(found.omega, nearly)} (coherence up to "
+                    f"{mixed[nearly].max():.2f}): what windows blur counts many times over there. Do not trust weak "
+                    "responses to either, however coherent; fly one log per axis."
                 )
     return words
 
@@ -128,11 +146,17 @@ def bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]
     return words
 
 
-def unused_references(flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...]) -> list[str]:
-    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one."""
+def unused_references(
+    flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...], axes: int
+) -> list[str]:
+    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one.
+
+    One that swept several axes in turn counts once for each.
+    """
     shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
-    found = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
-    enough = len(found) >= len(inputs) or (len(found) == 1 and len(flights) >= len(inputs))
+    moving = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
+    found = [n for n in moving if flights[0][n].attrs.get("units") != "Hz"]  # not the sweep's own frequency
+    enough = len(found) >= len(inputs) or (len(found) == 1 and axes >= len(inputs))
     if not enough or any(name.startswith(names) for name in inputs):
         return []
     return [

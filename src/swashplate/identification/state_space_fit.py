@@ -128,7 +128,7 @@ def _targets(
             f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
             where=f"model '{model.name}'"
             + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
-            hint="Name the model's channels as the flight's.",
+            hint="Name the channels as the model does (swash respond --inputs NAME=CHANNEL), or take another model.",
         )
     found, ceilings, missing = [], [], []
     for output in shared_out:

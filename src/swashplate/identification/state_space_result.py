@@ -70,6 +70,11 @@ class StateSpaceFit:
         """J_ave."""
         return float(np.mean(self.costs))
 
+    @property
+    def nothing_to_drop(self) -> bool:
+        """Whether a reduction was asked for, and every parameter was within its targets already."""
+        return bool(self.settings.get("reduced")) and not self.reduction
+
     def __getitem__(self, name: str) -> ParameterAccuracy:
         return next(p for p in self.parameters if p.name == name)
 
@@ -105,4 +110,6 @@ class StateSpaceFit:
         for step in self.reduction:
             verdict = "dropped" if step.kept else "put back"
             lines.append(f"  {verdict} {step.dropped} ({step.reason}): J_ave {step.before:.1f} -> {step.after:.1f}")
+        if self.nothing_to_drop:
+            lines.append("  nothing to take out: every parameter is within its targets")
         return "\n".join([*lines, *(f"! {text}" for text in (*self.problems, *self.warnings))])

@@ -92,7 +92,8 @@ class TransferFunctionFit:
         for p in self.parameters:
             free = percent(p.cramer_rao_percent, width=9) + percent(p.insensitivity_percent, width=9)
             cells = f"{'fixed':>9}{'':>9}" if p.fixed else free
-            lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}  {p.unit}".rstrip())
+            bound = "  at its bound" if p.at_bound else ""
+            lines.append(f"  {p.name:<24}{p.value:>12.5g}{cells}  {p.unit}{bound}".rstrip())
         return "\n".join([*lines, *(f"! {text}" for text in self.warnings)])
 
 
@@ -243,6 +244,10 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
         )
     _check_fixed(form, spread)
     free = [name for name in names if name not in spread]
+    if not free:
+        raise IdentificationError(
+            f"every parameter of the form {form.text} is held: there is nothing to fit.", hint="Let one move."
+        )
 
     def models(values: Mapping[str, float]) -> list[TransferFunction]:
         return [

@@ -18,6 +18,7 @@ from swashplate.flights.filters import filtered
 from swashplate.flights.flight import Array, Flight
 from swashplate.identification.linear_simulation import delayed, free_and_forced
 from swashplate.identification.records import uniform_table
+from swashplate.identification.response_warnings import damaged
 from swashplate.identification.state_space import StateSpaceModel
 
 GOOD_J, GOOD_TIC = 2.0, 0.30
@@ -156,7 +157,7 @@ def verify(
             hint="Map the flight's columns to these names.",
         )
     growth = float(max(0.0, *model.eigenvalues().real, 0.0))
-    warnings = []
+    warnings = damaged(flights) if band is None else []  # said once
     traces = []
     for flight in flights:
         for piece in flight.split():

@@ -11,7 +11,7 @@ from swashplate.flights.flight import Array
 from swashplate.flights.schema import channel
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse, decibel, unwrapped_degrees
 from swashplate.identification.mismatch import Mismatch, envelopes
-from swashplate.identification.spectra import Complex
+from swashplate.identification.spread import Answers
 from swashplate.identification.verification import Trace
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.structure import Figure, Key
@@ -33,9 +33,12 @@ from swashplate.reporting.theme import (
     phase_ticks,
     shown,
     stacked,
+    unit_words,
 )
 
 _ERROR = "rgba(0,0,0,0.15)"
+_BOUND = "rgba(0,114,178,0.18)"
+_DB = 20.0 / np.log(10.0)
 _COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 
 
@@ -48,15 +51,13 @@ def _log_x(layout: dict[str, Any], panels: int, title: str = "frequency [Hz]") -
     return layout
 
 
-def bode(
-    responses: FrequencyResponse, output: str, input: str, *, model: tuple[Array, Complex] | None = None
-) -> Figure:
-    """Magnitude, phase and coherence of one pair, with +-2 random errors and the model where there is one.
+def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answers | None = None) -> Figure:
+    """Magnitude, phase and coherence of one pair with +-2 random errors; a model with +-2 Cramér-Rao bounds beside it.
 
     Args:
         responses: measured.
         output, input: the pair.
-        model: frequencies [rad/s] and response of a model.
+        model: a fitted model's response.
     """
     h, coherence, error = responses.pair(output, input)
     hertz = responses.omega / TWO_PI
@@ -66,16 +67,12 @@ def bode(
     layout["yaxis2"] |= phase_ticks(phase)
     layout["yaxis3"]["range"] = [0, 1.02]
     known = np.isfinite(gain)
-    both = np.concatenate([hertz[known], hertz[known][::-1]])
     traces: list[dict[str, Any]] = []
     up, down = 20.0 * np.log10(1.0 + 2.0 * spread), 20.0 * np.log10(np.maximum(1.0 - 2.0 * spread, 0.1))
-    for number, middle, above, below in (
-        ("", gain, up, down),
-        ("2", phase, np.degrees(2.0 * spread), -np.degrees(2.0 * spread)),
-    ):
-        edge = np.concatenate([(middle + above)[known], (middle + below)[known][::-1]])
-        band = line(both, edge, name="±2ε", color=_ERROR, width=0, axis=number)
-        traces.append({**band, "fill": "toself", "fillcolor": _ERROR, "hoverinfo": "skip", "hovertemplate": None})
+    lag = np.degrees(2.0 * spread)
+    for number, middle, above, below in (("", gain, up, down), ("2", phase, lag, -lag)):
+        edges = (middle + below)[known], (middle + above)[known]
+        traces.append(_band(hertz[known], *edges, color=_ERROR, name="±2ε", axis=number))
     hover = "%{x:.3g} Hz, %{y:.4g}"
     traces += [
         line(hertz, gain, name="flight", color=FLIGHT, hover=hover),
@@ -85,16 +82,23 @@ def bode(
     ]
     keys = [Key("flight", FLIGHT), Key("±2 random errors", _ERROR, "band")]
     if model is not None:
-        omega, answer = model
+        omega, answer = model.omega, model.response
         turned = unwrapped_degrees(answer)
         # The model's count of turns is the flight's where they meet.
         here = np.interp(omega, responses.omega[known], phase[known])
         turned = turned + 360.0 * np.round(np.median(here - turned) / 360.0)
+        wide = [(2.0 * _DB * model.gain, decibel(answer), ""), (np.degrees(2.0 * model.phase), turned, "2")]
+        for half, middle, number in wide:
+            if np.isfinite(half).all():
+                edges = middle - half, middle + half
+                traces.append(_band(omega / TWO_PI, *edges, color=_BOUND, name="±2 CR", axis=number))
         traces += [
             line(omega / TWO_PI, decibel(answer), name="model", color=MODEL, dash="dash", width=2.0, hover=hover),
             line(omega / TWO_PI, turned, name="model", color=MODEL, dash="dash", width=2.0, hover=hover, axis="2"),
         ]
         keys.insert(1, Key("model", MODEL, "dash"))
+        if np.isfinite(model.gain).all():
+            keys.append(Key("±2 Cramér-Rao bounds", _BOUND, "band"))
     band_found = responses.band(output, input)
     told = (
         "no coherent band" if band_found is None else f"coherent from {_hz(band_found[0])} to {_hz(band_found[1])} Hz"
@@ -103,10 +107,27 @@ def bode(
         identifier=f"bode-{_plain(output)}-{_plain(input)}",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
-        caption=f"Response of {output} to {input}: {told}. Below a coherence of 0.6 the response is not to be used.",
+        caption=f"Response of {output} to {input}: {told}. {_zero_words(responses, output, input)}Below a coherence of "
+        "0.6 the response is not to be used.",
         alt=f"Bode diagram of {output} over {input} with coherence; {told}.",
         keys=tuple(keys),
     )
+
+
+def _band(x: Array, below: Array, above: Array, *, color: str, name: str, axis: str) -> dict[str, Any]:
+    """A filled band between two curves."""
+    edges = np.concatenate([above, below[::-1]])
+    band = line(np.concatenate([x, x[::-1]]), edges, name=name, color=color, width=0, axis=axis)
+    return {**band, "fill": "toself", "fillcolor": color, "hoverinfo": "skip", "hovertemplate": None}
+
+
+def _zero_words(responses: FrequencyResponse, output: str, input: str) -> str:
+    """What 0 dB are."""
+    if not (responses.output_units and responses.input_units):
+        return ""
+    o, i = responses.place(output, input)
+    above, below = unit_words(responses.output_units[o]), unit_words(responses.input_units[i])
+    return f"0 dB are 1 {above} for {f'1 {below}' if below else f'a {input} of 1'}. "
 
 
 def _hz(omega: float) -> str:
@@ -120,8 +141,10 @@ def _plain(name: str) -> str:
 def excitation(responses: FrequencyResponse) -> Figure:
     """Spectra of the inputs, and how far they moved together."""
     hertz = responses.omega / TWO_PI
-    layout = _log_x(stacked(["input power [dB]", "between inputs"], height=150), 2)
-    layout["yaxis2"]["range"] = [0, 1.02]
+    several = len(responses.inputs) > 1
+    layout = _log_x(stacked(["input power [dB]", "coherence"][: 2 if several else 1], height=150), 2 if several else 1)
+    if several:
+        layout["yaxis2"]["range"] = [0, 1.02]
     traces, keys = [], []
     for i, name in enumerate(responses.inputs):
         color = INPUT_COLORS[i % len(INPUT_COLORS)]
@@ -142,9 +165,15 @@ def excitation(responses: FrequencyResponse) -> Figure:
         identifier="input-spectra",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
-        caption="What was excited (unit²/Hz in dB), and the coherence between inputs: above 0.5 the pilot or a loop "
-        "mixed them, and only the conditioned responses can tell their effects apart.",
-        alt=f"Input spectra of {', '.join(responses.inputs)} and the coherence between them.",
+        caption="What was excited (power density of each input, its unit²/Hz in dB)"
+        + (
+            ", and the coherence between inputs: above 0.5 the pilot or a loop mixed them, and only the conditioned "
+            "responses can tell their effects apart."
+            if several
+            else "."
+        ),
+        alt=f"Input spectra of {', '.join(responses.inputs)}"
+        + (" and the coherence between them." if several else "."),
         keys=tuple(keys),
     )
 

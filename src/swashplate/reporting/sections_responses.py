@@ -7,14 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swashplate.control.ardupilot_gains import Suggestion
-from swashplate.errors import IdentificationError
+from swashplate.control.ardupilot_gains import PEAK, Suggestion
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.handling import Handling, attitude_of, handling_qualities
+from swashplate.identification.handling import Handling
 from swashplate.identification.linear_time_fit import LinearTimeFit
 from swashplate.identification.mismatch import mismatch
+from swashplate.identification.readings import handling_lines
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
+from swashplate.identification.spread import Fitted, answers, has_pair
 from swashplate.identification.state_space_result import StateSpaceFit
 from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
 from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
@@ -47,6 +48,11 @@ class ResponseMaterial:
     rival: Verification | None = None
     time_fit: LinearTimeFit | None = None
     gains: tuple[Suggestion, ...] = field(default=())
+
+    @property
+    def fits(self) -> tuple[Fitted, ...]:
+        """All models fitted to responses."""
+        return (*((self.fit,) if self.fit else ()), *self.transfer_functions)
 
 
 def tone(cost: float) -> str:
@@ -97,6 +103,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     if fit.warnings:
         blocks.append(Points(fit.warnings, title="What to beware of"))
     blocks.append(parameter_table(fit.parameters))
+    if fit.nothing_to_drop:
+        blocks.append(Text("Structure reduction: nothing to take out, every parameter is within its targets."))
     if fit.reduction:
         blocks.append(
             Table(
@@ -220,7 +228,7 @@ def bodes_section(m: ResponseMaterial) -> Section:
     r = m.responses
     assert r is not None
     rows, figures = [], []
-    by_pair = {(model.output, model.input): model for f in m.transfer_functions for model in f.models}
+    fits = m.fits
     for output in r.outputs:
         for name in r.inputs:
             band = r.band(output, name)
@@ -245,12 +253,8 @@ def bodes_section(m: ResponseMaterial) -> Section:
                     Cell(f"{20 * np.log10(1 + np.median(error[inside])):.2f}", number=True),
                 )
             )
-            model = None
-            if m.fit and output in m.fit.model.outputs and name in m.fit.model.inputs:
-                o, i = m.fit.model.outputs.index(output), m.fit.model.inputs.index(name)
-                model = (r.omega, m.fit.model.response(r.omega)[:, o, i])
-            elif (output, name) in by_pair:
-                model = (r.omega, by_pair[output, name].response(r.omega))
+            fitted = next((f for f in fits if has_pair(f, output, name)), None)
+            model = None if fitted is None else answers(fitted, output, name, r.omega)
             figures.append(bode(r, output, name, model=model))
     blocks: list[Block] = [Text(text, tone="bad") for text in r.problems]
     blocks += [Points(r.warnings, title="What to beware of")] if r.warnings else []
@@ -266,31 +270,44 @@ def excitation_section(r: FrequencyResponse) -> Section:
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:
-    """Suggested rate-loop gains in ArduPilot's names, and the margins that they give."""
+    """Suggested rate-loop gains in ArduPilot's names beside the flown ones, and the margins of both."""
     rows = tuple(
         (
             Cell(name),
-            Cell(f"{value:.4f}", number=True, strong=True),
-            Cell(
-                f"{g.margins.phase_margin.value:.0f}" if np.isfinite(g.margins.phase_margin.value) else "no crossing",
-                number=True,
-            ),
-            Cell(f"{g.margins.gain_margin.value:.1f}", number=True),
-            Cell(f"{g.peak:.2f}", number=True),
+            Cell(f"{g.parameters[name]:.4f}" if name in g.parameters else "–", number=True, strong=True),
+            Cell(f"{g.flown[name]:.4f}" if name in g.flown else "not logged", number=True),
         )
         for g in gains
-        for name, value in g.parameters.items()
+        for name in g.parameters or g.flown
     )
+    judged = [
+        (
+            Cell(g.axis),
+            Cell(which),
+            *(Cell(repr(r).replace("+-", "±"), number=True) for r in (m.crossover, m.phase_margin, m.gain_margin)),
+            Cell(f"{peak:.2f}", number=True, tone="bad" if peak > 2.0 * PEAK else "plain"),
+        )
+        for g in gains
+        for which, m, peak in (("suggested", g.margins, g.peak), ("flown", g.flown_margins, g.flown_peak))
+        if np.isfinite(peak)
+    ]
+    heads = ("axis", "gains", "crossover [rad/s]", "phase margin [deg]", "gain margin [dB]", "peak sensitivity")
     return Section(
         "gains",
         "Suggested rate-loop gains (ArduPilot)",
         (
+            Table("Gains", ("parameter", "suggested", "flown"), rows),
             Table(
-                "Gains and the margins they give on the identified model",
-                ("parameter", "value", "phase margin [deg]", "gain margin [dB]", "peak sensitivity"),
-                rows,
+                "Margins of the rate loop on the identified model",
+                heads,
+                tuple(judged),
+                note="The least of each where the loop crosses several times. ± is what the Cramér-Rao bounds of the "
+                "model's parameters make of it. FLTE and FLTD are filters of the controller, and count.",
             ),
-            Text(gains[0].words, tone="caution"),
+            *(
+                Text(f"{', '.join(g.axis for g in gains if g.words == words)}: {words}", tone="caution")
+                for words in dict.fromkeys(g.words for g in gains)
+            ),
         ),
     )
 
@@ -307,55 +324,28 @@ def handling_section(m: ResponseMaterial) -> Section | None:
     if r is None:
         return None
     rows = []
-    for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
-        if rate not in r.outputs:
-            continue
-        # The input that moves this axis best is its own.
-        coherent = {n: float(np.nansum(r.coherence[:, r.outputs.index(rate), i])) for i, n in enumerate(r.inputs)}
-        name = max(coherent, key=lambda n: coherent[n])
-        found = [("flight", _handling(r, rate, name))]
-        if m.fit and rate in m.fit.model.outputs and name in m.fit.model.inputs:
-            found.append(("model", _model_handling(m.fit, rate, name)))
-        for source, read in found:
-            if isinstance(read, str):
-                rows.append((Cell(f"{angle} / {name}"), Cell(source), Cell(read), *[Cell("–", number=True)] * 3))
-                continue
-            cells = (read.bandwidth, read.omega_180, read.phase_delay_line)
-            rows.append(
-                (Cell(f"{angle} / {name}"), Cell(source), Cell(""), *(Cell(repr(c), number=True) for c in cells))
+    for found in handling_lines(r, m.fits):
+        read = found.read
+        cells = (read.bandwidth, read.omega_180, read.phase_delay_line) if isinstance(read, Handling) else ()
+        rows.append(
+            (
+                Cell(found.response),
+                Cell(found.source),
+                *(Cell(repr(c).replace("+-", "±"), number=True) for c in cells),
+                *(Cell("–", number=True) for _ in range(3 - len(cells))),
+                Cell(found.problem),
             )
+        )
     if not rows:
         return None
     table = Table(
         "Attitude responses (rates over jω)",
-        ("response", "from", "remark", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]"),
+        ("response", "from", "bandwidth [rad/s]", "ω180 [rad/s]", "phase delay [s]", "remark"),
         tuple(rows),
         note="After ADS-33E-PRF (definition from memory, not verified against its text), rate command: the lower of "
         "the frequencies of 45° phase margin and 6 dB gain margin; phase delay by a coherence-weighted line "
         "from ω180 to twice of it. Its boundaries are for manned helicopters: for a small one scale "
-        "frequencies with the square root of the size (Froude).",
+        "frequencies with the square root of the size (Froude). ± of the flight: random error; of the model: what "
+        "the Cramér-Rao bounds of its parameters make of it.",
     )
     return Section("handling", "Handling qualities", (table,), folded=True)
-
-
-def _handling(r: FrequencyResponse, rate: str, name: str) -> Handling | str:
-    try:
-        omega, attitude, error, coherence = attitude_of(r, rate, name)
-        return handling_qualities(omega, _pilots(attitude), error=error, coherence=coherence)
-    except IdentificationError as problem:
-        return problem.problem
-
-
-def _model_handling(fit: StateSpaceFit, rate: str, name: str) -> Handling | str:
-    omega = np.geomspace(0.3, 300.0, 800)
-    o, i = fit.model.outputs.index(rate), fit.model.inputs.index(name)
-    try:
-        return handling_qualities(omega, _pilots(fit.model.response(omega)[:, o, i] / (1j * omega)))
-    except IdentificationError as problem:
-        return problem.problem
-
-
-def _pilots(attitude: Complex) -> Complex:
-    """The response with the sign that a pilot expects: a positive command turns the aircraft positively."""
-    middle = attitude[len(attitude) // 4]
-    return -attitude if (1j * middle).real < 0.0 else attitude

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from swashplate.flights.schema import channel
 from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
 from swashplate.reporting.figures_responses import verification_figure
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
-from swashplate.reporting.theme import unit_words
+from swashplate.reporting.theme import shown, unit_words
 from swashplate.reporting.words import value_words
 
 _TRACES = 4
@@ -16,8 +19,8 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
     rows = tuple(
         (
             Cell(o.output),
-            Cell(unit_words(o.unit)),
-            Cell(value_words(o.rms), number=True),
+            Cell(unit_words(channel(o.output).shown_unit or o.unit)),
+            Cell(value_words(float(shown(o.output, np.array(o.rms)))), number=True),
             Cell(f"{o.theil:.2f}", number=True, tone="good" if o.theil <= GOOD_TIC else "caution"),
             Cell(f"{o.fit:.0f}", number=True),
         )
@@ -46,7 +49,8 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             else "Along unseen records",
             ("output", "unit", "rms error", "Theil", "fit %"),
             rows,
-            note=f"Theil's coefficient up to {GOOD_TIC:g} is good. Biases and shifts are solved for per record.",
+            note=f"Theil's coefficient up to {GOOD_TIC:g} is good (1: of no use). Biases and shifts are solved for per "
+            "record.",
         )
     )
     if rival is not None:
@@ -55,6 +59,8 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             for o in rival.outputs
         )
         blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
+        if not {t.source for t in rival.traces} & {t.source for t in v.traces}:
+            blocks.append(Text(f"{rival.model.name} is not drawn: it was flown in other stretches.", tone="quiet"))
     outputs = tuple(o.output for o in v.outputs)
     for k, trace in enumerate(v.traces[:_TRACES]):
         twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []

@@ -3,7 +3,7 @@
 A mapping file is TOML; with one, only the channels it names are read:
 
     rate = 50                # optional: Hz, where the table has no time column
-    delimiter = ","          # optional: comma, semicolon and tab are told apart without it
+    delimiter = ","          # optional: comma, semicolon, tab and (in tables of bare numbers) spaces are told apart
     header = true            # false where the first line is data already; then columns are numbers from 1
 
     [channels]
@@ -56,7 +56,10 @@ class _Column:
 def recognises(source: Source) -> bool:
     """Any text with more than one column; the motion capture exports are asked first."""
     text = source.text
-    return text is not None and any(mark in text[:65536] for mark in ",;\t")
+    if text is None or any(mark in text[:65536] for mark in ",;\t"):
+        return text is not None
+    rows = [line.split() for line in text[:4096].splitlines()[:-1] if line.strip() and not line.startswith("#")]
+    return bool(rows) and all(len(row) > 1 and all(map(_is_number, row)) for row in rows)
 
 
 def _split(cell: str) -> tuple[str, str | None]:

@@ -17,22 +17,24 @@ Array = NDArray[np.float64]
 def separator(text: str) -> str:
     """The separator of some lines: of comma, semicolon and tab the one of which every line has as many.
 
-    Where none is so regular it is the one that the lines have most of. Decimals written with a comma are thereby told
-    from commas that separate.
+    Where none is so regular it is the one that the lines have most of, and a space where there is none of them.
+    Decimals written with a comma are thereby told from commas that separate.
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     counts = {mark: {line.count(mark) for line in lines} for mark in ",;\t"}
     regular = [mark for mark, found in counts.items() if len(found) == 1 and found != {0}]
-    return max(regular or ",;\t", key=text.count)
+    return max(regular or ",;\t", key=text.count) if any(mark in text for mark in ",;\t") else " "
 
 
 def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list[str]]:
     """Cells by line, stripped of spaces; empty lines stay as empty rows.
 
     Args:
-        delimiter: the separator; found in the first lines where None.
+        delimiter: the separator; found in the first lines where None. A space stands for any number of them.
     """
     chosen = delimiter or separator("\n".join(text.split("\n", 40)[:40]))
+    if chosen == " ":
+        return [line.split() for line in text.splitlines()]
     try:
         return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text, newline=""), delimiter=chosen)]
     except (csv.Error, TypeError) as error:  # TypeError: a delimiter that is not one character
