@@ -12,6 +12,7 @@ import numpy as np
 from swashplate.errors import IdentificationError
 from swashplate.identification.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.identification.linear_start import other_starts
+from swashplate.identification.mode_accuracy import mode_accuracy
 from swashplate.identification.response_cost import (
     ACCEPTABLE,
     ParameterAccuracy,
@@ -203,6 +204,12 @@ def fit_targets(
         warnings=tuple(warnings),
         problems=tuple(problems),
         left_out=left_out,
+        modes=mode_accuracy(
+            found,
+            dict(zip(model.free, map(float, cramer_rao), strict=True)),
+            correlation,
+            lowest=min(float(t.omega[0]) for t in targets),
+        ),
         seconds=time.perf_counter() - began,
         settings={**dict(settings or {}), "started_from": source or "given values"},
     )
