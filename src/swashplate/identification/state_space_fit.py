@@ -13,6 +13,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.identification.linear_start import other_starts
 from swashplate.identification.mode_accuracy import mode_accuracy
+from swashplate.identification.model_units import unit_words
 from swashplate.identification.response_cost import (
     ACCEPTABLE,
     ParameterAccuracy,
@@ -184,6 +185,7 @@ def fit_targets(
         )
         for name, p in found.parameters.items()
     )
+    warnings += unit_words(model)
     warnings += misfit_words(found, targets)
     warnings += words(targets, costs, parameters, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
     below = {c.name for c, above in zip(kept, every[len(targets) :], strict=True) if above <= ACCEPTABLE}

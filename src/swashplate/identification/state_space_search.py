@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -127,7 +128,7 @@ def best_end(
     for row in candidates:
         if np.isfinite(cost.cost(np.clip(row, low, high))):
             rough = iterations if starts == 1 else min(_ROUGH, iterations)
-            ends.append(minimise(cost, start=row, tolerance=1e-2, iterations=rough, progress=progress))
+            ends.append(_down(cost, start=row, tolerance=1e-2, iterations=rough, progress=progress))
     if not ends:
         raise IdentificationError(
             f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
@@ -141,7 +142,7 @@ def best_end(
         before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
         if best.cost > _HOPE * before.cost:
             break
-    final = minimise(
+    final = _down(
         cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
     )
     return replace(final, history=(*best.history, *final.history[1:])), cost
@@ -174,7 +175,7 @@ def best_below(
     values, kept = alone.row * cost.row.scale, tuple(ceilings)
     while True:
         cost = cost_function(model, (*targets, *kept), cost.row.scale)
-        end = minimise(cost, start=values / cost.row.scale, tolerance=fine, iterations=iterations, progress=progress)
+        end = _down(cost, start=values / cost.row.scale, tolerance=fine, iterations=iterations, progress=progress)
         over = _over(cost, end.row)
         if _seen(cost, end) <= enough or not kept:
             break
@@ -186,6 +187,11 @@ def best_below(
         if _seen(priced, other) <= enough and len(_over(priced, other.row)) < len(over):
             return other, priced, kept
     return replace(end, history=(*alone.history, *end.history[1:])), cost, kept
+
+
+def _down(cost: ResponseCost, **how: Any) -> Optimum:
+    """Downhill from a row; derivatives that hardly show must not shorten the steps of the others."""
+    return minimise(cost, around=True, **how)
 
 
 def _seen(cost: ResponseCost, end: Optimum) -> float:
@@ -215,7 +221,7 @@ def _from_above(model: StateSpaceModel, cost: ResponseCost, best: Optimum, *, st
     row = end.row * other.row.scale / cost.row.scale
     if not np.isfinite(cost.cost(row)):
         return best
-    return min((best, minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
+    return min((best, _down(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
 
 
 def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
@@ -232,5 +238,5 @@ def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
 
     prices = np.array([price(row) for row in shaken])
     hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
-    ends = [minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
+    ends = [_down(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
     return min((best, *ends), key=lambda end: end.cost)
