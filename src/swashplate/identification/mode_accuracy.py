@@ -17,6 +17,9 @@ from swashplate.identification.state_space import StateSpaceModel
 
 _STEP = 1e-5
 
+_ORIGIN = 1e-6
+"""1/s; an integrator's eigenvalue is zero but for rounding, and no mode."""
+
 
 @dataclass(frozen=True)
 class ModeAccuracy:
@@ -55,7 +58,7 @@ class ModeAccuracy:
 def mode_accuracy(
     model: StateSpaceModel, bounds: Mapping[str, float], correlation: Array, *, lowest: float
 ) -> tuple[ModeAccuracy, ...]:
-    """The modes of an identified model with their bounds, fastest first.
+    """The modes of an identified model with their bounds, fastest first; integrators are none.
 
     Args:
         model: with its numbers.
@@ -72,7 +75,7 @@ def mode_accuracy(
     found = []
     for k in np.argsort(-np.abs(values), kind="stable"):
         v = complex(values[k])
-        if v.imag < 0.0 or v == 0.0:
+        if v.imag < 0.0 or abs(v) < _ORIGIN:
             continue
         # Of the modulus and of -Re / modulus.
         frequency = (np.conj(v) * moved[k]).real / abs(v)
