@@ -82,7 +82,7 @@ def mode_accuracy(
         damping = -moved[k].real / abs(v) + v.real / abs(v) ** 2 * frequency
         blind = bool(np.any(np.abs(moved[k][~told]) > 0.0))
         bound = [np.inf if blind else float(np.sqrt(max(s @ covariance @ s, 0.0))) for s in (frequency, damping)]
-        found.append(ModeAccuracy(v, abs(v), -v.real / abs(v), bound[0], bound[1], abs(v) >= lowest))
+        found.append(ModeAccuracy(v, abs(v), -v.real / abs(v), bound[0], bound[1], bool(abs(v) >= lowest)))
     return tuple(found)
 
 
