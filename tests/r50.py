@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from pathlib import Path
 
 import numpy as np
+import tomli_w
 from scipy.linalg import expm, solve_continuous_are
 
 from swashplate.flights.flight import Flight, Provenance, stream
 from swashplate.flights.maneuvers import Maneuver
 from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_file import structure
+from swashplate.identification.state_space_file import parse, structure, to_toml
 
 RATE = 100.0
 NOISE = {"p": 0.005, "q": 0.005, "r": 0.005, "ax": 0.05, "ay": 0.05, "az": 0.05, "u": 0.03, "v": 0.03, "w": 0.03}
@@ -25,20 +27,18 @@ def truth(data: Path) -> StateSpaceModel:
     names = {"tf": "tau_f", "ts": "tau_s"}
     with (data / "vehicles" / "derivs_mettler_r50.csv").open(encoding="utf-8") as file:
         rows = {names.get(r["param"], r["param"]): float(r["hover_SI"]) for r in csv.DictReader(file)}
-    model = with_speeds(structure("thirteen_state"))
+    model = without_angles(structure("thirteen_state"))
     model = model.with_values({n: v for n, v in rows.items() if n in model.free} | DELAYS)
     # Zero in hover, and fixed there by Mettler, too.
     return model.with_values(dict.fromkeys(("Lw", "Mw", "Mcol", "Yped"), 0.0), free=False)
 
 
-def with_speeds(model: StateSpaceModel) -> StateSpaceModel:
-    """The ready structure with the body speeds among its outputs."""
-    from swashplate.identification.state_space_file import parse, to_toml
-
-    text = to_toml(model)
-    for name in ("u", "v", "w"):
-        text += f'\n[outputs.{name}]\nunit = "m/s"\nof = {{{name} = "1"}}\n'
-    return parse(text)
+def without_angles(model: StateSpaceModel) -> StateSpaceModel:
+    """The ready structure without its angles among the outputs: the flight carries rates, speeds and accelerations."""
+    document = tomllib.loads(to_toml(model))
+    for name in ("phi", "theta"):
+        del document["outputs"][name]
+    return parse(tomli_w.dumps(document))
 
 
 def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0, gust: float = 0.2) -> Flight:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from swashplate.errors import CardError, FlightError, IdentificationError
-from swashplate.flights.flight import Flight, stream
+from swashplate.flights.flight import Array, Flight, stream
 from swashplate.identification.frequency_response import FrequencyResponse
 from swashplate.identification.linear_simulation import hold_matrices
 from swashplate.identification.reduction import reduce
 from swashplate.identification.response_cost import ParameterAccuracy, percent
-from swashplate.identification.start_values import from_linear_model, from_transfer_functions
+from swashplate.identification.start_values import at_flown_trim, from_linear_model, from_transfer_functions
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_file import parse, structure, structure_names, to_toml
 from swashplate.identification.state_space_fit import fit_state_space
@@ -315,3 +315,44 @@ def test_parameters_that_are_told_only_together_are_named() -> None:
     told = words([], [], [one("Nrfb", 0.1), one("Nr", 0.1), one("Kr", 0.1)], correlation, at_bound=(), converged=True)
     assert told == []
     assert percent(29120.5) == "   >9999"
+
+
+def test_accelerometer_in_forward_flight_is_that_of_the_full_equations() -> None:
+    """a = dV/dt + omega x V - R'g with all products, differenced about a trim of small angles."""
+    trim = {"u": 15.0, "v": -0.7, "w": 1.2, "phi": 0.02, "theta": -0.03}
+    names = {"u": "U0", "v": "V0", "w": "W0", "phi": "phi0", "theta": "theta0"}
+    base = structure("six_dof_coupled").with_values({names[s]: v for s, v in trim.items()})
+    random = np.random.default_rng(2)
+    model = base.with_values({n: float(random.uniform(-1.0, 1.0)) for n in base.free if not n.startswith("tau")})
+    a, b, c, d = model.explicit()
+    at = {name: model.states.index(name) for name in model.states}
+    start = np.zeros(len(model.states))
+    for name, value in trim.items():
+        start[at[name]] = value
+    gravity = model.parameters["g"].value
+
+    def felt(deviation: Array, inputs: Array) -> Array:
+        x = start + deviation
+        speed, turn = x[[at["u"], at["v"], at["w"]]], x[[at["p"], at["q"], at["r"]]]
+        phi, theta = x[at["phi"]], x[at["theta"]]
+        down = np.array([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)])
+        return (a @ deviation + b @ inputs)[[at["u"], at["v"], at["w"]]] + np.cross(turn, speed) - gravity * down
+
+    rows = [model.outputs.index(name) for name in ("ax", "ay", "az")]
+    step, none = 1e-6, np.zeros(4)
+    for k in range(len(model.states)):
+        change = step * np.eye(len(model.states))[k]
+        slope = (felt(change, none) - felt(-change, none)) / (2.0 * step)
+        np.testing.assert_allclose(c[rows, k], slope, atol=2.0 * gravity * 0.03**2, rtol=1e-7)
+    np.testing.assert_allclose(d[rows], b[[at["u"], at["v"], at["w"]]])
+
+
+def test_the_trim_comes_from_the_flights_unless_it_is_given() -> None:
+    model = structure("hybrid")
+    responses = replace(exact(model), settings={"means": {"u": 14.0, "theta": -0.05, "p": 0.1}})
+    found = at_flown_trim(model, responses)
+    assert {n: found.parameters[n].value for n in ("U0", "theta0", "W0")} == {"U0": 14.0, "theta0": -0.05, "W0": 0.0}
+    given = at_flown_trim(model.with_values({"U0": 10.0}), responses)
+    assert given.parameters["U0"].value == 10.0
+    with pytest.raises(CardError, match=r"trim\.p"):
+        parse(to_toml(model).replace("[trim]", '[trim]\np = "U0"'))

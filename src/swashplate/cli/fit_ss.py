@@ -68,6 +68,7 @@ def fit_ss(
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.reduction import reduce as reduced
     from swashplate.identification.response_warnings import damaged
+    from swashplate.identification.start_values import at_flown_trim
     from swashplate.identification.state_space_file import structure as find
     from swashplate.identification.state_space_file import to_toml
     from swashplate.identification.state_space_fit import fit_state_space
@@ -83,7 +84,7 @@ def fit_ss(
         if start_from is not None:
             line.say("finding start values")
             model = _started(model, start_from, found, seed=seed)
-        model = flying.with_given(model, start, fix)
+        model = flying.with_given(at_flown_trim(model, found), start, fix)
         line.say("fitting")
         fit = fit_state_space(
             model,

@@ -201,6 +201,7 @@ def respond(
             "references": list(references),
             "averages": [m.averages for m in matrices],
             **_autopilot(flights),
+            "means": _means(flights, (*inputs, *outputs)),
         },
     )
 
@@ -296,6 +297,11 @@ def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, floa
     }
     slow = min(rates, key=lambda name: rates[name], default="")
     return slow, rates.get(slow, np.inf)
+
+
+def _means(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, float]:
+    """What each channel is on average: where the flights were trimmed."""
+    return {name: float(np.mean(np.concatenate([flight.values(name) for flight in flights]))) for name in names}
 
 
 def _unit(flight: Flight, name: str) -> str:

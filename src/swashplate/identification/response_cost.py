@@ -43,6 +43,7 @@ class Target:
         measured: the response there, shape (n,).
         coherence: partial coherence there, shape (n,).
         ceiling: True where nothing coherent was seen, and `measured` is what the response cannot exceed.
+        error: relative random error there, shape (n,); None where it is not known.
     """
 
     output: str
@@ -51,6 +52,7 @@ class Target:
     measured: Complex
     coherence: Array
     ceiling: bool = False
+    error: Array | None = None
 
     @property
     def name(self) -> str:
@@ -59,7 +61,8 @@ class Target:
     def above(self, omega: float) -> Target:
         """The part from a frequency [rad/s] on."""
         k = self.omega >= omega
-        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k])
+        error = None if self.error is None else self.error[k]
+        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k], error=error)
 
     @property
     def weights(self) -> tuple[Array, Array]:
@@ -86,7 +89,7 @@ def target(
         points: frequencies, evenly in log frequency.
         least: coherence from which on the response is used.
     """
-    h, coherence, _ = responses.pair(output, input)
+    h, coherence, error = responses.pair(output, input)
     found = responses.band(output, input, least=least)
     if found is None:
         return None
@@ -99,7 +102,8 @@ def target(
     omega, log = responses.omega[known], np.log(np.abs(h[known])) + 1j * np.unwrap(np.angle(h[known]))
     at = np.geomspace(omega[0], omega[-1], points)
     log_at = np.interp(np.log(at), np.log(omega), log.real) + 1j * np.interp(np.log(at), np.log(omega), log.imag)
-    return Target(output, input, at, np.exp(log_at), np.interp(np.log(at), np.log(omega), coherence[known]))
+    seen, sure = (np.interp(np.log(at), np.log(omega), column[known]) for column in (coherence, error))
+    return Target(output, input, at, np.exp(log_at), seen, error=sure)
 
 
 def ceiling(

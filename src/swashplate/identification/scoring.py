@@ -79,6 +79,7 @@ def minimise(
     iterations: int = 60,
     tolerance: float = 0.05,
     together: bool = False,
+    around: bool = False,
     progress: Progress | None = None,
 ) -> Optimum:
     """The row of the highest posterior probability.
@@ -90,6 +91,8 @@ def minimise(
         tolerance: a gain in log-likelihood that is too small to go on for.
         together: shorten a step that is too long always as a whole: half the iterations where many short shots make a
             narrow valley, many more where a noise is estimated or a whole record is simulated in one piece.
+        around: where entries want to go too far, hold them at their reach and let the others go where that leads: for
+            many parameters of which some hardly show, and would shorten every step.
         progress: told about every iteration.
 
     Raises:
@@ -118,6 +121,9 @@ def minimise(
                 weights = np.where(kinked, max(each, careful), each)
                 step = _step(row, gradient, information[1], weights, low, high)
                 step = _within(reach, step, gradient, information[1], together=together)
+                if around:
+                    within = np.maximum(low - row, -reach), np.minimum(high - row, reach)
+                    step = _held(within, step, gradient, information[1], weights)
                 trial = np.clip(row + step, low, high)
                 trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
                 if np.isfinite(trial_cost) and trial_cost < cost:
@@ -164,6 +170,27 @@ def _within(reach: Array, step: Array, gradient: Array, hessian: Array, *, toget
         return shortened
     cut = np.clip(step, -reach, reach)
     return min(cut, shortened, key=lambda tried: float(gradient @ tried + 0.5 * tried @ hessian @ tried))
+
+
+def _held(within: tuple[Array, Array], step: Array, gradient: Array, hessian: Array, damping: Array) -> Array:
+    """The damped step with what wants to leave its reach held there and the others solved again, if that promises more.
+
+    One pass after the other as for least squares with bounds (Lawson and Hanson 1974, ch. 23), never letting go.
+    """
+    low, high = within
+    damped = hessian + np.diag(damping * (np.diag(hessian) + 1e-6))
+    free, held = np.ones(step.size, dtype=bool), np.zeros(step.size)
+    tried = held.copy()
+    while free.any():
+        tried = held.copy()
+        tried[free] = np.linalg.solve(damped[np.ix_(free, free)], -(gradient + hessian @ held)[free])
+        away = free & ((tried < low) | (tried > high))
+        if not away.any():
+            break
+        held[away] = np.clip(tried, low, high)[away]
+        free &= ~away
+        tried = held
+    return min(step, tried, key=lambda s: float(gradient @ s + 0.5 * s @ hessian @ s))
 
 
 def _posterior(likelihood: Likelihood, row: Array) -> tuple[float, Array, tuple[Array, Array]]:

@@ -68,6 +68,7 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
         name, sign = text.lstrip("-"), -1.0 if text.startswith("-") else 1.0
         if (
             name not in model.parameters
+            or name in model.trim.values()
             or model.parameters[name].tie is not None
             or column not in names
             or name in found
@@ -78,7 +79,19 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
         parameter = model.parameters[name]
         value = sign * float(number) * left.get((e.row, e.row), 1.0)
         found[name] = float(np.clip(value, parameter.lower, parameter.upper))
+    flown = linear.trim.states()
+    found |= {name: flown[state] for state, name in model.trim.items() if state in flown}
     return model.with_values(found)
+
+
+def at_flown_trim(model: StateSpaceModel, responses: FrequencyResponse) -> StateSpaceModel:
+    """The model about the flights' mean speeds and angles, where the responses have them among their outputs.
+
+    Only held parameters of the model's [trim] that are zero change: what was given stays.
+    """
+    means = responses.settings.get("means", {})
+    about = {name: means[state] for state, name in model.trim.items() if state in means}
+    return model.with_values({n: v for n, v in about.items() if model.parameters[n].value == 0.0 and np.isfinite(v)})
 
 
 def _time_constants(model: StateSpaceModel, states: Sequence[str], a: Array) -> dict[str, float]:

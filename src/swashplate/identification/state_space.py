@@ -143,6 +143,15 @@ class StateSpaceModel:
             made, parameters={**made.parameters, **{n: replace(made.parameters[n], value=v) for n, v in tied.items()}}
         )
 
+    @property
+    def trim(self) -> dict[str, str]:
+        """The held parameters that say where the model stands: by trimmed state, those of the file's [trim]."""
+        named = {state: str(text) for state, text in self.document.get("trim", {}).items()}
+        return {s: n for s, n in named.items() if n in self.parameters and n not in self.free and not self._tied(n)}
+
+    def _tied(self, name: str) -> bool:
+        return self.parameters[name].tie is not None
+
     def check_bounds(self, names: Iterable[str]) -> None:
         """That parameters lie within their own bounds.
 

@@ -23,6 +23,8 @@ rates = {w = "1"}                            # coefficients of the states' deriv
 collective = "tau"                           # by input, or by "output/input"
 [limits]                                     # of inputs, from the trim; only a controller needs them
 collective = [-1.0, 1.0]
+[trim]                                       # where the model stands if not in hover: accelerometers need it
+# u = "U0", w = "W0", phi = "phi0"           m/s and rad, small angles; also v and theta
 [shape]
 rotor_radius = 1.535                         # m: how large pages draw it, 1 if not given
 
@@ -46,8 +48,9 @@ import numpy as np
 import tomli_w
 
 from swashplate.errors import CardError, ExpressionError
-from swashplate.flights.base_units import is_unit
 from swashplate.flights.schema import channel
+from swashplate.identification import state_space_checks as checks
+from swashplate.identification.accelerometer import AXES, TRIM, specific_force
 from swashplate.identification.expressions import Expression
 from swashplate.identification.state_space import Element, ModelParameter, StateSpaceModel
 
@@ -67,6 +70,7 @@ _SECTIONS = {
     "parameters",
     "limits",
     "shape",
+    "trim",
     "fit",
 }
 _PARAMETER = {
@@ -152,6 +156,7 @@ class _Reader:
         self.parameters = {name: self._parameter(name, e) for name, e in self._table("parameters").items()}
         self.elements: list[Element] = []
         self.used: set[str] = {n for p in self.parameters.values() if p.tie for n in p.tie.names}
+        self.trim = self._trim()
 
     def _table(self, name: str) -> Mapping[str, Any]:
         table = self.document.get(name, {})
@@ -180,7 +185,7 @@ class _Reader:
             raise CardError(f"lower is {low:g}, above upper, {high:g}.", where=self.path, channel=name)
         if "tie" not in entry and not low <= value <= high:
             raise CardError(f"value {value:g} lies outside [{low:g}, {high:g}].", where=self.path, channel=name)
-        self._check_units({f"parameters.{name}.unit": entry.get("unit", "")})
+        checks.units({f"parameters.{name}.unit": entry.get("unit", "")}, path=self.path)
         return ModelParameter(
             name=name,
             value=value,
@@ -251,64 +256,25 @@ class _Reader:
         return self.states.index(name)
 
     def _specific_force(self, row: int, name: str, output: Mapping[str, Any]) -> None:
-        """An accelerometer at a place: a = dV/dt + omega x V + gravity's share + domega/dt x r, linear about trim.
-
-        Hover form: the trim speeds are zero, so omega x V is of second order; gravity's share is +g theta and -g phi.
-        """
         entry, axis = f"outputs.{name}", output["specific_force"]
-        if axis not in ("x", "y", "z"):
+        if axis not in AXES:
             raise CardError(f"specific_force is {axis!r}, expected 'x', 'y' or 'z'.", where=self.path, channel=entry)
         at = output.get("at", [0, 0, 0])
         if not isinstance(at, list) or len(at) != 3:
             raise CardError(f"at is {at!r}, expected three expressions.", where=self.path, channel=entry)
-        velocity, gravity, arms = {
-            "x": ("u", ("theta", "g"), (("q", 2, ""), ("r", 1, "-"))),
-            "y": ("v", ("phi", "-g"), (("r", 0, ""), ("p", 2, "-"))),
-            "z": ("w", None, (("p", 1, ""), ("q", 0, "-"))),
-        }[axis]
-        self._add("H1", row, self._state(velocity, entry), "1", entry)
-        if gravity is not None and gravity[0] in self.states:
-            self._add("H0", row, self._state(gravity[0], entry), gravity[1], entry)
-        for rate, place, sign in arms:
-            if at[place] not in (0, "0", 0.0):
-                self._add("H1", row, self._state(rate, entry), f"{sign}({at[place]})", entry)
+        for matrix, state, text in specific_force(axis, at=at, trim=self.trim, states=self.states):
+            self._add(matrix, row, self._state(state, entry), text, entry)
 
-    def _check_units(self, units: Mapping[str, Any]) -> None:
-        """That what stands for a unit is one, and that channels of flights are in the flights' own."""
-        for entry, unit in units.items():
-            if not isinstance(unit, str) or (unit and not is_unit(unit)):
+    def _trim(self) -> dict[str, str]:
+        """Expressions of the trim's speeds and angles."""
+        for name, text in self._table("trim").items():
+            entry = f"trim.{name}"
+            if name not in TRIM:
                 raise CardError(
-                    f"unit {unit!r} is not known, expected a unit or a product of units.",
-                    where=self.path,
-                    channel=entry,
-                    hint='For example "rad/s", "m/s^2", "rad/(m s)" or "1"; "" where there is none.',
+                    "is no part of a trim.", where=self.path, channel=entry, hint=f"It has {', '.join(TRIM)}."
                 )
-            part, _, name = entry.removesuffix(".unit").partition(".")
-            wanted = channel(name).unit
-            if part in ("inputs", "outputs") and unit and wanted and unit != wanted:
-                raise CardError(
-                    f"unit is {unit!r}, expected {wanted!r}: flights hold '{name}' in {wanted}.",
-                    where=self.path,
-                    channel=entry,
-                    hint="Convert the model's numbers, or give the channel another name.",
-                )
-
-    def _check_limits(self) -> None:
-        for name, ends in self._table("limits").items():
-            if name not in self.inputs:
-                raise CardError("is no input of this model.", where=self.path, channel=f"limits.{name}")
-            numbers = isinstance(ends, list) and len(ends) == 2
-            if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) for v in ends):
-                raise CardError(f"is {ends!r}, expected [low, high].", where=self.path, channel=f"limits.{name}")
-
-    def _check_shape(self) -> None:
-        for name, size in self._table("shape").items():
-            if name != "rotor_radius":
-                raise CardError(
-                    "is no part of a shape.", where=self.path, channel=f"shape.{name}", hint="It has rotor_radius."
-                )
-            if isinstance(size, bool) or not isinstance(size, int | float) or not 0.0 < size < 100.0:
-                raise CardError(f"is {size!r}, expected 0 to 100 m.", where=self.path, channel=f"shape.{name}")
+            self.used |= self._expression(text, entry).names
+        return {name: str(text) for name, text in self._table("trim").items()}
 
     def model(self) -> StateSpaceModel:
         for name, table in self._table("left").items():
@@ -323,15 +289,14 @@ class _Reader:
             row = self._state(name, f"equations.{name}")
             self._row(table, row, f"equations.{name}", of_states="F", of_inputs="G")
         units = {**self._table("states"), **self._table("inputs")}
-        self._check_units(
-            {f"{part}.{name}": u for part in ("states", "inputs") for name, u in self._table(part).items()}
-        )
+        given = {f"{part}.{name}": u for part in ("states", "inputs") for name, u in self._table(part).items()}
+        checks.units(given, path=self.path)
         for row, (name, output) in enumerate(self._table("outputs").items()):
             entry = f"outputs.{name}"
             if not isinstance(output, Mapping) or set(output) - _OUTPUT:
                 raise CardError(f"may have only {', '.join(sorted(_OUTPUT))}.", where=self.path, channel=entry)
             units[name] = output.get("unit", units.get(name, "") or channel(name).unit)  # a state's, or the schema's
-            self._check_units({f"{entry}.unit": units[name]})
+            checks.units({f"{entry}.unit": units[name]}, path=self.path)
             self._row(output.get("of", {}), row, entry, of_states="H0", of_inputs="D")
             self._row(output.get("rates", {}), row, f"{entry}.rates", of_states="H1", of_inputs=None)
             if "specific_force" in output:
@@ -345,8 +310,8 @@ class _Reader:
                 )
             delays[name] = self._expression(text, f"delays.{name}")
             self.used |= delays[name].names
-        self._check_limits()
-        self._check_shape()
+        checks.limits(self._table("limits"), self.inputs, path=self.path)
+        checks.shape(self._table("shape"), path=self.path)
         idle = sorted(set(self.parameters) - self.used)
         if idle:
             raise CardError(

@@ -1,4 +1,4 @@
-"""State-space models from frequency responses: many starts, exact gradients, accuracy figures, J per response."""
+"""State-space models fitted to frequency responses: what is fitted, how well it is told, J per response."""
 
 from __future__ import annotations
 
@@ -10,53 +10,26 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Array
 from swashplate.identification.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.identification.linear_start import other_starts
+from swashplate.identification.mode_accuracy import mode_accuracy
+from swashplate.identification.model_units import unit_words
 from swashplate.identification.response_cost import (
     ACCEPTABLE,
     ParameterAccuracy,
-    ResponseCost,
     Target,
     accuracy_of,
     ceiling,
     target,
 )
-from swashplate.identification.rows import Entry, Row
-from swashplate.identification.scoring import Optimum, minimise
-from swashplate.identification.spectra import Complex
 from swashplate.identification.state_space import StateSpaceModel
 from swashplate.identification.state_space_result import StateSpaceFit
+from swashplate.identification.state_space_search import STARTED, best_below, better_start, pairs_of
 from swashplate.identification.state_space_words import words
+from swashplate.identification.structure_misfit import misfit_words
 
 FAST_GROWTH = 1.0
 """1/s: a start model with a mode that grows faster is no helicopter, but a wrong sign."""
-
-SPREAD = 0.3
-"""Relative scatter of the starting points."""
-
-SCREENED, STARTED = 48, 4
-
-_ROUGH = 25
-"""Iterations of each start, before the best is followed to its end."""
-
-RESCUES, RESCUED, _HOPE = 4, 96, 0.99
-"""Times that a bad end is shaken hard, points that are tried then, and what has to be left of the cost at most."""
-
-_HARD, _TURNED = 0.4, 0.08
-"""Relative scatter of these points, and the share of parameters whose sign is turned."""
-
-_ENOUGH = 1e-4
-"""Share of the cost that an iteration has to gain for it to go on."""
-
-_UPPER, _POINTS = 3.0, 5
-"""Times the lowest frequency from which a fit to the upper ones begins, and how many points a response keeps there."""
-
-_VERY_WRONG = 3e4
-"""J that a response counts for at most when starts are compared: 30 dB and half a turn off."""
-
-_UNSEEN = 1e3
-"""A parameter that starts at zero and would need more than this to answer alone is scaled by one."""
 
 
 def fit_state_space(
@@ -175,9 +148,10 @@ def fit_targets(
             f"no fitted response sees a free parameter of '{model.name}'.",
             hint="Fit other responses or free parameters.",
         )
-    every_target = (*targets, *ceilings)
-    start, source = _better(model, others or {}, every_target)
-    optimum, cost = _best(start, every_target, starts=starts, iterations=iterations, seed=seed, progress=progress)
+    start, source = better_start(model, others or {}, (*targets, *ceilings))
+    optimum, cost, kept = best_below(
+        start, targets, ceilings, starts=starts, iterations=iterations, seed=seed, progress=progress
+    )
     numbers = optimum.row * cost.row.scale
     _, slopes = cost.residuals(optimum.row)
     cramer_rao, insensitivity, correlation = accuracy_of(slopes / cost.row.scale)
@@ -211,8 +185,11 @@ def fit_targets(
         )
         for name, p in found.parameters.items()
     )
+    warnings += unit_words(model)
+    warnings += misfit_words(found, targets)
     warnings += words(targets, costs, parameters, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
-    over = [c.name for c, above in zip(ceilings, every[len(targets) :], strict=True) if above > ACCEPTABLE]
+    below = {c.name for c, above in zip(kept, every[len(targets) :], strict=True) if above <= ACCEPTABLE}
+    over = [c.name for c in ceilings if c.name not in below]
     if over:
         warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
     return StateSpaceFit(
@@ -229,61 +206,15 @@ def fit_targets(
         warnings=tuple(warnings),
         problems=tuple(problems),
         left_out=left_out,
+        modes=mode_accuracy(
+            found,
+            dict(zip(model.free, map(float, cramer_rao), strict=True)),
+            correlation,
+            lowest=min(float(t.omega[0]) for t in targets),
+        ),
         seconds=time.perf_counter() - began,
         settings={**dict(settings or {}), "started_from": source or "given values"},
     )
-
-
-def _better(
-    model: StateSpaceModel, others: Mapping[str, StateSpaceModel], targets: Sequence[Target]
-) -> tuple[StateSpaceModel, str]:
-    """The start that costs least, with its source ("" for the given one); zero responses count as very wrong."""
-
-    def price(one: StateSpaceModel) -> float:
-        row = cost_function(one, targets, np.ones(len(model.free)))
-        each = row.each(np.array([one.parameters[n].value for n in model.free]))
-        return float(sum(min(cost, _VERY_WRONG) if np.isfinite(cost) else _VERY_WRONG for cost in each))
-
-    best, source, least = model, "", price(model)
-    for name, other in others.items():
-        one = model.with_values({n: other.parameters[n].value for n in model.free})
-        if price(one) < least:
-            best, source, least = one, name, price(one)
-    return best, source
-
-
-def _pairs(model: StateSpaceModel, targets: Sequence[Target]) -> list[tuple[int, int, Array]]:
-    return [(model.outputs.index(t.output), model.inputs.index(t.input), t.omega) for t in targets]
-
-
-def cost_function(model: StateSpaceModel, targets: Sequence[Target], scale: Array) -> ResponseCost:
-    """The cost of a model's free parameters, each scaled."""
-    pairs, free = _pairs(model, targets), model.free
-
-    def evaluate(numbers: Array) -> tuple[list[Complex], list[Complex]]:
-        responses, slopes = model.sensitivities(free, numbers, pairs)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return responses, [slope / h[:, None] for slope, h in zip(slopes, responses, strict=True)]
-
-    entries = tuple(
-        Entry(n, "parameter", p.value, float(s), p.lower, p.upper)
-        for n, s in zip(free, scale, strict=True)
-        for p in (model.parameters[n],)
-    )
-    return ResponseCost(Row(entries), targets, evaluate)
-
-
-def _scale(model: StateSpaceModel, targets: Sequence[Target]) -> Array:
-    """A change of the order that matters: the value, or what alone would make a response that starts at zero."""
-    values = np.array([model.parameters[n].value for n in model.free])
-    _, slopes = model.sensitivities(model.free, values + 1e-9 * (values == 0.0), _pairs(model, targets))
-    with np.errstate(divide="ignore"):
-        needed = [
-            np.median(np.abs(t.measured)[:, None] / np.abs(s), axis=0) for t, s in zip(targets, slopes, strict=True)
-        ]
-    alone = np.min(needed, axis=0)
-    # What hardly shows must not run away on a scale of its own making.
-    return np.where(values != 0.0, np.abs(values), np.where(alone < _UNSEEN, alone, 1.0))
 
 
 def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, ...]:
@@ -293,7 +224,7 @@ def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, 
     for shake in (0.0, 0.1):
         values = np.array([model.parameters[n].value for n in model.free])
         values = values * (1.0 + shake * random.standard_normal(values.size)) + (values == 0.0) * shake * 0.1
-        _, slopes = model.sensitivities(model.free, values, _pairs(model, targets))
+        _, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
         seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
     return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12)
 
@@ -307,92 +238,6 @@ def _start_problems(model: StateSpaceModel) -> list[str]:
         f"the start model '{model.name}' is unstable: a mode at {worst.real:+.2f}{worst.imag:+.2f}j 1/s doubles every "
         f"{np.log(2) / worst.real:.2f} s, which no helicopter does. Check the signs of the start values."
     ]
-
-
-def _best(
-    model: StateSpaceModel,
-    targets: Sequence[Target],
-    *,
-    starts: int,
-    iterations: int,
-    seed: int,
-    progress: Callable[[int, float], None] | None,
-) -> tuple[Optimum, ResponseCost]:
-    """The best end of several starts: the given one, and the cheapest of many shaken ones followed for a while."""
-    cost = cost_function(model, targets, _scale(model, targets))
-    first = cost.row.starts()
-    low, high = cost.row.bounds()
-    candidates = [first]
-    if starts > 1:
-        random = np.random.default_rng(seed)
-        shaken = first * np.exp(SPREAD * random.standard_normal((SCREENED, first.size)))
-        shaken = np.where(first == 0.0, SPREAD * random.standard_normal(shaken.shape), shaken)
-        shaken = np.clip(shaken, low, high)
-        price = np.array([cost.cost(row) for row in shaken])
-        candidates += [shaken[k] for k in np.argsort(price)[: starts - 1] if np.isfinite(price[k])]
-    elif not np.isfinite(cost.cost(np.clip(first, low, high))):
-        # A response that starts at zero has no decibels: give what makes it a small value of its own.
-        candidates = [np.where(first == 0.0, 0.1 * SPREAD, first)]
-    ends = []
-    for row in candidates:
-        if np.isfinite(cost.cost(np.clip(row, low, high))):
-            rough = iterations if starts == 1 else min(_ROUGH, iterations)
-            ends.append(minimise(cost, start=row, tolerance=1e-2, iterations=rough, progress=progress))
-    if not ends:
-        raise IdentificationError(
-            f"the start of '{model.name}' gives no finite response.", hint="Check the start values of the model file."
-        )
-    best = min(ends, key=lambda end: end.cost)
-    if starts > 1 and iterations > _ROUGH and _bad(cost, best):
-        best = _from_above(model, cost, best, starts=starts, seed=seed)
-    for turn in range(RESCUES if starts > 1 and iterations > _ROUGH else 0):
-        if not _bad(cost, best):
-            break
-        before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
-        if best.cost > _HOPE * before.cost:
-            break
-    final = minimise(
-        cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
-    )
-    return replace(final, history=(*best.history, *final.history[1:])), cost
-
-
-def _bad(cost: ResponseCost, best: Optimum) -> bool:
-    """Whether the responses that were seen (not those that may not be exceeded) are badly fitted on average."""
-    seen = [j for j, t in zip(cost.each(best.row), cost.targets, strict=True) if not t.ceiling]
-    return float(np.mean(seen)) > ACCEPTABLE
-
-
-def _from_above(model: StateSpaceModel, cost: ResponseCost, best: Optimum, *, starts: int, seed: int) -> Optimum:
-    """A better end than a bad one, from a fit to the upper frequencies: slow responses are the least sure, and can hold
-    a search where the fast modes are wrong."""
-    least = _UPPER * min(float(t.omega[0]) for t in cost.targets)
-    upper = [part for t in cost.targets if (part := t.above(least)).omega.size >= _POINTS]
-    if all(t.ceiling for t in upper):
-        return best
-    end, other = _best(model, upper, starts=starts, iterations=_ROUGH, seed=seed, progress=None)
-    row = end.row * other.row.scale / cost.row.scale
-    if not np.isfinite(cost.cost(row)):
-        return best
-    return min((best, minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
-
-
-def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:
-    """A better end than a bad one, from points around it that are shaken hard and have some signs turned."""
-    random = np.random.default_rng(seed)
-    low, high = cost.row.bounds()
-    shape = (RESCUED, best.row.size)
-    turned = np.where(random.random(shape) < _TURNED, -1.0, 1.0)
-    shaken = np.clip(best.row * turned * np.exp(_HARD * random.standard_normal(shape)), low, high)
-
-    def price(row: Array) -> float:
-        each = np.nan_to_num(cost.each(row), nan=_VERY_WRONG, posinf=_VERY_WRONG)
-        return float(np.sum(np.minimum(each, _VERY_WRONG))) if np.isfinite(cost.cost(row)) else np.inf
-
-    prices = np.array([price(row) for row in shaken])
-    hopeful = [shaken[k] for k in np.argsort(prices)[:STARTED] if np.isfinite(prices[k])]
-    ends = [minimise(cost, start=row, tolerance=1e-2, iterations=_ROUGH) for row in hopeful]
-    return min((best, *ends), key=lambda end: end.cost)
 
 
 def frequencies(targets: Sequence[Target]) -> tuple[float, float]:

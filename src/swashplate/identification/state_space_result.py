@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.flights.flight import Array
+from swashplate.identification.mode_accuracy import ModeAccuracy
 from swashplate.identification.response_cost import ParameterAccuracy, Target, percent
 from swashplate.identification.state_space import StateSpaceModel
 
@@ -44,6 +45,7 @@ class StateSpaceFit:
         converged: False where the iterations ran out.
         warnings, problems: what a reader must know; what is wrong.
         left_out: pairs without a coherent band. ceilings: what their responses cannot exceed.
+        modes: of the identified model, with what the bounds leave of them.
         seconds: wall time.
         settings: what was asked.
     """
@@ -62,6 +64,7 @@ class StateSpaceFit:
     problems: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     ceilings: tuple[Target, ...] = ()
+    modes: tuple[ModeAccuracy, ...] = ()
     seconds: float = 0.0
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -89,6 +92,7 @@ class StateSpaceFit:
             "free": list(self.free),
             "correlation": self.correlation.tolist(),
             "eigenvalues": [[float(v.real), float(v.imag)] for v in self.model.eigenvalues()],
+            "modes": [mode.as_dict() for mode in self.modes],
             "reduction": [vars(step) for step in self.reduction],
             "converged": self.converged,
             "warnings": list(self.warnings),
@@ -107,9 +111,16 @@ class StateSpaceFit:
             cells = percent(p.cramer_rao_percent) + percent(p.insensitivity_percent) if moving else " " * 16
             remark = f"  = {p.tie}" if p.tie else "  fixed" if p.fixed else "  at its bound" if p.at_bound else ""
             lines.append(f"  {p.name:<14}{p.start:>12.5g}{p.value:>12.5g}{cells}  {p.unit}{remark}")
+        lines += [_mode_words(mode) for mode in self.modes]
         for step in self.reduction:
             verdict = "dropped" if step.kept else "put back"
             lines.append(f"  {verdict} {step.dropped} ({step.reason}): J_ave {step.before:.1f} -> {step.after:.1f}")
         if self.nothing_to_drop:
             lines.append("  nothing to take out: every parameter is within its targets")
         return "\n".join([*lines, *(f"! {text}" for text in (*self.problems, *self.warnings))])
+
+
+def _mode_words(mode: ModeAccuracy) -> str:
+    head = f"  mode {mode.frequency:>9.4g} rad/s, damping {mode.damping:>6.3f}"
+    place = "" if mode.inside else "  below the band"
+    return f"{head}   CR {percent(mode.frequency_percent, width=6)} %, {mode.damping_bound:.3f}{place}"

@@ -177,6 +177,12 @@ def verify(
                 name = f"{piece.provenance.source or 'flight'} {time[part][0]:.2f}-{time[part][-1]:.2f} s"
                 traces.append(_flown(model, shared, name, time[part], table[part], dt, shifts))
     judged = _judged(model, shared, traces)
+    lost = [f"{o.output} ({o.theil:.2f})" for o in judged if o.theil > GOOD_TIC]
+    if lost:
+        warnings.append(
+            f"Theil's coefficient above {GOOD_TIC:g}: {', '.join(lost)}. The model does not follow them, or what moved "
+            f"them was no input (gusts)."
+        )
     weight = np.array([_WEIGHT.get(model.units.get(n, ""), 1.0) for n in shared])
     errors = np.concatenate([t.flight - t.model for t in traces]) * weight
     return Verification(

@@ -12,6 +12,7 @@ from swashplate.identification.frequency_response import TWO_PI, FrequencyRespon
 from swashplate.identification.handling import Handling
 from swashplate.identification.linear_time_fit import LinearTimeFit
 from swashplate.identification.mismatch import mismatch
+from swashplate.identification.mode_accuracy import ModeAccuracy
 from swashplate.identification.readings import handling_lines
 from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
 from swashplate.identification.spectra import Complex
@@ -123,13 +124,32 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
             )
         )
     modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
-    blocks.append(eigenvalues(modes))
+    blocks += [_mode_table(fit.modes), eigenvalues(modes)] if fit.modes else [eigenvalues(modes)]
     if len(fit.free) > 1:
         blocks.append(correlation_matrix(fit.free, fit.correlation))
     if len(fit.history) > 1:
         words = "Half the sum of J over all responses, after each iteration."
         blocks.append(replace(cost_history(fit.history), caption=words))
     return Section("parameters", "Parameters", tuple(blocks))
+
+
+def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
+    return Table(
+        "Modes of the identified model",
+        ("eigenvalue [1/s]", "frequency [rad/s]", "CR %", "damping", "CR", ""),
+        tuple(
+            (
+                Cell(f"{m.eigenvalue.real:.4g}" + (f" ± {m.eigenvalue.imag:.4g} j" if m.eigenvalue.imag else "")),
+                Cell(f"{m.frequency:.4g}", number=True),
+                _percent(m.frequency_percent, CR_TARGET),
+                Cell(f"{m.damping:.3f}", number=True),
+                Cell(f"{m.damping_bound:.3f}", number=True),
+                Cell("" if m.inside else "below the band", tone="plain" if m.inside else "caution"),
+            )
+            for m in modes
+        ),
+        note="The parameters' Cramér-Rao bounds and correlations, carried to the modes.",
+    )
 
 
 def time_fit_section(fit: LinearTimeFit) -> Section:

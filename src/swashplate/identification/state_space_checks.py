@@ -1,0 +1,65 @@
+"""Checks of a state-space model file that need no model: units, limits of inputs, the shape that is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from swashplate.errors import CardError
+from swashplate.flights.base_units import is_unit
+from swashplate.flights.schema import channel
+
+
+def units(given: Mapping[str, Any], *, path: str) -> None:
+    """That what stands for a unit is one, and that channels of flights are in the flights' own.
+
+    Args:
+        given: units by entry of the file, e.g. "outputs.p.unit". path: of the file.
+
+    Raises:
+        CardError: naming the entry.
+    """
+    for entry, unit in given.items():
+        if not isinstance(unit, str) or (unit and not is_unit(unit)):
+            raise CardError(
+                f"unit {unit!r} is not known, expected a unit or a product of units.",
+                where=path,
+                channel=entry,
+                hint='For example "rad/s", "m/s^2", "rad/(m s)" or "1"; "" where there is none.',
+            )
+        part, _, name = entry.removesuffix(".unit").partition(".")
+        wanted = channel(name).unit
+        if part in ("inputs", "outputs") and unit and wanted and unit != wanted:
+            raise CardError(
+                f"unit is {unit!r}, expected {wanted!r}: flights hold '{name}' in {wanted}.",
+                where=path,
+                channel=entry,
+                hint="Convert the model's numbers, or give the channel another name.",
+            )
+
+
+def limits(table: Mapping[str, Any], inputs: Sequence[str], *, path: str) -> None:
+    """That limits belong to inputs and have two ends.
+
+    Raises:
+        CardError: naming the entry.
+    """
+    for name, ends in table.items():
+        if name not in inputs:
+            raise CardError("is no input of this model.", where=path, channel=f"limits.{name}")
+        numbers = isinstance(ends, list) and len(ends) == 2
+        if not numbers or any(isinstance(v, bool) or not isinstance(v, int | float) for v in ends):
+            raise CardError(f"is {ends!r}, expected [low, high].", where=path, channel=f"limits.{name}")
+
+
+def shape(table: Mapping[str, Any], *, path: str) -> None:
+    """That a shape is a rotor's radius that can be drawn.
+
+    Raises:
+        CardError: naming the entry.
+    """
+    for name, size in table.items():
+        if name != "rotor_radius":
+            raise CardError("is no part of a shape.", where=path, channel=f"shape.{name}", hint="It has rotor_radius.")
+        if isinstance(size, bool) or not isinstance(size, int | float) or not 0.0 < size < 100.0:
+            raise CardError(f"is {size!r}, expected 0 to 100 m.", where=path, channel=f"shape.{name}")
