@@ -50,12 +50,13 @@ def derivatives(
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks)
+        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks, imperial=imperial)
     factors = {name: factor_to_feet(*split_name(name)) if imperial else 1.0 for name in tables[0].names()}
     if json:
         document = [
             {
                 "speed": at.speed,
+                **({} if wide is None else {"modes": _mode_bounds(wide), "draws": wide.draws, "refused": wide.refused}),
                 "derivatives": {
                     name: {
                         "value": table[name] * factors[name],
@@ -69,7 +70,7 @@ def derivatives(
             }
             for at, table in zip(found, tables, strict=True)
         ]
-        typer.echo(as_json({"vehicle": asked.name, "tables": document}))
+        typer.echo(as_json({"vehicle": asked.name, "tables": document, "remarks": remarks}))
         return
     for at, table in zip(found, tables, strict=True):
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
@@ -113,19 +114,33 @@ def _shown(table: DerivativeTable, factors: dict[str, float], *, imperial: bool,
     return tabulate(head, rows, left=2)
 
 
-def _modes(wide: Any) -> None:
+def _mode_bounds(wide: Any) -> list[dict[str, Any]]:
+    """Every mode of the card with the 5 % and 95 % quantiles of the samples' [1/s], fastest first."""
     import numpy as np
 
+    found = []
+    for i in np.argsort(-np.abs(wide.eigenvalues), kind="stable"):
+        value, drawn = wide.eigenvalues[i], wide.samples[:, i]
+        if value.imag < 0.0 or abs(value) < 1e-6:
+            continue
+        real, imag = np.quantile(drawn.real, [0.05, 0.95]), np.quantile(np.abs(drawn.imag), [0.05, 0.95])
+        found.append(
+            {
+                "real": {"value": value.real, "5 %": real[0], "95 %": real[1]},
+                "imag": {"value": value.imag, "5 %": imag[0], "95 %": imag[1]},
+            }
+        )
+    return found
+
+
+def _modes(wide: Any) -> None:
     from swashplate.cli.console import console
     from swashplate.cli.tables import table as tabulate
 
     rows = []
-    for i in np.argsort(-np.abs(wide.eigenvalues), kind="stable"):
-        value = wide.eigenvalues[i]
-        if value.imag < 0.0 or abs(value) < 1e-6:
-            continue
-        real = np.quantile(wide.samples[:, i].real, [0.05, 0.95])
-        imag = np.quantile(np.abs(wide.samples[:, i].imag), [0.05, 0.95])
-        shown = f"{value.real:+.3f}" + (f" +/- {value.imag:.3f}j" if value.imag else "")
-        rows.append((shown, f"{real[0]:+.3f} .. {real[1]:+.3f}", f"{imag[0]:.3f} .. {imag[1]:.3f}"))
-    console().print(tabulate(("mode [1/s]", "real part", "frequency"), rows))
+    for mode in _mode_bounds(wide):
+        real, imag = mode["real"], mode["imag"]
+        shown = f"{real['value']:+.3f}" + (f" +/- {imag['value']:.3f}j" if imag["value"] else "")
+        bounds = (f"{real['5 %']:+.3f} .. {real['95 %']:+.3f}", f"{imag['5 %']:.3f} .. {imag['95 %']:.3f}")
+        rows.append((shown, *bounds))
+    console().print(tabulate(("mode [1/s]", "real part", "imaginary part"), rows))

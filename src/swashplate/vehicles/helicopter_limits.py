@@ -10,7 +10,7 @@ import numpy as np
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import local_to_body
-from swashplate.vehicles.conventional import HelicopterState, loads
+from swashplate.vehicles.conventional import HelicopterState, Loads, loads
 from swashplate.vehicles.derivatives import Array
 from swashplate.vehicles.helicopter_options import HelicopterOptions
 from swashplate.vehicles.structure import rebuild
@@ -33,6 +33,22 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
     return tuple(_doubts(vehicle, x, u, environment).values())
 
 
+def shaft_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> float | None:
+    """Power [W] that main and tail rotor take from the engine at a state; None for other vehicles."""
+    acting = _loads(vehicle, x, u, environment)
+    return None if acting is None else float(acting.power)
+
+
+def _loads(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> Loads | None:
+    """What acts at a state; None for other vehicles."""
+    options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
+    if not isinstance(options, HelicopterOptions):
+        return None
+    state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
+    inputs: Any = vehicle.inputs(*(float(value) for value in u))
+    return loads(state, inputs, vehicle.values(), environment, FloatBackend(), options=options)
+
+
 def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array) -> tuple[str, ...]:
     """What of the equations does not hold somewhere along a flight, each with when that is first seen.
 
@@ -49,13 +65,11 @@ def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array)
 
 def _doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
     """The same by kind."""
-    options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
-    if not isinstance(options, HelicopterOptions):
+    acting = _loads(vehicle, x, u, environment)
+    if acting is None:
         return {}
     xp, par = FloatBackend(), vehicle.values()
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
-    inputs: Any = vehicle.inputs(*(float(value) for value in u))
-    acting = loads(state, inputs, par, environment, xp, options=options)
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
