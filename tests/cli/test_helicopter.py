@@ -66,6 +66,36 @@ def test_linearize_tells_modes_and_matrices() -> None:
     assert model["inputs"] == ["theta0", "B1", "A1", "theta0T"]
 
 
+@pytest.mark.parametrize(
+    ("form", "states"),
+    [
+        ("paper", ["u", "w", "q", "theta", "v", "p", "phi", "r"]),
+        ("lateral", ["v", "p", "phi", "r"]),
+        ("flapping", ["u", "v", "w", "p", "q", "r", "phi", "theta", "a1", "b1"]),
+        ("bar-and-gyro", ["u", "v", "p", "q", "phi", "theta", "a1", "b1", "w", "r", "r_gyro", "c", "d"]),
+    ],
+)
+def test_linear_models_in_the_papers_and_in_hybrid_forms(form: str, states: list[str]) -> None:
+    """Forms with fewer states keep heave, which hardly meets anything else."""
+    switches = ("--option", "bar=true", "--option", "gyro=true")
+    document = json.loads(swash("linearize", "raptor50", *switches, "--form", form, "--json").out)
+    model = document["models"][0]
+    assert model["states"] == states
+    assert np.array(model["A"]).shape == (len(states), len(states))
+    assert np.array(model["B"]).shape == (len(states), len(model["inputs"]))
+    if form != "lateral":
+        assert min(abs(mode["real"] + 0.985) for mode in model["modes"]) < 0.02
+
+
+def test_what_leaving_out_each_derivative_changes() -> None:
+    document = json.loads(swash("derivatives", "raptor50", "--left-out", "--json").out)
+    study = {entry["derivative"]: entry for entry in document["studies"][0]["left_out"]}
+    assert len(study) == 60
+    assert max(study["Xr"]["modes"], study["Xr"]["response"]) < 1e-3  # the paper leaves it out
+    assert study["Mq"]["modes"] > 0.1
+    assert "Xtheta0T" in swash("derivatives", "raptor50", "--left-out").out
+
+
 def test_derivatives_by_contributor_in_both_units(tmp_path: Path) -> None:
     metric = json.loads(swash("derivatives", "raptor50", "--json").out)["tables"][0]["derivatives"]
     feet = json.loads(swash("derivatives", "raptor50", "--json", "--imperial").out)["tables"][0]["derivatives"]
@@ -169,6 +199,13 @@ def test_a_new_card_is_commented_and_flies(tmp_path: Path) -> None:
         (("derivatives", "coax"), "needs a single-rotor card"),
         (("derivatives", "raptor50", "--uncertainty", "--speed", "0-5"), "takes one speed"),
         (("derivatives", "raptor50", "--uncertainty", "--primed"), "has no bounds"),
+        (("derivatives", "raptor50", "--left-out", "--primed"), "goes with --json and the conditions only"),
+        (("derivatives", "coax", "--left-out"), "needs a single-rotor card"),
+        (("linearize", "raptor50", "--form", "short"), "expected one of full, paper"),
+        (("linearize", "coax", "--form", "paper"), "is for single-rotor helicopters"),
+        (("linearize", "raptor50", "--form", "bar-and-gyro"), "r_gyro: is not a state of this model"),
+        (("linearize", "raptor50", "--form", "paper", "--plot", "x.html"), "is of the full model"),
+        (("trim", "raptor50", "--climb=-30"), "Ask for a slower flight."),
         (("trim", "raptor50", "--option", "engine_lag=true"), "needs a rotor speed that the engine can change"),
         (("trim", "raptor50", "--set", "rotor_chord=0"), "lies outside"),
         (("trim", "raptor50", "--set", "inertia_xx=-0.1"), "lies outside"),

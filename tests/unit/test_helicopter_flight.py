@@ -19,7 +19,7 @@ from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_man
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle
+from swashplate.vehicles.catalogue import from_card, vehicle
 from swashplate.vehicles.helicopter_limits import doubts
 
 RAPTOR = vehicle("raptor50")
@@ -75,6 +75,11 @@ def test_where_the_equations_are_not_to_be_trusted() -> None:
     heavy = RAPTOR.with_values({"mass": 16.0, "collective_high": 0.4, "tail_high": 0.8})
     at = trim(heavy)
     assert "blades would stall" in " ".join(doubts(heavy, at.state, at.inputs, at.environment))
+    steep = from_card(RAPTOR.card.with_values({"collective_high": 0.4}))
+    at = trim(steep, climb=17.0)
+    assert "air comes through the disc at 0.16 of the tip speed" in " ".join(
+        doubts(steep, at.state, at.inputs, at.environment)
+    )
 
 
 def test_a_hold_keeps_the_helicopter_through_a_maneuver() -> None:

@@ -11,6 +11,9 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swashplate.simulation.trim import Trim
     from swashplate.vehicles.derivatives import DerivativeTable
 
 
@@ -27,6 +30,10 @@ def derivatives(
     ] = False,
     draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
+    left_out: Annotated[
+        bool,
+        typer.Option("--left-out", help="Instead: what leaving out each one changes, those that matter least first."),
+    ] = False,
     plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
@@ -40,8 +47,14 @@ def derivatives(
         raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
     if uncertainty and primed:
         raise SwashError("has no bounds.", channel="--primed", hint="Leave out --uncertainty or --primed.")
+    if left_out and (uncertainty or primed or imperial or plot):
+        raise SwashError("goes with --json and the conditions only.", channel="--left-out")
     found = asked.trims()
     remarks = asked.doubts(found)
+    if left_out:
+        derivative_table(asked.vehicle, found[0])  # refuses what has none
+        _left_out(asked, found, json=json, remarks=remarks)
+        return
     tables = [derivative_table(asked.vehicle, at) for at in found]
     if primed:
         card = asked.vehicle.card.values()
@@ -80,6 +93,24 @@ def derivatives(
         _modes(wide)
     if plot is not None:
         typer.echo(f"Written: {plot}")
+
+
+def _left_out(asked: given.Conditions, found: Sequence[Trim], *, json: bool, remarks: Sequence[str]) -> None:
+    """The study behind the paper's remark that X_r may be excluded."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table as tabulate
+    from swashplate.simulation.linearize import linearize
+    from swashplate.simulation.reduction import omissions, paper_model
+
+    studies = [(at.speed, omissions(paper_model(linearize(asked.vehicle, at)))) for at in found]
+    if json:
+        document = [{"speed": speed, "left_out": [vars(each) for each in study]} for speed, study in studies]
+        typer.echo(as_json({"vehicle": asked.name, "studies": document, "remarks": remarks}))
+        return
+    for speed, study in studies:
+        typer.echo(f"At {speed:g} m/s: largest relative change of a mode, and of q/B1, p/A1, r/theta0T, w/theta0")
+        rows = [(each.derivative, f"{each.value:.3g}", f"{each.modes:.1e}", f"{each.response:.1e}") for each in study]
+        console().print(tabulate(("left out", "value", "modes", "responses"), rows))
 
 
 def _parts(table: DerivativeTable, name: str) -> dict[str, float]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
+from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.simulation.linearize import LinearModel
@@ -105,16 +106,31 @@ def _document(vehicle: Vehicle, at: Trim) -> dict[str, Any]:
 @given.flown
 def linearize(
     asked: given.Conditions,
+    form: Annotated[
+        str,
+        typer.Option(
+            "--form",
+            help="full; paper (8 states), printed (the paper's terms only), longitudinal, lateral (3 degrees of "
+            "freedom); flapping (10 states), bar-and-gyro (13).",
+        ),
+    ] = "full",
     plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
     from swashplate.cli.console import as_json
     from swashplate.simulation.linearize import linearize as about
+    from swashplate.simulation.reduction import FORMS, in_form
 
+    if form not in FORMS:
+        raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="--form")
+    if form != "full" and asked.vehicle.name != "conventional":
+        raise SwashError("is for single-rotor helicopters.", where=asked.name, channel="--form")
+    if form != "full" and plot is not None:
+        raise SwashError("is of the full model.", where=plot, channel="--plot", hint="Leave out --form or --plot.")
     found = asked.trims()
+    models = [in_form(about(asked.vehicle, at), form) for at in found]
     remarks = asked.doubts(found)
-    models = [about(asked.vehicle, at) for at in found]
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 

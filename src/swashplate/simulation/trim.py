@@ -297,10 +297,14 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
                 f"{where} needs {name} = {told[0]}, but its limit is {told[1]}.",
                 where=vehicle.card.where,
                 channel=name,
-                hint="Ask for a slower flight, less payload or a fuller battery."
-                if battery
-                else "Ask for a slower flight or less weight.",
+                hint=_hint(battery=battery, too_low=value < low),
             )
+
+
+def _hint(*, battery: bool, too_low: bool) -> str:
+    if battery:
+        return "Ask for a slower flight, less payload or a fuller battery."
+    return "Ask for a slower flight." if too_low else "Ask for a slower flight or less weight."
 
 
 def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, environment: Environment) -> Array:

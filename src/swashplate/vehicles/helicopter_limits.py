@@ -22,13 +22,15 @@ _TURNING = 0.5
 _ADVANCE = 0.35
 _LOADING = 0.13
 _FLAPPING = 0.21
-"""Advance ratio, C_T / sigma and flapping [rad] beyond which reversed flow, stall and large angles count."""
+_THROUGH = 0.15
+"""Advance ratio, C_T / sigma, flapping [rad] and share of the tip speed at which air comes through the disc, beyond
+which reversed flow, stall and large angles count (0.15: the air meets the blades at 0.2 rad at three quarters)."""
 
 
 def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tuple[str, ...]:
     """What of the equations does not hold at a state; empty where they may be trusted, or for other vehicles.
 
-    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large flapping angles.
+    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large angles of inflow and flapping.
     """
     return tuple(_doubts(vehicle, x, u, environment).values())
 
@@ -94,6 +96,12 @@ def _doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> d
         )
     if loading > _LOADING:
         found["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
+    through = (float(acting.induced) - float(air.z)) / tip
+    if abs(through) > _THROUGH:
+        found["inflow"] = (
+            f"air comes through the disc at {abs(through):.2f} of the tip speed, above {_THROUGH}: its angles at the "
+            "blades are taken as small"
+        )
     flap = max(abs(float(state.disc.a1)), abs(float(state.disc.b1)))
     if flap > _FLAPPING:
         found["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"
