@@ -49,7 +49,8 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$$XLA_FLAGS --xla_cpu_parallel_codegen_split_count=1" \
+	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
 
 speed: $(STAMP)
 	$(BIN)/python -m benchmarks.run --short
