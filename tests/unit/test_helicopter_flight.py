@@ -160,7 +160,8 @@ def test_what_is_parked_stays_where_it_is_until_friction_gives_way() -> None:
 def test_grip_lets_go_in_the_air_and_trims_have_none() -> None:
     """Flight is as without it, and its states vanish."""
     stands = vehicle("raptor50", ground=True, grip=True)
-    at = trim(stands, speed=5.0, height=5.0)
+    at = trim(stands, speed=5.0)
+    assert at.states()["z"] == -10.0
     assert all(abs(at.states()[name]) < 1e-12 for name in stands.state_names if name.startswith("grip"))
     np.testing.assert_allclose(at.inputs, trim(RAPTOR, speed=5.0).inputs, atol=1e-12)
     with pytest.raises(CardError, match="grip: needs ground to hold"):
