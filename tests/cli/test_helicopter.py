@@ -20,14 +20,21 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_trim_at_one_speed_and_over_a_range(tmp_path: Path) -> None:
-    assert "theta0" in swash("trim", "raptor50", "--speed", "5").out
+    words = [line.split() for line in swash("trim", "raptor50", "--speed", "5").out.splitlines()]
+    (collective,) = (row for row in words if row[0] == "theta0")
+    assert float(collective[3]) == pytest.approx(np.degrees(float(collective[1])), abs=1e-3)
+    assert collective[2] == "rad"
     page = tmp_path / "curves.html"
     document = json.loads(swash("trim", "raptor50", "--speed", "0-12/4", "--json", "--plot", page).out)
     assert [entry["speed"] for entry in document["trims"]] == [0.0, 4.0, 8.0, 12.0]
     assert max(entry["residual"] for entry in document["trims"]) < 1e-10
+    assert (document["units"]["theta0"], document["units"]["u"]) == ("rad", "m/s")
+    power = [entry["power"] for entry in document["trims"]]
+    assert power[0] > power[1] > power[2] < power[3]  # least between hover and fast flight
     text = page.read_text(encoding="utf-8")
     assert "root-locus" in text
     assert "trim-curves" in text
+    assert "shaft power [kW]" in text
     table = swash("trim", "raptor50", "--speed", "0-8/8").out.splitlines()
     assert len(table) == 3
     assert "B1 [deg]" in table[0]
@@ -54,11 +61,41 @@ def test_weight_altitude_wind_numbers_and_options_change_the_trim() -> None:
 
 
 def test_linearize_tells_modes_and_matrices() -> None:
-    assert "+0.761" in swash("linearize", "raptor50").out or "eigenvalue" in swash("linearize", "raptor50").out
+    assert "+0.772 +/- 0.979j" in swash("linearize", "raptor50").out
     document = json.loads(swash("linearize", "raptor50", "--json").out)
     model = document["models"][0]
     assert np.array(model["A"]).shape == (14, 14)
     assert model["inputs"] == ["theta0", "B1", "A1", "theta0T"]
+
+
+@pytest.mark.parametrize(
+    ("form", "states"),
+    [
+        ("paper", ["u", "w", "q", "theta", "v", "p", "phi", "r"]),
+        ("lateral", ["v", "p", "phi", "r"]),
+        ("flapping", ["u", "v", "w", "p", "q", "r", "phi", "theta", "a1", "b1"]),
+        ("bar-and-gyro", ["u", "v", "p", "q", "phi", "theta", "a1", "b1", "w", "r", "r_gyro", "c", "d"]),
+    ],
+)
+def test_linear_models_in_the_papers_and_in_hybrid_forms(form: str, states: list[str]) -> None:
+    """Forms with fewer states keep heave, which hardly meets anything else."""
+    switches = ("--option", "bar=true", "--option", "gyro=true")
+    document = json.loads(swash("linearize", "raptor50", *switches, "--form", form, "--json").out)
+    model = document["models"][0]
+    assert model["states"] == states
+    assert np.array(model["A"]).shape == (len(states), len(states))
+    assert np.array(model["B"]).shape == (len(states), len(model["inputs"]))
+    if form != "lateral":
+        assert min(abs(mode["real"] + 0.985) for mode in model["modes"]) < 0.02
+
+
+def test_what_leaving_out_each_derivative_changes() -> None:
+    document = json.loads(swash("derivatives", "raptor50", "--left-out", "--json").out)
+    study = {entry["derivative"]: entry for entry in document["studies"][0]["left_out"]}
+    assert len(study) == 60
+    assert max(study["Xr"]["modes"], study["Xr"]["response"]) < 1e-3  # the paper leaves it out
+    assert study["Mq"]["modes"] > 0.1
+    assert "Xtheta0T" in swash("derivatives", "raptor50", "--left-out").out
 
 
 def test_derivatives_by_contributor_in_both_units(tmp_path: Path) -> None:
@@ -69,7 +106,9 @@ def test_derivatives_by_contributor_in_both_units(tmp_path: Path) -> None:
     assert sum(metric["Yv"]["by"].values()) == pytest.approx(metric["Yv"]["value"])
     page = tmp_path / "derivatives.html"
     swash("derivatives", "raptor50", "--speed", "0-8/4", "--plot", page)
-    assert "Derivatives by contributor" in page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert "Derivatives by contributor" in text
+    assert all(f"<b>{name} [".replace("<", "\\u003c").replace(">", "\\u003e") in text for name in metric)
 
 
 def test_primed_rows_mix_roll_and_yaw_by_the_product_of_inertia() -> None:
@@ -88,7 +127,13 @@ def test_uncertainty_bounds_hold_the_cards_value_and_repeat() -> None:
     arguments = ("derivatives", "raptor50", "--uncertainty", "--draws", "20", "--json")
     first, second = swash(*arguments), swash(*arguments)
     assert first.out == second.out
-    found = json.loads(first.out)["tables"][0]["derivatives"]
+    document = json.loads(first.out)["tables"][0]
+    found = document["derivatives"]
+    assert (document["draws"], document["refused"]) == (20, 0)
+    assert [mode["real"]["value"] for mode in document["modes"]] == pytest.approx(
+        [m["real"] for m in json.loads(swash("linearize", "raptor50", "--json").out)["models"][0]["modes"] if m["real"]]
+    )
+    assert all(mode["real"]["5 %"] < mode["real"]["value"] < mode["real"]["95 %"] for mode in document["modes"][:3])
     for name in ("Lp", "Mq", "Zw", "Xu"):
         assert found[name]["5 %"] < found[name]["value"] < found[name]["95 %"]
     assert "5 % and 95 % bounds of 20 samples" in swash(*arguments[:-1]).out
@@ -102,6 +147,22 @@ def test_a_sweep_in_hover_is_flown_and_saved(tmp_path: Path) -> None:
     flight = Flight.load(out)
     assert np.ptp(flight.values("B1")) > 0.05
     assert np.ptp(flight.values("q")) > np.ptp(flight.values("p"))
+
+
+def test_a_simulation_in_numbers_and_as_a_page(tmp_path: Path) -> None:
+    """Of the truth, whatever the sensors make of it."""
+    asked = ("simulate", "--vehicle", "raptor50", "--maneuver", "doublet:pitch,0.5s,0.03", "--speed", "5")
+    page = tmp_path / "flight.html"
+    outcome = swash(*asked, "--sensors", "clean", "--out", tmp_path / "a.nc", "--json", "--plot", page)
+    assert outcome.code == 0, outcome.err
+    document = json.loads(outcome.out)
+    assert document["written"] == [str(tmp_path / "a.nc"), str(page)]
+    assert document["remarks"] == []
+    assert document["channels"]["q"]["unit"] == "rad/s"
+    assert document["channels"]["x"]["end"] == pytest.approx(5.0 * document["duration"], rel=0.1)
+    assert document["channels"]["u"]["start"] == pytest.approx(5.0, rel=0.01)
+    text = page.read_text(encoding="utf-8")
+    assert all(word in text for word in ("flight-commands", "flight-inner", "theta0T [deg]", "q [deg/s]", "w [m/s]"))
 
 
 def test_a_simulation_says_when_it_leaves_what_its_equations_hold_for(tmp_path: Path) -> None:
@@ -140,6 +201,13 @@ def test_a_new_card_is_commented_and_flies(tmp_path: Path) -> None:
         (("derivatives", "coax"), "needs a single-rotor card"),
         (("derivatives", "raptor50", "--uncertainty", "--speed", "0-5"), "takes one speed"),
         (("derivatives", "raptor50", "--uncertainty", "--primed"), "has no bounds"),
+        (("derivatives", "raptor50", "--left-out", "--primed"), "goes with --json and the conditions only"),
+        (("derivatives", "coax", "--left-out"), "needs a single-rotor card"),
+        (("linearize", "raptor50", "--form", "short"), "expected one of full, paper"),
+        (("linearize", "coax", "--form", "paper"), "is for single-rotor helicopters"),
+        (("linearize", "raptor50", "--form", "bar-and-gyro"), "r_gyro: is not a state of this model"),
+        (("linearize", "raptor50", "--form", "paper", "--plot", "x.html"), "is of the full model"),
+        (("trim", "raptor50", "--climb=-30"), "Ask for a slower flight."),
         (("trim", "raptor50", "--option", "engine_lag=true"), "needs a rotor speed that the engine can change"),
         (("trim", "raptor50", "--set", "rotor_chord=0"), "lies outside"),
         (("trim", "raptor50", "--set", "inertia_xx=-0.1"), "lies outside"),
@@ -307,6 +375,8 @@ def test_a_new_card_that_cannot_be_is_not_written(arguments: tuple[str, ...], sa
         (("--maneuver", "doublet:roll,0.5s,0.02", "--option", "flybar=true"), "is not an option"),
         (("--maneuver", "doublet:roll,0.5s,0.02", "--gusts", "3"), "is for --monte-carlo"),
         (("--maneuver", "doublet:roll,0.5s,0.02", "--pilot"), "is for a --controller"),
+        (("--maneuver", "doublet:roll,0.5s,0.02", "--plot", "flight.pdf"), "ends in '.pdf', expected .html"),
+        (("--maneuver", "doublet:roll,0.5s,0.02", "--monte-carlo", "9", "--json"), "--json: is for one flight"),
     ],
 )
 def test_a_simulation_that_cannot_be_leaves_no_file(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_man
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle
+from swashplate.vehicles.catalogue import from_card, vehicle
 from swashplate.vehicles.helicopter_limits import doubts
 
 RAPTOR = vehicle("raptor50")
@@ -75,6 +75,11 @@ def test_where_the_equations_are_not_to_be_trusted() -> None:
     heavy = RAPTOR.with_values({"mass": 16.0, "collective_high": 0.4, "tail_high": 0.8})
     at = trim(heavy)
     assert "blades would stall" in " ".join(doubts(heavy, at.state, at.inputs, at.environment))
+    steep = from_card(RAPTOR.card.with_values({"collective_high": 0.4}))
+    at = trim(steep, climb=17.0)
+    assert "air comes through the disc at 0.16 of the tip speed" in " ".join(
+        doubts(steep, at.state, at.inputs, at.environment)
+    )
 
 
 def test_a_hold_keeps_the_helicopter_through_a_maneuver() -> None:
@@ -128,6 +133,39 @@ def test_spin_up_on_the_skids_take_off_and_landing() -> None:
     assert _low(flown) < -depth + 0.05
     assert flown.values("z")[-1] == pytest.approx(-depth, abs=0.05)
     assert abs(flown.values("w")[-1]) < 0.05
+
+
+def _parked(east: float) -> Flight:
+    """A Raptor on its skids, rotor at rest, in a wind that begins when it has settled; 100 Hz is the slowest in use."""
+    stands = vehicle("raptor50", rotor_speed="throttle", ground=True, grip=True)
+    time = np.arange(1200) / 100.0
+    inputs = dict.fromkeys(stands.input_names, np.zeros(time.size)) | {"wind_east": np.where(time > 2.0, east, 0.0)}
+    start = {**dict.fromkeys(stands.state_names, 0.0), "z": -stands.card.values()["skid_depth"]}
+    return simulate(stands, inputs, start=start, rate=100.0)
+
+
+def test_what_is_parked_stays_where_it_is_until_friction_gives_way() -> None:
+    """In 10 m/s of wind it stands, held against the drag of fuselage and fin; in 30 m/s, ten times that, it slides."""
+    held = _parked(10.0)
+    for name in ("x", "y", "psi"):
+        assert abs(held.values(name)[-1] - held.values(name)[600]) < 1e-6
+    card = RAPTOR.card.values()
+    pull = card["skid_stiffness"] * sum(held.values(f"grip_{end}_y")[-1] for end in ("fr", "fl", "ar", "al"))
+    pressure = 0.5 * 1.225 * 10.0**2
+    assert pressure * card["fuselage_area_y"] < pull < pressure * (card["fuselage_area_y"] + card["fin_area"])
+    greatest = (9.0 * pull - card["skid_friction"] * card["mass"] * 9.81) / card["mass"]
+    assert 0.08 * greatest < _parked(30.0).values("v")[210] < 0.1 * greatest  # 0.1 s later; then it turns into the wind
+
+
+def test_grip_lets_go_in_the_air_and_trims_have_none() -> None:
+    """Flight is as without it, and its states vanish."""
+    stands = vehicle("raptor50", ground=True, grip=True)
+    at = trim(stands, speed=5.0)
+    assert at.states()["z"] == -10.0
+    assert all(abs(at.states()[name]) < 1e-12 for name in stands.state_names if name.startswith("grip"))
+    np.testing.assert_allclose(at.inputs, trim(RAPTOR, speed=5.0).inputs, atol=1e-12)
+    with pytest.raises(CardError, match="grip: needs ground to hold"):
+        vehicle("raptor50", grip=True)
 
 
 def test_autorotation() -> None:

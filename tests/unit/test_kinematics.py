@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from swashplate.identification.kinematics import PREDICTED, measured_states
 from swashplate.identification.records import POSE, Record
-from swashplate.identification.start_states import hover, slopes, start_state
+from swashplate.identification.start_states import mean_velocity, slopes, start_state, steady_flight
 from swashplate.identification.stochastic import Nuisance
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import enable_double_precision
@@ -102,7 +102,7 @@ def test_the_first_guess_of_the_equations_agrees(nuisance: Nuisance) -> None:
 @pytest.mark.parametrize("voltage", [11.1, 12.22])
 def test_the_closed_form_of_hover_is_the_trim(voltage: float) -> None:
     found = trim(COAX, voltage=voltage)
-    x, u = hover(COAX, COAX.values(), voltage)
+    x, u = steady_flight(COAX, COAX.values(), voltage)
     np.testing.assert_allclose(np.asarray(u), found.inputs, atol=1e-9)
     speeds = [COAX.index("omega_lower"), COAX.index("omega_upper")]
     np.testing.assert_allclose(np.asarray(x)[speeds], found.state[speeds], rtol=1e-9)
@@ -143,19 +143,21 @@ def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
     np.testing.assert_allclose(rate, np.tile([1.0, -2.0, 0.5, 0.1, 0.2, 3.0], (3, 1)), atol=1e-12)
 
 
-def test_a_helicopters_hover_and_inner_states_are_those_of_its_trim_and_differentiable() -> None:
+def test_a_helicopters_steady_flight_and_inner_states_are_those_of_its_trim_and_differentiable() -> None:
     """The traced Newton steps end where `trim` does, and their derivative is that of trims at other masses."""
     raptor = vehicle("raptor50")
-    level = trim(raptor)
+    level, fast = trim(raptor), trim(raptor, speed=10.0, climb=-0.5)
 
-    def at(mass: float) -> tuple[jax.Array, jax.Array]:
-        return hover(raptor, raptor.values()._replace(mass=mass), jnp.asarray(12.0))
+    def at(mass: float, velocity: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return steady_flight(raptor, raptor.values()._replace(mass=mass), jnp.asarray(12.0), velocity)
 
     mass = raptor.card.values()["mass"]
     once = partial(jax.jit, compiler_options=QUICK_TO_COMPILE)
-    (x, u), (dx, du) = once(lambda m: jax.jvp(at, (m,), (jnp.ones(()),)))(jnp.asarray(mass))
-    np.testing.assert_allclose(x, level.state, atol=1e-12)
-    np.testing.assert_allclose(u, level.inputs, atol=1e-12)
+    flown = once(lambda m, v: jax.jvp(partial(at, velocity=v), (m,), (jnp.ones(()),)))
+    for velocity, expected in (((10.0, 0.0, 0.5), fast), ((0.0, 0.0, 0.0), level)):
+        (x, u), (dx, du) = flown(jnp.asarray(mass), jnp.asarray(velocity))
+        np.testing.assert_allclose(x, expected.state, atol=1e-12)
+        np.testing.assert_allclose(u, expected.inputs, atol=1e-12)
     heavy, light = (trim(raptor.with_values({"mass": mass + step})) for step in (1e-4, -1e-4))
     np.testing.assert_allclose(dx, (heavy.state - light.state) / 2e-4, atol=1e-8)
     np.testing.assert_allclose(du, (heavy.inputs - light.inputs) / 2e-4, atol=1e-8)
@@ -166,3 +168,21 @@ def test_a_helicopters_hover_and_inner_states_are_those_of_its_trim_and_differen
         return jnp.asarray(start_state(raptor, POSE, raptor.values(), Nuisance(), value=value, **rest))
 
     np.testing.assert_allclose(once(guess)(jnp.array(list(seen.values()))), level.state, atol=1e-12)
+
+
+def test_a_filter_is_linearised_about_the_mean_flight_of_a_helicopter_that_is_fast() -> None:
+    """Ahead and right of the heading, whatever that is; hover for what is slow, coaxial or cannot be flown steadily."""
+    time = np.arange(0.0, 3.0, 0.01)
+
+    def flying(velocity: tuple[float, float, float]) -> Record:
+        rows = np.zeros((time.size, 6))
+        rows[:, 5] = 0.9
+        c, s = np.cos(0.9), np.sin(0.9)
+        ahead, right, down = velocity
+        rows[:, :3] = time[:, None] * [c * ahead - s * right, s * ahead + c * right, down]
+        return Record("a", time, np.zeros((time.size, 4)), rows, np.full(time.size, 12.0), POSE, True)
+
+    raptor = vehicle("raptor50")
+    np.testing.assert_allclose(mean_velocity(raptor, flying((10.0, 1.0, -0.5))), (10.0, 1.0, -0.5), atol=1e-9)
+    for flown, velocity in ((raptor, (2.0, 1.0, 0.0)), (raptor, (60.0, 0.0, 0.0)), (COAX, (10.0, 0.0, 0.0))):
+        np.testing.assert_array_equal(mean_velocity(flown, flying(velocity)), np.zeros(3))

@@ -88,9 +88,9 @@ def test_everything_can_stand(name: str, options: dict[str, object]) -> None:
 
 
 def test_ground_is_added_to_any_body_as_a_card_has_it() -> None:
-    """The wrapper and the helicopter's own option are the same equations."""
+    """The wrapper and the helicopter's own option, without its grip, are the same equations."""
     free = vehicle("raptor50", rotor_speed="throttle")
-    own = standing(free)
+    own = vehicle("raptor50", rotor_speed="throttle", ground=True)
     added = standing(replace(free, card=replace(free.card, vehicle="other")))
     around = Environment()
     start = at_rest(own, around)

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from swashplate.identification.records import POSE
-from swashplate.identification.start_states import hover
+from swashplate.identification.start_states import steady_flight
 from swashplate.identification.stochastic import (
     DISTURBED,
     FilterState,
@@ -55,7 +55,7 @@ def _step() -> Any:
 
 @lru_cache(maxsize=1)
 def _linear() -> tuple[np.ndarray, ...]:
-    x, u = hover(COAX, COAX.values(), jnp.asarray(VOLTAGE))
+    x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
     found = jax.jit(_model().linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), Noise(), TILTED)
     return tuple(np.asarray(part) for part in found)
 
@@ -104,7 +104,7 @@ def test_the_tracked_point_lies_at_its_lever_in_body_axes() -> None:
 def test_the_joined_system_is_the_slope_of_one_sample() -> None:
     """A and C against central differences of the nonlinear step; gusts fade, drifts stay, both push alike."""
     A, C, _, _ = _linear()
-    x, u = (np.asarray(part) for part in hover(COAX, COAX.values(), jnp.asarray(VOLTAGE)))
+    x, u = (np.asarray(part) for part in steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE)))
     n, step = x.size, 1e-5
     for i in range(n):
         away = step * np.eye(n)[i]
@@ -127,7 +127,7 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
 def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
     model, noise = stochastic_model(COAX, POSE, DT, windy=True), Noise(wind=0.4, tau_wind=0.5, speed=0.1)
-    x, u = hover(COAX, COAX.values(), jnp.asarray(VOLTAGE))
+    x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
     A, C, Q, _ = jax.jit(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
     n = x.size
     assert A.shape == (n + 8 + 6, n + 8 + 6)
@@ -163,7 +163,7 @@ def test_the_noise_has_its_units() -> None:
 
 def _filtered(y: np.ndarray, u: np.ndarray, nuisance: Nuisance, heading: float) -> tuple[np.ndarray, FilterState]:
     model = _model()
-    x0, u0 = hover(COAX, COAX.values(), jnp.asarray(VOLTAGE))
+    x0, u0 = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
 
     def run(y: Any, u: Any, heading: Any) -> Any:
         gain = model.gain(x0, u0, COAX.values(), jnp.asarray(VOLTAGE), Noise(), nuisance)
@@ -211,7 +211,7 @@ def test_the_filter_does_not_care_where_north_is() -> None:
 def test_without_a_surprise_the_filter_is_the_simulation_and_a_steady_push_becomes_a_drift() -> None:
     n = 150
     u = np.tile(trim(COAX, voltage=VOLTAGE).inputs, (n, 1))
-    x0 = np.asarray(hover(COAX, COAX.values(), jnp.asarray(VOLTAGE))[0])
+    x0 = np.asarray(steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))[0])
     still = np.tile(np.asarray(_model().measure(jnp.asarray(x0), Nuisance())), (n, 1))
     innovations, states = _filtered(still, u, Nuisance(), 0.0)
     assert np.abs(innovations).max() < 1e-9

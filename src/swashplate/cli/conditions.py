@@ -43,7 +43,8 @@ Switch = Annotated[
 ]
 
 
-def _page(path: Path | None) -> Path | None:
+def checked_page(path: Path | None) -> Path | None:
+    """The place for a page, if it is one."""
     if path is not None and path.suffix.lower() not in (".html", ".htm"):
         raise SwashError(f"ends in '{path.suffix}', expected .html.", where=path, channel="--plot")
     return path
@@ -51,7 +52,9 @@ def _page(path: Path | None) -> Path | None:
 
 Page = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.", callback=_page),
+    typer.Option(
+        "--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.", callback=checked_page
+    ),
 ]
 
 

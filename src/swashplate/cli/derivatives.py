@@ -12,6 +12,9 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swashplate.simulation.trim import Trim
     from swashplate.vehicles.derivatives import DerivativeTable
 
 
@@ -34,6 +37,10 @@ def derivatives(
     ] = False,
     draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
+    left_out: Annotated[
+        bool,
+        typer.Option("--left-out", help="Instead: what leaving out each one changes, those that matter least first."),
+    ] = False,
     plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
@@ -53,12 +60,18 @@ def derivatives(
             channel="--published",
             hint="Units are in the file.",
         )
+    if left_out and (uncertainty or primed or imperial or plot or published):
+        raise SwashError("goes with --json and the conditions only.", channel="--left-out")
     found = asked.trims()
     remarks = asked.doubts(found)
     if published is not None:
         from swashplate.cli.published import compare
 
         compare(asked, found[0], published, primed=primed, json=json)
+        return
+    if left_out:
+        derivative_table(asked.vehicle, found[0])  # refuses what has none
+        _left_out(asked, found, json=json, remarks=remarks)
         return
     tables = [derivative_table(asked.vehicle, at) for at in found]
     if primed:
@@ -68,12 +81,13 @@ def derivatives(
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks)
+        speed_page(asked.vehicle, found, path=plot, tables=tables, remarks=remarks, imperial=imperial)
     factors = {name: factor_to_feet(*split_name(name)) if imperial else 1.0 for name in tables[0].names()}
     if json:
         document = [
             {
                 "speed": at.speed,
+                **({} if wide is None else {"modes": _mode_bounds(wide), "draws": wide.draws, "refused": wide.refused}),
                 "derivatives": {
                     name: {
                         "value": table[name] * factors[name],
@@ -87,7 +101,7 @@ def derivatives(
             }
             for at, table in zip(found, tables, strict=True)
         ]
-        typer.echo(as_json({"vehicle": asked.name, "tables": document}))
+        typer.echo(as_json({"vehicle": asked.name, "tables": document, "remarks": remarks}))
         return
     for at, table in zip(found, tables, strict=True):
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
@@ -97,6 +111,24 @@ def derivatives(
         _modes(wide)
     if plot is not None:
         typer.echo(f"Written: {plot}")
+
+
+def _left_out(asked: given.Conditions, found: Sequence[Trim], *, json: bool, remarks: Sequence[str]) -> None:
+    """The study behind the paper's remark that X_r may be excluded."""
+    from swashplate.cli.console import as_json, console
+    from swashplate.cli.tables import table as tabulate
+    from swashplate.simulation.linearize import linearize
+    from swashplate.simulation.reduction import omissions, paper_model
+
+    studies = [(at.speed, omissions(paper_model(linearize(asked.vehicle, at)))) for at in found]
+    if json:
+        document = [{"speed": speed, "left_out": [vars(each) for each in study]} for speed, study in studies]
+        typer.echo(as_json({"vehicle": asked.name, "studies": document, "remarks": remarks}))
+        return
+    for speed, study in studies:
+        typer.echo(f"At {speed:g} m/s: largest relative change of a mode, and of q/B1, p/A1, r/theta0T, w/theta0")
+        rows = [(each.derivative, f"{each.value:.3g}", f"{each.modes:.1e}", f"{each.response:.1e}") for each in study]
+        console().print(tabulate(("left out", "value", "modes", "responses"), rows))
 
 
 def _parts(table: DerivativeTable, name: str) -> dict[str, float]:
@@ -131,19 +163,33 @@ def _shown(table: DerivativeTable, factors: dict[str, float], *, imperial: bool,
     return tabulate(head, rows, left=2)
 
 
-def _modes(wide: Any) -> None:
+def _mode_bounds(wide: Any) -> list[dict[str, Any]]:
+    """Every mode of the card with the 5 % and 95 % quantiles of the samples' [1/s], fastest first."""
     import numpy as np
 
+    found = []
+    for i in np.argsort(-np.abs(wide.eigenvalues), kind="stable"):
+        value, drawn = wide.eigenvalues[i], wide.samples[:, i]
+        if value.imag < 0.0 or abs(value) < 1e-6:
+            continue
+        real, imag = np.quantile(drawn.real, [0.05, 0.95]), np.quantile(np.abs(drawn.imag), [0.05, 0.95])
+        found.append(
+            {
+                "real": {"value": value.real, "5 %": real[0], "95 %": real[1]},
+                "imag": {"value": value.imag, "5 %": imag[0], "95 %": imag[1]},
+            }
+        )
+    return found
+
+
+def _modes(wide: Any) -> None:
     from swashplate.cli.console import console
     from swashplate.cli.tables import table as tabulate
 
     rows = []
-    for i in np.argsort(-np.abs(wide.eigenvalues), kind="stable"):
-        value = wide.eigenvalues[i]
-        if value.imag < 0.0 or abs(value) < 1e-6:
-            continue
-        real = np.quantile(wide.samples[:, i].real, [0.05, 0.95])
-        imag = np.quantile(np.abs(wide.samples[:, i].imag), [0.05, 0.95])
-        shown = f"{value.real:+.3f}" + (f" +/- {value.imag:.3f}j" if value.imag else "")
-        rows.append((shown, f"{real[0]:+.3f} .. {real[1]:+.3f}", f"{imag[0]:.3f} .. {imag[1]:.3f}"))
-    console().print(tabulate(("mode [1/s]", "real part", "frequency"), rows))
+    for mode in _mode_bounds(wide):
+        real, imag = mode["real"], mode["imag"]
+        shown = f"{real['value']:+.3f}" + (f" +/- {imag['value']:.3f}j" if imag["value"] else "")
+        bounds = (f"{real['5 %']:+.3f} .. {real['95 %']:+.3f}", f"{imag['5 %']:.3f} .. {imag['95 %']:.3f}")
+        rows.append((shown, *bounds))
+    console().print(tabulate(("mode [1/s]", "real part", "imaginary part"), rows))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -86,6 +86,16 @@ def simulate(
         float, typer.Option("--delay", help="With --monte-carlo: commands late by up to [s].", min=0.0, max=1.0)
     ] = 0.0,
     rate: options.Rate = 100.0,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE.html",
+            help="Also a page of plots over time.",
+            callback=given.checked_page,
+        ),
+    ] = None,
+    json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Fly a maneuver from hover or steady flight under a controller, and save the flight."""
@@ -116,6 +126,8 @@ def simulate(
     if battery is not None and (voltage is not None or sag):
         raise SwashError("says what --voltage and --sag say.", channel="--battery", hint="Give one of them.")
     if many is not None:
+        if pages := [name for name, wanted in {"--plot": plot, "--json": json}.items() if wanted]:
+            raise SwashError("is for one flight.", channel=", ".join(pages), hint="Leave out --monte-carlo.")
         if controller is None:
             raise SwashError("needs a --controller.", channel="--monte-carlo", hint="`swash decouple` writes one.")
         from swashplate.cli import monte_carlo
@@ -159,20 +171,50 @@ def simulate(
             rate=rate,
             wind=blowing,
         )
-        remarks = _doubts(aircraft, flight)
+        remarks = [f"{words}." for words in _doubts(aircraft, flight)] + _at_limits(aircraft, flight)
+        truth = flight
         if sensors is not SensorSet.NONE:
             from swashplate.simulation.sensors import QUIET, Sensors
 
             chosen = QUIET if sensors is SensorSet.CLEAN else Sensors()
             flight = sp.observe(flight, aircraft, sensors=chosen, seed=seed)
         paths = _save(flight, out)
-    for words in _at_limits(aircraft, flight):
-        typer.echo(f"Careful: {words}", err=True)
+        if plot is not None:
+            from swashplate.reporting.flight_page import flight_page
+
+            paths += (flight_page(aircraft, truth, path=plot, remarks=remarks),)
     for words in remarks:
-        typer.echo(f"Careful: {words}.", err=True)
-    if not quiet:
+        typer.echo(f"Careful: {words}", err=True)
+    if json:
+        from swashplate.cli.console import as_json
+
+        typer.echo(as_json(_document(vehicle, aircraft, maneuver, truth) | {"remarks": remarks, "written": paths}))
+    elif not quiet:
         typer.echo(repr(flight))
         typer.echo(f"\nWritten: {', '.join(map(str, paths))}")
+
+
+def _document(name: str, vehicle: Vehicle, maneuver: str, flight: Flight) -> dict[str, Any]:
+    """A flight in numbers: every state and input at the start, at the end, and how far it went [SI units]."""
+    channels = (*vehicle.state_names, *vehicle.input_names)
+    units = (*vehicle.state_units, *vehicle.input_units)
+    columns = {channel: flight.values(channel) for channel in channels}
+    return {
+        "vehicle": name,
+        "maneuver": maneuver,
+        "duration": flight.duration,
+        "rate": round(flight.rate(channels[0]), 9),
+        "channels": {
+            channel: {
+                "unit": unit,
+                "start": columns[channel][0],
+                "end": columns[channel][-1],
+                "least": columns[channel].min(),
+                "greatest": columns[channel].max(),
+            }
+            for channel, unit in zip(channels, units, strict=True)
+        },
+    }
 
 
 def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
+from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.simulation.linearize import LinearModel
@@ -33,27 +34,54 @@ def trim(
 
         speed_page(asked.vehicle, found, path=plot, remarks=remarks)
     if json:
-        typer.echo(as_json({"vehicle": asked.name, "trims": [_document(at) for at in found], "remarks": remarks}))
+        trims = [_document(asked.vehicle, at) for at in found]
+        document = {"vehicle": asked.name, "trims": trims, "units": _units(asked.vehicle), "remarks": remarks}
+        typer.echo(as_json(document))
         return
     if len(found) == 1:
-        typer.echo(repr(found[0]))
+        typer.echo(repr(found[0]).splitlines()[0])
+        console().print(_one(asked.vehicle, found[0]))
     else:
-        units = dict(zip(asked.vehicle.state_names, asked.vehicle.state_units, strict=True))
-        angles = [name for name in ("phi", "theta", "a1", "b1") if name in units]
-        controls = asked.vehicle.input_names
-        head = ("speed [m/s]", *(f"{name} [{_unit(asked.vehicle, name)}]" for name in (*controls, *angles)))
-        rows = [
-            (f"{at.speed:g}", *(f"{_shown(asked.vehicle, name, at):.3f}" for name in (*controls, *angles)))
-            for at in found
-        ]
+        shown = (*asked.vehicle.input_names, *(n for n in ("phi", "theta", "a1", "b1") if n in found[0].state_names))
+        head = ["speed [m/s]", *(f"{name} [{_unit(asked.vehicle, name)}]" for name in shown)]
+        rows = [[f"{at.speed:g}", *(f"{_shown(asked.vehicle, name, at):.3f}" for name in shown)] for at in found]
+        powers = [_power(asked.vehicle, at) for at in found]
+        if any(power is not None for power in powers):
+            head.append("power [W]")
+            rows = [[*row, f"{power:.1f}"] for row, power in zip(rows, powers, strict=True)]
         console().print(table(head, rows, left=0))
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
 
+def _one(vehicle: Vehicle, at: Trim) -> Any:
+    """Every input and state of a trim with its unit, angles also in degrees."""
+    from swashplate.cli.tables import table
+
+    values, rows = {**at.commands(), **at.states()}, []
+    if (power := _power(vehicle, at)) is not None:
+        rows.append(("shaft power", f"{power:.1f}", "W", ""))
+    for name, unit in _units(vehicle).items():
+        degrees = f"{round(math.degrees(values[name]), 3) + 0.0:.3f}" if unit == "rad" else ""
+        rows.append((name, f"{round(values[name], 5) + 0.0:.5f}", unit, degrees))
+    return table(("", "value", "unit", "in degrees"), rows, left=1)
+
+
+def _units(vehicle: Vehicle) -> dict[str, str]:
+    """The unit of every input and state."""
+    inputs, states = (vehicle.input_names, vehicle.input_units), (vehicle.state_names, vehicle.state_units)
+    return {name: unit for both in (inputs, states) for name, unit in zip(*both, strict=True)}
+
+
+def _power(vehicle: Vehicle, at: Trim) -> float | None:
+    """Shaft power [W] of a helicopter."""
+    from swashplate.vehicles.helicopter_limits import shaft_power
+
+    return shaft_power(vehicle, at.state, at.inputs, at.environment)
+
+
 def _unit(vehicle: Vehicle, name: str) -> str:
-    units = dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
-    return "1" if units.get(name) == "1" else "deg"
+    return "deg" if _units(vehicle)[name] == "rad" else _units(vehicle)[name]
 
 
 def _shown(vehicle: Vehicle, name: str, at: Trim) -> float:
@@ -61,7 +89,8 @@ def _shown(vehicle: Vehicle, name: str, at: Trim) -> float:
     return math.degrees(value) if _unit(vehicle, name) == "deg" else value
 
 
-def _document(at: Trim) -> dict[str, Any]:
+def _document(vehicle: Vehicle, at: Trim) -> dict[str, Any]:
+    power = _power(vehicle, at)
     return {
         "speed": at.speed,
         "climb": at.climb,
@@ -70,28 +99,44 @@ def _document(at: Trim) -> dict[str, Any]:
         "inputs": at.commands(),
         "states": at.states(),
         "residual": at.residual,
+        **({} if power is None else {"power": power}),
     }
 
 
 @given.flown
 def linearize(
     asked: given.Conditions,
+    form: Annotated[
+        str,
+        typer.Option(
+            "--form",
+            help="full; paper (8 states), printed (the paper's terms only), longitudinal, lateral (3 degrees of "
+            "freedom); flapping (10 states), bar-and-gyro (13).",
+        ),
+    ] = "full",
     plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
     """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
     from swashplate.cli.console import as_json
     from swashplate.simulation.linearize import linearize as about
+    from swashplate.simulation.reduction import FORMS, in_form
 
+    if form not in FORMS:
+        raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="--form")
+    if form != "full" and asked.vehicle.name != "conventional":
+        raise SwashError("is for single-rotor helicopters.", where=asked.name, channel="--form")
+    if form != "full" and plot is not None:
+        raise SwashError("is of the full model.", where=plot, channel="--plot", hint="Leave out --form or --plot.")
     found = asked.trims()
+    models = [in_form(about(asked.vehicle, at), form) for at in found]
     remarks = asked.doubts(found)
-    models = [about(asked.vehicle, at) for at in found]
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
         speed_page(asked.vehicle, found, path=plot, remarks=remarks)
     if json:
-        typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(model) for model in models]}))
+        typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(m) for m in models], "remarks": remarks}))
         return
     for at, model in zip(found, models, strict=True):
         typer.echo(f"At {at.speed:g} m/s\n{model!r}\n")

@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 
 from swashplate.identification.parameters import Layout
-from swashplate.identification.start_states import hover, start_state
+from swashplate.identification.start_states import start_state, steady_flight
 from swashplate.identification.stochastic import (
     N_DISTURBANCES,
     FilterState,
@@ -72,19 +72,31 @@ def unpack(plan: Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
     return plan.layout.values(data["card"], numbers[:k]), nuisance, Noise(*noise)
 
 
+def _by_record(data: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """What of the data each record has of its own."""
+    return data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], data["velocity"]
+
+
 @partial(jax.jit, static_argnums=0)
 def innovations(plan: Plan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
     """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
     parameters, nuisances, noise = unpack(plan, data, row)
 
-    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance) -> Any:
+    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, nuisance: Nuisance) -> Any:
         return filter_record(
-            plan.model, y, u, voltage, value=value, rate=rate, parameters=parameters, noise=noise, nuisance=nuisance
+            plan.model,
+            y,
+            u,
+            voltage,
+            value=value,
+            rate=rate,
+            velocity=velocity,
+            parameters=parameters,
+            noise=noise,
+            nuisance=nuisance,
         )
 
-    return jax.vmap(one)(  # type: ignore[no-any-return]
-        data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], nuisances
-    )
+    return jax.vmap(one)(*_by_record(data), nuisances)  # type: ignore[no-any-return]
 
 
 def filter_record(
@@ -95,6 +107,7 @@ def filter_record(
     *,
     value: Any,
     rate: Any,
+    velocity: Any,
     parameters: Any,
     noise: Noise,
     nuisance: Nuisance,
@@ -105,9 +118,10 @@ def filter_record(
         model: the stochastic model.
         y, u, voltage: measurements, logged inputs and battery voltage by sample.
         value, rate: measured channels and their rates at the first sample.
+        velocity: mean velocity ahead, right and down [m/s] that the gain is for (`start_states.mean_velocity`).
         parameters, noise, nuisance: numbers of the equations, of the noise and of this record.
     """
-    reaching, gain, start = _beginning(model, u, voltage, value, rate, parameters, noise, nuisance)
+    reaching, gain, start = _beginning(model, u, voltage, (value, rate, velocity), parameters, noise, nuisance)
 
     def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
         commanded, volts = now
@@ -121,16 +135,16 @@ def _beginning(
     model: StochasticModel,
     u: Any,
     voltage: Any,
-    value: Any,
-    rate: Any,
+    motion: tuple[Any, Any, Any],
     parameters: Any,
     noise: Noise,
     nuisance: Nuisance,
 ) -> tuple[Any, Gain, FilterState]:
     """What reaches the vehicle, the filter's gain and its first guess."""
+    value, rate, velocity = motion
     reaching = commands(model.vehicle, model.dt, u, nuisance)
-    around, at_hover = hover(model.vehicle, parameters, jnp.mean(voltage))
-    gain = model.gain(around, at_hover, parameters, jnp.mean(voltage), noise, nuisance)
+    around, held = steady_flight(model.vehicle, parameters, jnp.mean(voltage), velocity)
+    gain = model.gain(around, held, parameters, jnp.mean(voltage), noise, nuisance)
     settled = max(1, round(0.5 / model.dt))
     x = start_state(
         model.vehicle,
@@ -212,9 +226,11 @@ def _straightened(plan: Plan, data: Any, row: Any, planes: tuple[Any, Any, Any, 
         parameters, nuisances, noise = unpack(plan, data, row)
         moved = plan.numbers(data, row) - here
 
-        def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, nuisance: Nuisance, planes: Any) -> Any:
+        def one(
+            y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, nuisance: Nuisance, planes: Any
+        ) -> Any:
             place, commanded, following, slopes = planes
-            reaching, gain, start = _beginning(model, u, voltage, value, rate, parameters, noise, nuisance)
+            reaching, gain, start = _beginning(model, u, voltage, (value, rate, velocity), parameters, noise, nuisance)
             g, m = place.shape[1], place.shape[1] + commanded.shape[1]
             pushed = jnp.einsum("nij,nj->ni", slopes[:, :, g:m], reaching - commanded) + slopes[:, :, m:] @ moved
 
@@ -225,8 +241,6 @@ def _straightened(plan: Plan, data: Any, row: Any, planes: tuple[Any, Any, Any, 
             along = (following + pushed, place, slopes[:, :, :g])
             return model.run(start, y, advance, along, noise, nuisance, gain)[0], gain.covariance
 
-        return jax.vmap(one)(
-            data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], nuisances, planes
-        )
+        return jax.vmap(one)(*_by_record(data), nuisances, planes)
 
     return jax.vmap(lambda t: jax.jvp(residuals, (row,), (t,))[1])(jnp.eye(row.shape[0]))

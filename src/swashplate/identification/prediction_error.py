@@ -20,7 +20,7 @@ from swashplate.identification.innovations import Plan, innovations, tangents, u
 from swashplate.identification.parameters import Parameterization
 from swashplate.identification.records import Record, logs
 from swashplate.identification.rows import Entry, Row
-from swashplate.identification.start_states import slopes
+from swashplate.identification.start_states import mean_velocity, slopes
 from swashplate.identification.stochastic import FilterState, Noise, Nuisance, StochasticModel, stochastic_model
 
 SETTLING = 1.5
@@ -145,6 +145,7 @@ class PredictionError:
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
             "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
             "rate": jnp.asarray(np.stack([rate[0] for _, rate in first])),
+            "velocity": jnp.asarray(np.stack([mean_velocity(table.vehicle, piece) for piece in pieces])),
             "card": jnp.asarray(table.card_row),
             "log": jnp.asarray(self._log),
             "scale": jnp.asarray(self.row.scale),

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from swashplate.errors import TrimError
 from swashplate.flights.flight import Array
 from swashplate.identification.records import Record
 from swashplate.identification.stochastic import Nuisance
@@ -16,7 +17,7 @@ from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import CONSTANTS, equations_of, jax_backend, rates_function
-from swashplate.simulation.trim import assemble, unrest
+from swashplate.simulation.trim import assemble, trim, unrest
 from swashplate.vehicles.structure import leaves
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -24,15 +25,47 @@ _SPAN = 0.15
 """Seconds of samples on either side from which a first guess of the velocities is taken."""
 
 
-def hover(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
-    """Flat state and inputs of a vehicle's hover in calm air, traceable and differentiable in the parameters."""
+_SLOW = 3.0
+"""m/s: mean velocity below which a flight is about a hover."""
+
+
+def mean_velocity(vehicle: Vehicle, record: Record) -> Array:
+    """Mean velocity [m/s] of a record ahead and right of the heading and down: what a filter is linearised about.
+
+    Zeros for a flight about a hover, for a coaxial helicopter, without measured positions, and where the vehicle has
+    no such steady flight.
+    """
+    at_rest: Array = np.zeros(3)
+    if "motor_upper" in vehicle.input_names or not {"x", "y", "z", "psi"} <= set(record.output_names):
+        return at_rest
+    places = np.arange(0.0, record.time.size, 10.0)
+    value, rate = ({name: rows[:, i] for i, name in enumerate(record.output_names)} for rows in slopes(record, places))
+    c, s = np.cos(value["psi"]), np.sin(value["psi"])
+    ahead, right = c * rate["x"] + s * rate["y"], c * rate["y"] - s * rate["x"]
+    found = np.array([ahead.mean(), right.mean(), rate["z"].mean()])
+    if np.linalg.norm(found) < _SLOW:
+        return at_rest
+    try:
+        trim(vehicle, speed=found[0], lateral=found[1], climb=-found[2])
+    except TrimError:
+        return at_rest
+    return found
+
+
+def steady_flight(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: Any = None) -> tuple[Any, Any]:
+    """Flat state and inputs of steady flight in calm air, the nose north, traceable and differentiable.
+
+    Args:
+        vehicle, parameters, voltage: what flies.
+        velocity: ahead, right and down [m/s], of a conventional helicopter; None hovers.
+    """
     if "motor_upper" in vehicle.input_names:
         return _coaxial_hover(vehicle, parameters, voltage)
-    return _hover_by_newton(vehicle, parameters, voltage)
+    return _trim_by_newton(vehicle, parameters, voltage, jnp.zeros(3) if velocity is None else velocity)
 
 
-def _hover_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
-    """Hover by a fixed count of Newton steps, none of which moves an angle by more than `_STRIDE`.
+def _trim_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: Any) -> tuple[Any, Any]:
+    """Trim by a fixed count of Newton steps, none of which moves an angle by more than `_STRIDE`.
 
     The steps are not differentiated: one more from where they end, with a constant slope, has the exact derivative
     (the implicit function theorem).
@@ -42,7 +75,7 @@ def _hover_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[A
     row = jnp.stack([jnp.asarray(0.0)] * 3 + [jnp.asarray(voltage, dtype=float)])
     constants = [getattr(calm, name) for name in CONSTANTS]
     p = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
-    course = jnp.zeros(6)
+    course = jnp.concatenate([velocity, jnp.zeros(3)])
     held = dict(vehicle.trim_held)
     limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
     middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
@@ -61,7 +94,7 @@ def _hover_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[A
 
 
 _STEPS, _STRIDE = 40, 0.1
-"""Newton steps to hover, and how far each may go [rad]."""
+"""Newton steps to a trim, and how far each may go [rad]."""
 
 
 def _coaxial_hover(vehicle: Vehicle, parameters: Any, voltage: Any) -> tuple[Any, Any]:
@@ -168,7 +201,7 @@ def start_state(
 def _at_rest_inside(vehicle: Vehicle, row: Any, inputs: Any, parameters: Any, voltage: Any) -> Any:
     """The row with disc tilt, bar, inflow, rotor speed and servos where this motion and these inputs hold them.
 
-    Differentiated as `_hover_by_newton` is.
+    Differentiated as `_trim_by_newton` is.
     """
     body, rates = len(RigidBody._fields), rates_function(vehicle)
     still = jax.lax.stop_gradient((row[:body], inputs, parameters, voltage))

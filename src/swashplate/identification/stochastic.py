@@ -3,9 +3,9 @@
 The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
 it fades) and a drift (random walk: trims, battery, servo zeros). Where asked, a horizontal wind (Ornstein-Uhlenbeck
 too) acts through the equations themselves: what moving air does to the rotors depends on the very parameters that are
-sought. All are held over a sample. The measurement update has a constant gain from the Riccati equation around hover
-(Jategaonkar 2015, sec. 5.4); horizontal position errors are turned into the heading first, so that the gain does not
-depend on where the nose points.
+sought. All are held over a sample. The measurement update has a constant gain from the Riccati equation around hover,
+or around the mean flight of a helicopter that is faster (Jategaonkar 2015, sec. 5.4); horizontal position errors are
+turned into the heading first, so that the gain does not depend on where the nose points.
 """
 
 from __future__ import annotations

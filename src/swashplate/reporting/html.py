@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from swashplate.atomic import write_text
+from swashplate.errors import SwashError
 from swashplate.reporting.structure import Figure, Report
 
 
@@ -23,6 +27,22 @@ def render(report: Report) -> str:
         script=Markup(_read("page.js")),
         plotly=Markup(_plotly()),
     )
+
+
+def write_page(path: str | os.PathLike[str], report: Report) -> Path:
+    """Write a report as a page; missing folders above it are made.
+
+    Raises:
+        SwashError: where the place cannot be written to.
+    """
+    target = Path(path)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return write_text(target, render(report))
+    except OSError as error:
+        raise SwashError(
+            f"cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+        ) from None
 
 
 @cache

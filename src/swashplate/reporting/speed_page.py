@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.atomic import write_text
 from swashplate.errors import SwashError
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Figure, Key, Points, Report, Section
 from swashplate.reporting.theme import (
     BLACK,
@@ -24,11 +23,13 @@ from swashplate.reporting.theme import (
     grid,
     line,
     numbers,
+    unit_words,
 )
 from swashplate.reporting.versions import date, versions
-from swashplate.simulation.linearize import linearize
+from swashplate.simulation.linearize import Mode, linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.derivatives import COLUMNS, DerivativeTable, split_name, unit
+from swashplate.vehicles.derivatives import COLUMNS, ROWS, DerivativeTable, factor_to_feet, split_name, unit
+from swashplate.vehicles.helicopter_limits import shaft_power
 from swashplate.vehicles.vehicle import Vehicle
 
 _PART_COLORS = {
@@ -40,9 +41,12 @@ _PART_COLORS = {
 }
 _PITCHES = (
     " theta0: collective, B1 and A1: longitudinal and lateral cyclic, theta0T: tail rotor, each as blade pitch; phi "
-    "and theta: roll and pitch attitude."
+    "and theta: roll and pitch attitude; a1 and b1: the disc's tilt aft and right."
 )
-_SHOWN = ("Xu", "Zw", "Mu", "Mw", "Mq", "Mp", "Yv", "Lv", "Lp", "Lq", "Nv", "Nr")
+_SLOW = 6.0
+"""rad/s: modes within this are drawn once more by themselves."""
+_WIDE = 860
+"""px: below this width the derivatives' small panels scroll."""
 
 
 def speed_page(
@@ -52,6 +56,7 @@ def speed_page(
     path: str | os.PathLike[str],
     tables: Sequence[DerivativeTable] = (),
     remarks: Sequence[str] = (),
+    imperial: bool = False,
 ) -> Path:
     """Write one self-contained HTML page.
 
@@ -60,6 +65,7 @@ def speed_page(
         trims: at two speeds or more.
         path: where to write.
         tables: derivatives at the same speeds (none: no such section).
+        imperial: derivatives in feet.
         remarks: what may not be believed.
 
     Raises:
@@ -67,10 +73,13 @@ def speed_page(
     """
     if len(trims) < 2:
         raise SwashError("a plot over speed needs a range of speeds.", channel="--speed", hint='Give one, e.g. "0-15".')
-    blocks: list[Block] = [_controls(vehicle, trims), _locus(vehicle, trims)]
-    sections = [Section("speed", "Over speed", tuple(blocks))]
+    sections = [
+        Section("speed", "Trim over speed", (_controls(vehicle, trims),)),
+        Section("modes", "Modes over speed", _loci(vehicle, trims)),
+    ]
     if tables:
-        sections.append(Section("derivatives", "Derivatives by contributor", (_derivatives(trims, tables),)))
+        figures: tuple[Block, ...] = tuple(_derivatives(trims, tables, row, imperial=imperial) for row in ROWS)
+        sections.append(Section("derivatives", "Derivatives by contributor", figures))
     if remarks:
         sections.append(Section("doubts", "Where the equations do not hold", (Points(tuple(remarks)),)))
     first, last = trims[0].speed, trims[-1].speed
@@ -84,98 +93,124 @@ def speed_page(
         sections=tuple(sections),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(report))
-    except OSError as error:
-        raise SwashError(
-            f"cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, report)
 
 
 def _controls(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
     speeds = [at.speed for at in trims]
-    angular = vehicle.name != "coax"
-    names = [*vehicle.input_names, "phi", "theta"]
-    layout = grid(
-        [f"{name} [deg]" if angular or name in ("phi", "theta") else name for name in names],
-        columns=3,
-        height=170,
-        x_title="speed [m/s]",
-    )
-    traces = []
-    for i, name in enumerate(names):
+    angular = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
+    angular |= dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
+    flapping = [name for name in ("a1", "b1") if name in vehicle.state_names]
+    panels = {}
+    for name in (*vehicle.input_names, "phi", "theta", *flapping):
         values = np.array([{**at.states(), **at.commands()}[name] for at in trims])
-        shown = np.degrees(values) if angular or name in ("phi", "theta") else values
+        in_degrees = angular[name] == "rad"
+        panels[f"{name} [deg]" if in_degrees else name] = np.degrees(values) if in_degrees else values
+    power = [shaft_power(vehicle, at.state, at.inputs, at.environment) for at in trims]
+    if all(value is not None for value in power):
+        panels["shaft power [kW]"] = np.array(power, dtype=np.float64) / 1000.0
+    layout = grid(list(panels), columns=3, height=170, x_title="speed [m/s]")
+    traces = []
+    for i, (title, values) in enumerate(panels.items()):
         number = "" if i == 0 else str(i + 1)
-        hover = f"{name}<br>%{{x:.1f}} m/s, %{{y:.3f}}"
-        traces.append(line(speeds, shown, name=name, color=BLUE, axis=number, hover=hover))
+        hover = f"{title}<br>%{{x:.1f}} m/s, %{{y:.3f}}"
+        traces.append(line(speeds, values, name=title, color=BLUE, axis=number, hover=hover))
     return Figure(
         "trim-curves",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        f"Controls and attitude that hold each speed.{_PITCHES if 'theta0T' in names else ''}",
-        f"Trim curves of {', '.join(names)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
+        f"Controls, attitude and power that hold each speed.{_PITCHES if flapping else ''}",
+        f"Trim curves of {', '.join(panels)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
     )
 
 
-def _locus(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
+def _loci(vehicle: Vehicle, trims: Sequence[Trim]) -> tuple[Figure, ...]:
+    """All eigenvalues, and by themselves those that a pilot or an autopilot lives with."""
+    found = [(at.speed, mode) for at in trims for mode in linearize(vehicle, at).modes() if mode.frequency > 0.0]
+    slow = [(speed, mode) for speed, mode in found if mode.frequency < _SLOW]
+    over = f"from {trims[0].speed:g} to {trims[-1].speed:g} m/s"
+    figures = [_locus(found, "root-locus", "Eigenvalues over speed. Right of the vertical line a motion grows.", over)]
+    if 0 < len(slow) < len(found):
+        caption = f"The same within {_SLOW:g} rad/s: the slow motions of the fuselage. Point at one for its states."
+        figures.append(_locus(slow, "slow-locus", caption, over))
+    return tuple(figures)
+
+
+def _locus(found: Sequence[tuple[float, Mode]], identifier: str, caption: str, over: str) -> Figure:
     layout = base_layout(420)
     layout["xaxis"], layout["yaxis"] = axis("real part [1/s]"), axis("imaginary part [rad/s]")
     layout["shapes"] = [{"type": "line", "x0": 0, "x1": 0, "yref": "paper", "y0": 0, "y1": 1, "line": {"color": BLACK}}]
-    real, imag, color = [], [], []
-    for at in trims:
-        for value in np.linalg.eigvals(linearize(vehicle, at).A):
-            if abs(value) > 1e-6:
-                real.append(value.real)
-                imag.append(value.imag)
-                color.append(at.speed)
+    points = [
+        (speed, mode, sign * mode.eigenvalue.imag)
+        for speed, mode in found
+        for sign in ((1.0, -1.0) if mode.eigenvalue.imag else (1.0,))
+    ]
     trace = {
         "type": "scatter",
         "mode": "markers",
-        "x": numbers(real),
-        "y": numbers(imag),
+        "x": numbers([mode.eigenvalue.real for _, mode, _ in points]),
+        "y": numbers([imag for _, _, imag in points]),
+        "text": [_mode_words(mode) for _, mode, _ in points],
         "marker": {
-            "color": numbers(color),
+            "color": numbers([speed for speed, _, _ in points]),
             "colorscale": "Viridis",
             "size": 7,
             "colorbar": {"title": {"text": "m/s"}, "thickness": 12},
         },
-        "hovertemplate": "%{x:.3f} %{y:+.3f}j at %{marker.color:.1f} m/s<extra></extra>",
+        "hovertemplate": "%{x:.3f} %{y:+.3f}j at %{marker.color:.1f} m/s<br>%{text}<extra></extra>",
     }
     return Figure(
-        "root-locus",
-        {"data": [trace], "layout": layout},
-        420,
-        "Eigenvalues over speed. Right of the vertical line a motion grows.",
-        f"Root locus from {trims[0].speed:g} to {trims[-1].speed:g} m/s in the complex plane.",
+        identifier, {"data": [trace], "layout": layout}, 420, caption, f"Root locus {over} in the complex plane."
     )
 
 
-def _derivatives(trims: Sequence[Trim], tables: Sequence[DerivativeTable]) -> Figure:
+def _mode_words(mode: Mode) -> str:
+    states = ", ".join(name for name, share in mode.states if share > _TAKES_PART)
+    damping = f"damping {mode.damping:.2f}, " if mode.eigenvalue.imag else f"time constant {mode.time_constant:.2f} s, "
+    return f"{damping}states {states}"
+
+
+def _derivatives(trims: Sequence[Trim], tables: Sequence[DerivativeTable], row: str, *, imperial: bool) -> Figure:
     speeds = [at.speed for at in trims]
-    layout = grid([f"{name} [{unit(name)}]" for name in _SHOWN], columns=3, height=170, x_title="speed [m/s]")
+    names = [row + column for column in COLUMNS]
+    titles = [f"{name} [{unit_words(unit(name, imperial=imperial))}]" for name in names]
+    layout = grid(titles, columns=5, height=150, x_title="speed [m/s]", gap=0.06)
     traces = []
     parts = [part for part in tables[0].parts if part in _PART_COLORS]
-    for i, name in enumerate(_SHOWN):
-        row, column = split_name(name)
+    for i, name in enumerate(names):
+        place = split_name(name)
+        factor = factor_to_feet(*place) if imperial else 1.0
         number = "" if i == 0 else str(i + 1)
+        total = [factor * table[name] for table in tables]
         hover = f"{name}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
-        total = [table[name] for table in tables]
         traces.append(line(speeds, total, name=f"{name} total", color=BLACK, width=2.0, axis=number, hover=hover))
         for part in parts:
-            values = [float(table.parts[part][row, column]) for table in tables]
-            if max(map(abs, values)) > 1e-6:
+            values = [factor * float(table.parts[part][place]) for table in tables]
+            if max(map(abs, values)) > _SEEN * max(map(abs, total)) + 1e-12:
+                seen = f"{name} of the {part.replace('_', ' ')}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
                 traces.append(
-                    line(speeds, values, name=part, color=_PART_COLORS[part], dash="dash", axis=number, hover=part)
+                    line(speeds, values, name=part, color=_PART_COLORS[part], dash="dash", axis=number, hover=seen)
                 )
     keys = (Key("total", BLACK), *(Key(part.replace("_", " "), _PART_COLORS[part], "dash") for part in parts))
+    per = "mass" if row in "XYZ" else "moment of inertia"
     return Figure(
-        "derivatives-over-speed",
+        f"derivatives-{row}",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        "Derivatives (force per mass, moment per inertia) and what contributes to them.",
-        f"Twelve of {6 * len(COLUMNS)} derivatives over speed, split by contributor.",
+        f"{row}: {_ROW_WORDS[row]} per {per}, by motion and control, and what contributes to it.",
+        f"Derivatives of {row} over speed, split by contributor.",
         keys=keys,
+        min_width=_WIDE,
     )
+
+
+_ROW_WORDS = {
+    "X": "force ahead",
+    "Y": "force to the right",
+    "Z": "force down",
+    "L": "rolling moment",
+    "M": "pitching moment",
+    "N": "yawing moment",
+}
+_TAKES_PART, _SEEN = 0.1, 1e-3
+"""Shares of a mode and of a derivative below which a state and a contributor are left out."""

@@ -171,12 +171,11 @@ def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") ->
     return layout
 
 
-def grid(titles: Sequence[str], *, columns: int, height: int, x_title: str) -> dict[str, Any]:
-    """A layout of small panels in rows, each under its own heading."""
+def grid(titles: Sequence[str], *, columns: int, height: int, x_title: str, gap: float = 0.12) -> dict[str, Any]:
+    """A layout of small panels in rows, each under its own heading; `gap` is the share of the width between two."""
     rows = -(-len(titles) // columns)
     layout = base_layout(height * rows + 56, left=44, top=24)
     down = bands(rows, gap=0.4 / rows)
-    gap = 0.12
     width = (1.0 - gap * (columns - 1)) / columns
     layout["annotations"] = []
     for i, title in enumerate(titles):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import set_compiler_flags
+from swashplate.simulation.trigonometry import vector_backend
 from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
 
@@ -109,10 +110,11 @@ def row_rates(equations: Equations, *, padded: bool, xp: JaxBackend | None = Non
         equations: of which vehicle.
         padded: put the scalars into the row as a sum of padded ones instead of by `stack`. XLA's CPU compiler makes
             one kernel of that and 18 of a stack: 1.2 times faster for one vehicle, slower for a batch.
-        xp: the operations; JAX's own by default.
+        xp: the operations. By default JAX's own, and for one vehicle with the sines of `trigonometry`, which become
+            part of the one function: a CoaX steps 1.4 times faster, a helicopter 1.15 times (measured).
     """
 
-    operations = xp or jax_backend()
+    operations = xp or (vector_backend() if padded else jax_backend())
 
     def rates(x: Any, w: Any, p: Any) -> Any:
         u, parameters, environment = unpack_rows(equations, w, p)

@@ -119,6 +119,30 @@ def paper_model(model: LinearModel, *, as_printed: bool = False) -> LinearModel:
     return replace(eight, A=A, B=B)
 
 
+FORMS = ("full", "paper", "printed", "longitudinal", "lateral", "flapping", "bar-and-gyro")
+"""What `in_form` makes."""
+
+
+def in_form(model: LinearModel, form: str) -> LinearModel:
+    """A single-rotor helicopter's linear model in one of `FORMS`.
+
+    "full": as it is; "paper" and "printed": `paper_model`; "longitudinal" and "lateral": three degrees of freedom of
+    it, without the coupling; "flapping": ten states; "bar-and-gyro": thirteen.
+
+    Raises:
+        SwashError: where the form is not known, or the model lacks one of its states.
+    """
+    if form == "full":
+        return model
+    if form in ("flapping", "bar-and-gyro"):
+        return residualise(model, HYBRID if form == "flapping" else METTLER)
+    if form in ("paper", "printed"):
+        return paper_model(model, as_printed=form == "printed")
+    if form in ("longitudinal", "lateral"):
+        return part(paper_model(model), *(LONGITUDINAL if form == "longitudinal" else LATERAL))
+    raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="form")
+
+
 @dataclass(frozen=True)
 class Omission:
     """What leaving one derivative out does.

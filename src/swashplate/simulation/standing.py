@@ -1,7 +1,8 @@
 """A vehicle that can stand on level ground with its rotors at rest, spool up, lift off and land.
 
 Conventional helicopters have skids and an engine among their options. Any other rigid body gets four skid ends added
-around its own equations: forces add, so its rates only gain what the ground's push gives a body at rest.
+around its own equations: forces add, so its rates only gain what the ground's push gives a body at rest. Without states
+for them, these do not stick: what the wind pushes creeps.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def standing(vehicle: Vehicle) -> Vehicle:
         SwashError: where its states hold no rigid body, or it is a linear model.
     """
     if vehicle.name == "conventional":
-        options = {**vehicle.card.options, "ground": True, "rotor_speed": "throttle"}
+        options = {**vehicle.card.options, "ground": True, "grip": True, "rotor_speed": "throttle"}
         return from_card(replace(vehicle.card, options=options))
     if vehicle.name == LINEAR:
         raise no_ground(vehicle.card.where)
@@ -89,14 +90,10 @@ def at_rest(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:
     return row
 
 
-def _ground(skids: Skids, state: Any, par: Any, xp: Backend) -> tuple[Vector, Vector]:
-    return skid_loads(state.body, skids, xp)
-
-
 def _derivatives(
     free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, **how: Any
 ) -> Any:
-    force, moment = _ground(skids, state, par, xp)
+    force, moment, _ = skid_loads(state.body, skids, xp)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None))
     still = state.body._replace(u=0.0, v=0.0, w=0.0, p=0.0, q=0.0, r=0.0)
     pushed = rigid_body_rates(still, force, moment, inertia, xp)
@@ -108,6 +105,6 @@ def _derivatives(
 def _specific_force(
     free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, **how: Any
 ) -> Vector:
-    force, _ = _ground(skids, state, par, xp)
+    force, _, _ = skid_loads(state.body, skids, xp)
     felt: Vector = free(state, inputs, par, env, xp, **how)
     return felt + force.scaled(1.0 / par.mass)

@@ -93,7 +93,7 @@ def trim(
     climb: float = 0.0,
     turn: float = 0.0,
     heading: float = 0.0,
-    height: float = 0.0,
+    height: float | None = None,
     voltage: float | None = None,
     environment: Environment | None = None,
     near: Trim | None = None,
@@ -108,7 +108,8 @@ def trim(
         speed, lateral, climb: velocity ahead and to the right in the level plane of the heading, and up [m/s].
         turn: rate of turn to the right [rad/s]; the velocity turns with the heading.
         heading: psi [rad].
-        height: above the local origin [m]; it matters only to a vehicle that can touch the ground.
+        height: above the local origin [m]; it matters only to a vehicle that can touch the ground, which by default is
+            well above it (10 m), any other at 0.
         voltage: battery voltage [V], instead of the environment's.
         environment: surroundings; wind enters as it should (a trim in wind is not a trim in calm air).
         near: a trim of the same vehicle to start from, e.g. at the speed before on a trim curve.
@@ -123,6 +124,8 @@ def trim(
     if vehicle.state_names[:_BODY] != RigidBody._fields:
         raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
     equations = equations_of(vehicle)
+    if height is None:
+        height = _CLEAR if vehicle.card.options.get("ground") else 0.0
     if turn and (surroundings.wind_north or surroundings.wind_east):
         raise TrimError(
             "a turn in wind is no steady flight.",
@@ -171,6 +174,10 @@ def trim(
     return Trim(
         state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest, turn
     )
+
+
+_CLEAR = 10.0
+"""m: a height at which no skid touches."""
 
 
 def assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
@@ -297,10 +304,14 @@ def _check_limits(vehicle: Vehicle, inputs: Array, where: str) -> None:
                 f"{where} needs {name} = {told[0]}, but its limit is {told[1]}.",
                 where=vehicle.card.where,
                 channel=name,
-                hint="Ask for a slower flight, less payload or a fuller battery."
-                if battery
-                else "Ask for a slower flight or less weight.",
+                hint=_hint(battery=battery, too_low=value < low),
             )
+
+
+def _hint(*, battery: bool, too_low: bool) -> str:
+    if battery:
+        return "Ask for a slower flight, less payload or a fuller battery."
+    return "Ask for a slower flight." if too_low else "Ask for a slower flight or less weight."
 
 
 def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, environment: Environment) -> Array:

@@ -16,7 +16,7 @@ from swashplate.identification.innovations import filter_record
 from swashplate.identification.kinematics import PREDICTED
 from swashplate.identification.records import Record
 from swashplate.identification.riccati import predicted_covariance
-from swashplate.identification.start_states import hover, slopes
+from swashplate.identification.start_states import mean_velocity, slopes, steady_flight
 from swashplate.identification.stochastic import (
     FilterState,
     Noise,
@@ -81,7 +81,7 @@ def predict(
         record.outputs,
         inputs,
         voltage,
-        (value[0], rate[0]),
+        (value[0], rate[0], mean_velocity(vehicle, record)),
         parameters,
         jax.tree.map(jnp.asarray, noise),
         jax.tree.map(jnp.asarray, nuisance),
@@ -133,6 +133,7 @@ def _predict(
         voltage[:n],
         value=first[0],
         rate=first[1],
+        velocity=first[2],
         parameters=parameters,
         noise=noise,
         nuisance=nuisance,
@@ -154,14 +155,14 @@ def _predict(
 
 
 def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:
-    """Standard deviations (n, 12) of predictions 1, 2, ... samples ahead, at hover with the nose north.
+    """Standard deviations (n, 12) of predictions 1, 2, ... samples ahead, about the mean flight, nose north.
 
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
     model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
     parameters = vehicle.values()
     voltage = jnp.asarray(float(np.mean(record.voltage)))
-    x, u = hover(vehicle, parameters, voltage)
+    x, u = steady_flight(vehicle, parameters, voltage, mean_velocity(vehicle, record))
     A, C, Q, R = model.linear(x, u, parameters, voltage, noise, nuisance)
     predicted = predicted_covariance(A, C, Q, R)
     gain = jnp.linalg.solve(C @ predicted @ C.T + R, C @ predicted).T

@@ -17,6 +17,7 @@ from swashplate.physics.engine import EngineLag, RotorSpeed
 from swashplate.physics.environment import Environment
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector, local_to_body
+from swashplate.physics.ground_contact import Grip
 from swashplate.physics.inflow import Inflow
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.vehicles.airframe import airframe
@@ -90,6 +91,7 @@ class HelicopterState(NamedTuple):
     servos: Servos | None
     delays: Delays | None
     engine: EngineLag | None
+    grip: Grip | None
 
 
 class Loads(NamedTuple):
@@ -109,6 +111,7 @@ class Loads(NamedTuple):
     servos: Servos | None
     delays: Delays | None
     engine: EngineLag | None
+    grip: Grip | None
     induced: Scalar
     power: Scalar
 
@@ -220,12 +223,13 @@ def loads(
         back = sense * par.rotor_inertia * rotor_rates.omega
         tilt = Vector(-xp.sin(par.shaft_tilt) * back, 0.0, xp.cos(par.shaft_tilt) * back)
         lifted = Contribution(lifted.force, lifted.moment + tilt)
-    touching = None
+    touching, bending = None, None
     if options.ground:
         skids = ground_contact.Skids(
             par.skid_length, par.skid_width, par.skid_depth, par.skid_stiffness, par.skid_damping, par.skid_friction
         )
-        touching = Contribution(*ground_contact.skid_loads(body, skids, xp))
+        force, moment, bending = ground_contact.skid_loads(body, skids, xp, state.grip)
+        touching = Contribution(force, moment)
     return Loads(
         lifted,
         frame.tail_rotor,
@@ -241,6 +245,7 @@ def loads(
         servo_rates,
         late,
         lag,
+        bending,
         rotor.induced,
         load * turning,
     )
@@ -279,6 +284,7 @@ def derivatives(
         acting.servos,
         acting.delays,
         acting.engine,
+        acting.grip,
     )
 
 
@@ -312,6 +318,7 @@ def conventional(card: Card) -> Vehicle:
         Servos(0.1, 0.0, 0.0, 0.1) if options.servos else None,
         Delays(0.1, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0) if options.delay else None,
         EngineLag(0.3) if options.engine_lag else None,
+        Grip(*(0.0,) * 8) if options.grip else None,
     )
     names, units = list(RigidBody._fields), list(_BODY_UNITS)
     for part, inner in (
@@ -323,6 +330,7 @@ def conventional(card: Card) -> Vehicle:
         (nothing.servos, ("rad",) * 4),
         (nothing.delays, ("rad",) * 4 + ("rad/s",) * 4),
         (nothing.engine, ("1",)),
+        (nothing.grip, ("m",) * 8),
     ):
         if part is not None:
             names += part._fields

@@ -10,7 +10,7 @@ import numpy as np
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import local_to_body
-from swashplate.vehicles.conventional import HelicopterState, loads
+from swashplate.vehicles.conventional import HelicopterState, Loads, loads
 from swashplate.vehicles.derivatives import Array
 from swashplate.vehicles.helicopter_options import HelicopterOptions
 from swashplate.vehicles.structure import rebuild
@@ -22,15 +22,33 @@ _TURNING = 0.5
 _ADVANCE = 0.35
 _LOADING = 0.13
 _FLAPPING = 0.21
-"""Advance ratio, C_T / sigma and flapping [rad] beyond which reversed flow, stall and large angles count."""
+_THROUGH = 0.15
+"""Advance ratio, C_T / sigma, flapping [rad] and share of the tip speed at which air comes through the disc, beyond
+which reversed flow, stall and large angles count (0.15: the air meets the blades at 0.2 rad at three quarters)."""
 
 
 def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tuple[str, ...]:
     """What of the equations does not hold at a state; empty where they may be trusted, or for other vehicles.
 
-    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large flapping angles.
+    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large angles of inflow and flapping.
     """
     return tuple(_doubts(vehicle, x, u, environment).values())
+
+
+def shaft_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> float | None:
+    """Power [W] that main and tail rotor take from the engine at a state; None for other vehicles."""
+    acting = _loads(vehicle, x, u, environment)
+    return None if acting is None else float(acting.power)
+
+
+def _loads(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> Loads | None:
+    """What acts at a state; None for other vehicles."""
+    options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
+    if not isinstance(options, HelicopterOptions):
+        return None
+    state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
+    inputs: Any = vehicle.inputs(*(float(value) for value in u))
+    return loads(state, inputs, vehicle.values(), environment, FloatBackend(), options=options)
 
 
 def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array) -> tuple[str, ...]:
@@ -49,13 +67,11 @@ def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array)
 
 def _doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
     """The same by kind."""
-    options = vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
-    if not isinstance(options, HelicopterOptions):
+    acting = _loads(vehicle, x, u, environment)
+    if acting is None:
         return {}
     xp, par = FloatBackend(), vehicle.values()
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
-    inputs: Any = vehicle.inputs(*(float(value) for value in u))
-    acting = loads(state, inputs, par, environment, xp, options=options)
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
@@ -80,6 +96,12 @@ def _doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> d
         )
     if loading > _LOADING:
         found["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
+    through = (float(acting.induced) - float(air.z)) / tip
+    if abs(through) > _THROUGH:
+        found["inflow"] = (
+            f"air comes through the disc at {abs(through):.2f} of the tip speed, above {_THROUGH}: its angles at the "
+            "blades are taken as small"
+        )
     flap = max(abs(float(state.disc.a1)), abs(float(state.disc.b1)))
     if flap > _FLAPPING:
         found["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"

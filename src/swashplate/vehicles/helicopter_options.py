@@ -23,6 +23,7 @@ class HelicopterOptions(NamedTuple):
         delay: commands come late by the card's pure delay.
         engine_lag: the engine's power follows the governor with a lag; it needs a rotor speed that is not fixed.
         ground: skids touch ground at z = 0.
+        grip: skids stick to the ground until friction gives way (eight states); it needs ground.
         phase_lag: use the card's aerodynamic phase lag.
         in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
         yaw_at_blades: the blades meet the air at the rotor's speed less the yaw rate, as they do on any shaft whose
@@ -43,6 +44,7 @@ class HelicopterOptions(NamedTuple):
     delay: bool = False
     engine_lag: bool = False
     ground: bool = False
+    grip: bool = False
     phase_lag: bool = False
     in_plane: str = "blade-element"
     yaw_at_blades: bool = False
@@ -73,6 +75,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "delay",
             "engine_lag",
             "ground",
+            "grip",
             "phase_lag",
             "yaw_at_blades",
             "yaw_at_hub",
@@ -105,4 +108,6 @@ def helicopter_options(card: Card) -> HelicopterOptions:
             channel="engine_lag",
             hint='Add rotor_speed = "governed", or "throttle".',
         )
+    if chosen.grip and not chosen.ground:
+        raise CardError("needs ground to hold.", where=where, channel="grip", hint="Add ground = true.")
     return chosen
