@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -11,7 +10,6 @@ import numpy as np
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Array, Flight
-from swashplate.flights.schema import QUATERNION, channel
 from swashplate.identification import response_warnings
 from swashplate.identification.composite import composite
 from swashplate.identification.conditioning import (
@@ -22,6 +20,7 @@ from swashplate.identification.conditioning import (
 )
 from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.input_shares import own_shares
+from swashplate.identification.record_facts import INJECTED, autopilot_gains, bystanders_of, means, slowest_of, unit_of
 from swashplate.identification.references import reference_columns, sweeps_of
 from swashplate.identification.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.spectra import Complex, Signals, SpectralMatrix, signals, spectral_matrix
@@ -30,8 +29,6 @@ LINES_PER_DECADE = 50
 WINDOWS = 5
 OVERLAP = 0.75
 """Hann windows that overlap so weigh every sample alike; less loses data, more only repeats."""
-INJECTED = ("sweep", "sid", "reference", "excitation")
-"""Names of signals that a program adds to a command: they are part of an input, not another one."""
 SLOW = 1.0 / 3.0
 """Share of a channel's own logging rate up to which it is used: beyond, samples fold and what is between is guessed."""
 SHORTEST = 0.2
@@ -137,7 +134,7 @@ def respond(
         ]
     rate = 1.0 / pieces[0].dt
     highest = min(band[1], 0.499 * rate) if band else rate / 10.0
-    slow, slowest = _slowest(flights, (*inputs, *outputs, *references))
+    slow, slowest = slowest_of(flights, (*inputs, *outputs, *references))
     slow_words = []
     if SLOW * slowest < highest:
         slow_words = [
@@ -190,8 +187,8 @@ def respond(
         )
     return replace(
         made,
-        input_units=tuple(_unit(flights[0], name) for name in inputs),
-        output_units=tuple(_unit(flights[0], name) for name in outputs),
+        input_units=tuple(unit_of(flights[0], name) for name in inputs),
+        output_units=tuple(unit_of(flights[0], name) for name in outputs),
         warnings=tuple(warnings),
         problems=tuple(problems),
         settings={
@@ -200,43 +197,10 @@ def respond(
             "overlap": overlap,
             "references": list(references),
             "averages": [m.averages for m in matrices],
-            **_autopilot(flights),
-            "means": _means(flights, (*inputs, *outputs)),
+            **autopilot_gains(flights),
+            "means": means(flights, (*inputs, *outputs)),
         },
     )
-
-
-def _autopilot(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
-    """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
-    said = [flight.provenance for flight in flights]
-    names = (
-        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[ED])|INS_GYRO_FILTER", n)
-    )
-    values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
-    same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
-    return {"autopilot": same} if same else {}
-
-
-def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
-    """Other commands on the same time base in all flights, which may have moved with the first of the named inputs.
-
-    A command has the unit "1", or none where that input has none (a table without units).
-    """
-
-    def commands(flight: Flight) -> set[str]:
-        home = flight.stream_of(named[0])
-        units = {"1", str(flight[named[0]].attrs.get("units", ""))} & {"1", ""}
-        data = flight.streams[home]
-        return {
-            str(name)
-            for name, values in data.data_vars.items()
-            if values.attrs.get("units", "") in units
-            and np.all(np.isfinite(values.values))
-            and np.ptp(values.values) > 0.0
-        }
-
-    shared = set.intersection(*(commands(flight) for flight in flights))
-    return tuple(sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith(INJECTED)))
 
 
 @dataclass(frozen=True)
@@ -283,29 +247,6 @@ def _estimate(
     rest, _ = _matrices(without(pieces, omega, guess), omega, lengths, overlap)
     sharpened = _composed(matrices, omega, question, shares, guess=guess, rest=rest)
     return _Estimate(omega, matrices, notes, blurred, sharpened)
-
-
-def _slowest(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
-    """The channel that was logged most slowly, by its flight's history, and its rate [Hz] (infinite for none)."""
-    rates = {
-        name: float(rate)
-        for flight in flights
-        for step in flight.history
-        if step.operation == "resample"
-        for name, rate in step.details.get("slower", {}).items()
-        if name in names
-    }
-    slow = min(rates, key=lambda name: rates[name], default="")
-    return slow, rates.get(slow, np.inf)
-
-
-def _means(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, float]:
-    """What each channel is on average: where the flights were trimmed."""
-    return {name: float(np.mean(np.concatenate([flight.values(name) for flight in flights]))) for name in names}
-
-
-def _unit(flight: Flight, name: str) -> str:
-    return str(flight[name].attrs.get("units", "")) or channel(name).unit
 
 
 def _matrices(

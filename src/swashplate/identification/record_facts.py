@@ -1,0 +1,71 @@
+"""What the flights behind a response tell besides their signals: gains, other commands, slow channels, means."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import QUATERNION, channel
+
+INJECTED = ("sweep", "sid", "reference", "excitation")
+"""Names of signals that a program adds to a command: they are part of an input, not another one."""
+
+
+def autopilot_gains(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
+    """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
+    said = [flight.provenance for flight in flights]
+    names = (
+        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[ED])|INS_GYRO_FILTER", n)
+    )
+    values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
+    same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
+    return {"autopilot": same} if same else {}
+
+
+def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
+    """Other commands on the same time base in all flights, which may have moved with the first of the named inputs.
+
+    A command has the unit "1", or none where that input has none (a table without units).
+    """
+
+    def commands(flight: Flight) -> set[str]:
+        home = flight.stream_of(named[0])
+        units = {"1", str(flight[named[0]].attrs.get("units", ""))} & {"1", ""}
+        data = flight.streams[home]
+        return {
+            str(name)
+            for name, values in data.data_vars.items()
+            if values.attrs.get("units", "") in units
+            and np.all(np.isfinite(values.values))
+            and np.ptp(values.values) > 0.0
+        }
+
+    shared = set.intersection(*(commands(flight) for flight in flights))
+    return tuple(sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith(INJECTED)))
+
+
+def slowest_of(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:
+    """The channel that was logged most slowly, by its flight's history, and its rate [Hz] (infinite for none)."""
+    rates = {
+        name: float(rate)
+        for flight in flights
+        for step in flight.history
+        if step.operation == "resample"
+        for name, rate in step.details.get("slower", {}).items()
+        if name in names
+    }
+    slow = min(rates, key=lambda name: rates[name], default="")
+    return slow, rates.get(slow, np.inf)
+
+
+def means(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, float]:
+    """What each channel is on average: where the flights were trimmed."""
+    return {name: float(np.mean(np.concatenate([flight.values(name) for flight in flights]))) for name in names}
+
+
+def unit_of(flight: Flight, name: str) -> str:
+    """A channel's unit as its flight says it, otherwise the schema's."""
+    return str(flight[name].attrs.get("units", "")) or channel(name).unit
