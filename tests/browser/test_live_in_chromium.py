@@ -136,7 +136,7 @@ def test_the_helicopter_moves_under_the_stick_and_charts_advance(visit_: Any, co
     north = visit.of("swash.now.own.x[0]")
     visit.stick(pitch=0.4)
     visit.until(f"swash.now.own.x[0] > {north + 1.0}")
-    assert visit.of("swash.scene.crafts.own.model.group.position.x") > north + 0.9, "what is drawn moves as well"
+    visit.until(f"swash.scene.crafts.own.model.group.position.x > {north + 0.9}")  # what is drawn moves as well
     longer = visit.of("swash.charts.charts.map(c => c.data[0].length)")
     assert all(now > then for now, then in zip(longer, charted, strict=True))
     assert visit.of("swash.charts.charts.length") == 4

@@ -134,8 +134,11 @@ def test_every_page_can_be_reached_from_the_index() -> None:
 
 
 def test_the_guide_to_the_report_names_its_sections() -> None:
-    page = PAGES["docs/howto/read-the-report.md"]
+    page, on_responses = PAGES["docs/howto/read-the-report.md"].split("## Reports on frequency responses")
     named = set(re.findall(r"\*\*(.+?)\*\*", page)) - {"Banners", "Summary"}
     report = compose(report_samples.fit(), report_samples.validation(), modes=report_samples.modes())
     titles = {section.title for section in report.sections}
     assert named <= titles
+    made = (ROOT / "src" / "swashplate" / "reporting" / "sections_responses.py").read_text(encoding="utf-8")
+    made += (ROOT / "src" / "swashplate" / "reporting" / "sections_verification.py").read_text(encoding="utf-8")
+    assert all(f'"{title}"' in made for title in re.findall(r"\*\*(.+?)\*\*", on_responses))
