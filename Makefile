@@ -49,7 +49,7 @@ layers: $(STAMP)
 unit: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$$XLA_FLAGS --xla_cpu_parallel_codegen_split_count=1" \
 	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
-	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 speed: $(STAMP)
 	$(BIN)/python -m benchmarks.run --short
