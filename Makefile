@@ -26,10 +26,10 @@ $(STAMP): lock/dev.txt pyproject.toml
 demo: $(STAMP)
 	$(BIN)/swash demo --out demo
 
-# First what fails fastest, two at a time; speed alone, for it is timed.
+# First what fails fastest; types beside the tests, which wait for browsers now and then; speed alone, for it is timed.
 test: $(STAMP)
-	$(MAKE) --no-print-directory -j 2 --output-sync page lint types layers
-	$(MAKE) --no-print-directory unit
+	$(MAKE) --no-print-directory -j 2 --output-sync page lint layers
+	$(MAKE) --no-print-directory -j 2 types unit
 	$(MAKE) --no-print-directory speed
 
 # three.js and uPlot for `swash live`, by hash; without npm the tests of the page are skipped with the reason.
@@ -47,7 +47,8 @@ layers: $(STAMP)
 	$(BIN)/lint-imports
 
 unit: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 XLA_FLAGS="$$XLA_FLAGS --xla_cpu_parallel_codegen_split_count=1" \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
+	XLA_FLAGS="$$XLA_FLAGS --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1" \
 	JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
 	$(BIN)/python -m pytest -m "not proof" -q -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 

@@ -58,7 +58,7 @@ def _run(port: int, count: int) -> float:
 
 def measure(*, short: bool) -> list[Result]:
     """Both kinds of vehicle."""
-    count, repeats = (3_000, 2) if short else (10_000, 5)
+    count, repeats = (1_500, 2) if short else (10_000, 5)
     return [exchanges(name, count=count, repeats=repeats) for name in ("raptor50", "coax")]
 
 

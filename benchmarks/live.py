@@ -69,8 +69,8 @@ class Punctual:
 
 
 def measure(*, short: bool) -> list[Punctual]:
-    """Both kinds of page for 60 s (10 s in the short form); without Chromium only the first."""
-    seconds = 10.0 if short else 60.0
+    """Both kinds of page for 60 s (5 s in the short form); without Chromium only the first."""
+    seconds = 5.0 if short else 60.0
     found = [_reading(seconds)]
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is not None:

@@ -47,16 +47,14 @@ def test_a_folder_that_cannot_be_made_changes_nothing(tmp_path: Path) -> None:
     assert jax.config.values["jax_compilation_cache_dir"] == before
 
 
-def test_flags_are_set_once_and_a_users_values_stay(monkeypatch: pytest.MonkeyPatch) -> None:
-    from swashplate.simulation.compilation import set_compiler_flags
+def test_small_loops_are_asked_for_once_and_a_users_options_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    from swashplate.simulation.compilation import compile_small_loops_whole
 
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
-    set_compiler_flags()
-    set_compiler_flags()
-    chosen = os.environ["XLA_FLAGS"].split()
-    assert chosen[:2] == ["--xla_cpu_enable_fast_math=false", "--xla_cpu_use_fusion_emitters=false"]
-    assert len(chosen) == 3
-    assert chosen[2].startswith("--xla_backend_extra_options=")
-    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=true --xla_backend_extra_options=other=1")
-    set_compiler_flags()
-    assert os.environ["XLA_FLAGS"] == "--xla_cpu_use_fusion_emitters=true --xla_backend_extra_options=other=1"
+    compile_small_loops_whole()
+    compile_small_loops_whole()
+    assert os.environ["XLA_FLAGS"].startswith("--xla_cpu_enable_fast_math=false --xla_backend_extra_options=")
+    assert os.environ["XLA_FLAGS"].count("xla_backend_extra_options") == 1
+    monkeypatch.setenv("XLA_FLAGS", "--xla_backend_extra_options=other=1")
+    compile_small_loops_whole()
+    assert os.environ["XLA_FLAGS"] == "--xla_backend_extra_options=other=1"

@@ -1,4 +1,4 @@
-"""How XLA compiles here: a persistent cache, so that a second run starts fast, and flags of the compiler."""
+"""How XLA compiles here: a persistent cache, so that a second run starts fast, and small loops as one function."""
 
 from __future__ import annotations
 
@@ -9,32 +9,27 @@ import jax
 import platformdirs
 
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
-"""Options for `jax.jit` of what takes longest to compile: as below, also where JAX has compiled something before."""
+"""Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
 
-_FLAGS = {
-    "xla_cpu_use_fusion_emitters": "false",
-    "xla_backend_extra_options": "xla_cpu_small_while_loop_byte_threshold=1000000",
-}
+_SMALL_LOOP = "xla_cpu_small_while_loop_byte_threshold"
+_SMALL_LOOP_BYTES = 1_000_000
 
 
-def set_compiler_flags() -> None:
-    """Let XLA make one function of a loop that touches little memory, and compile without its fusion emitters.
+def compile_small_loops_whole() -> None:
+    """Let XLA compile a loop that touches little memory into one function instead of one launch per kernel.
 
-    By default XLA's CPU compiler does the first for loops of up to 1,024 bytes; one vehicle's Runge-Kutta stage touches
-    some thousands. A launch takes about 60 ns and a stage has 40 to 100 of them (measured: 1,350,000 steps per second
+    XLA's CPU compiler does this for loops of up to 1,024 bytes; one vehicle's Runge-Kutta stage touches some
+    thousands. A launch takes about 60 ns and a stage has 40 to 100 of them (measured: 1,350,000 steps per second
     instead of 150,000 for one CoaX, 440,000 instead of 43,000 for a helicopter with flapping, bar and dynamic inflow).
     Loops that gather, scatter or multiply matrices stay as they are.
 
-    Without the emitters a helicopter's derivatives compile in a sixth less time (the exact ones of an observer in a
-    quarter of it) and a fit needs a third less memory; what was compiled runs as fast (decision 27).
-
-    Flags of XLA that are read when JAX first compiles: called by the package's entry points, they have no effect where
-    JAX has already compiled something, and a value that the user has set stays.
+    An option of XLA that is read when JAX first compiles: called by the package's entry points, it has no effect where
+    JAX has already compiled something, and it leaves a value alone that the user has set.
     """
     flags = os.environ.get("XLA_FLAGS", "")
-    ours = [f"--{name}={value}" for name, value in _FLAGS.items() if name not in flags]
-    if ours:
-        os.environ["XLA_FLAGS"] = " ".join([flags, *ours]).strip()
+    if "xla_backend_extra_options" not in flags:
+        option = f"--xla_backend_extra_options={_SMALL_LOOP}={_SMALL_LOOP_BYTES}"
+        os.environ["XLA_FLAGS"] = f"{flags} {option}".strip()
 
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:

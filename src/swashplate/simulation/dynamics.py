@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import set_compiler_flags
+from swashplate.simulation.compilation import compile_small_loops_whole
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.vehicles.structure import rebuild
 from swashplate.vehicles.vehicle import Vehicle
@@ -30,7 +30,7 @@ CONSTANTS = ("air_density", "gravity")
 
 def enable_double_precision() -> None:
     """Make JAX compute in float64, as every public entry point of swashplate needs; importing alone does not do it."""
-    set_compiler_flags()
+    compile_small_loops_whole()
     if not jax.config.values["jax_enable_x64"]:
         jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 

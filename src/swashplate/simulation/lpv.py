@@ -140,7 +140,7 @@ def simulate_lpv(
 
 
 _CHUNK = 50
-"""Steps per inner loop: XLA makes one function of a loop that touches little (`set_compiler_flags`)."""
+"""Steps per inner loop: XLA makes one function of a loop that touches little (`compile_small_loops_whole`)."""
 
 
 def _product(A: Any, x: Any) -> Any:
