@@ -8,11 +8,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from swashplate.atomic import write_text
-from swashplate.errors import SwashError
 from swashplate.identification.bench.evaluate import Bench
 from swashplate.identification.bench.result import BenchResult, Check, Curve
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words
 from swashplate.reporting.versions import card_hash, date, versions
@@ -34,14 +32,7 @@ def bench_report(bench: Bench, *, path: str | os.PathLike[str]) -> Path:
     Raises:
         SwashError: a place that cannot be written to.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(compose_bench(bench)))
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, compose_bench(bench))
 
 
 def compose_bench(bench: Bench) -> Report:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.atomic import write_text
 from swashplate.control.check import ControlCheck
 from swashplate.control.requirements import (
     ATTITUDE_COUPLING,
@@ -19,10 +18,9 @@ from swashplate.control.requirements import (
     REJECTION_PEAK,
     Boundary,
 )
-from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
 from swashplate.reporting import figures_control as figures
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import card_hash, date, versions
@@ -42,14 +40,7 @@ def control_report(check: ControlCheck, *, path: str | os.PathLike[str], title: 
     Raises:
         SwashError: a place that cannot be written to.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(compose_check(check, title=title)))
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, compose_check(check, title=title))
 
 
 def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:

@@ -41,7 +41,7 @@ def write_page(path: str | os.PathLike[str], report: Report) -> Path:
         return write_text(target, render(report))
     except OSError as error:
         raise SwashError(
-            f"cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
+            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
         ) from None
 
 

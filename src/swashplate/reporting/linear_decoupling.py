@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.atomic import write_text
 from swashplate.control.linear_decoupling import Decoupling, coupling
-from swashplate.errors import SwashError
 from swashplate.reporting.figures_control import over_frequency, style
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
 from swashplate.reporting.theme import line, stacked
 from swashplate.reporting.versions import date, versions
@@ -50,7 +48,6 @@ def decoupling_report(
     Raises:
         SwashError: a place that cannot be written to.
     """
-    target = Path(path)
     axes = {"inputs": list(inputs), "outputs": list(outputs)}
     w = np.geomspace(_LOW, _HIGH, _POINTS)
     ratios = {words: coupling(model, w, by=by, **axes) for words, by in made.items()}
@@ -71,13 +68,7 @@ def decoupling_report(
         sections=(_steps(model, made, axes), _numbers(made, axes, frequency)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )  # fmt: skip
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(report))
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, report)
 
 
 def _keys(made: Sequence[str]) -> tuple[Key, ...]:

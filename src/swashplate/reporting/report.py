@@ -6,11 +6,9 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from swashplate.atomic import write_text
-from swashplate.errors import SwashError
 from swashplate.identification.fit import Fit
 from swashplate.reporting.compose import compose
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.simulation.linearize import Mode
 from swashplate.validation.validation import Validation
 
@@ -40,12 +38,4 @@ def report(
     Raises:
         SwashError: nothing to report, or a place that cannot be written to.
     """
-    page = render(compose(fit, validation, title=title, modes=modes))
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, page)
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, compose(fit, validation, title=title, modes=modes))

@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from swashplate.atomic import write_text
 from swashplate.errors import SwashError
 from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Report
@@ -23,14 +22,7 @@ def response_report(material: ResponseMaterial, *, path: str | os.PathLike[str],
     Raises:
         SwashError: nothing to report, or a place that cannot be written to.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(compose_responses(material, title=title)))
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, compose_responses(material, title=title))
 
 
 def compose_responses(material: ResponseMaterial, *, title: str | None = None) -> Report:

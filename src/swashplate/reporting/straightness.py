@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.atomic import write_text
 from swashplate.control.straightness import StepRun
-from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
-from swashplate.reporting.html import render
+from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
 from swashplate.reporting.versions import card_hash, date, versions
@@ -50,16 +48,7 @@ def straightness_report(
     Raises:
         SwashError: a place that cannot be written to.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(
-            target, render(compose_straightness(vehicle, runs, command=command, lag=lag, sources=sources))
-        )
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    return write_page(path, compose_straightness(vehicle, runs, command=command, lag=lag, sources=sources))
 
 
 def compose_straightness(
