@@ -15,8 +15,8 @@ from benchmarks.timing import Result, best_rate
 from swashplate.export.compiler import shared_library
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
+from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle as load_vehicle
 
 STEP_TARGET = 1_000_000.0
 """Steps per second on one core."""

@@ -17,13 +17,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.timing import Span
-from swashplate.flights.flight import Array, Flight, stream
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.respond import respond
-from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_file import structure
-from swashplate.identification.state_space_fit import fit_state_space
-from swashplate.identification.transfer_function_fit import TransferFunctionFit, fit_transfer_function
+from swashplate.arrays import Array
+from swashplate.flights.flight import Flight, stream
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, fit_transfer_function
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.respond import respond
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import structure
 
 SECONDS, RATE = 600.0, 100.0
 RESPOND_WITHIN, FIT_WITHIN = 2.0, 15.0
@@ -164,7 +165,7 @@ def fit(*, repeats: int) -> Span:
 
     def run() -> None:
         result = fit_state_space(start, found)
-        count[:] = [len(result.free), len(result.targets), result.cost]
+        count[:] = [len(result.names), len(result.targets), result.cost]
 
     run()
     seconds = _best(run, repeats)

@@ -6,6 +6,7 @@ import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.models.catalogue import vehicle
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.integrate import trajectory
@@ -13,7 +14,6 @@ from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import PAPER_INPUTS
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle
 
 SCAN_TARGET = 100_000.0
 SPEEDS_TARGET = 50.0

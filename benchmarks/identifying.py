@@ -18,11 +18,11 @@ import numpy as np
 
 import swashplate as sp
 from benchmarks.timing import Span
-from swashplate.identification.nelder_mead import minimise_squares
-from swashplate.identification.output_error import OutputError
-from swashplate.identification.parameters import CHOICES, parameterize
-from swashplate.identification.records import records
-from swashplate.identification.scoring import minimise
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import records
+from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.nelder_mead import minimise_squares
+from swashplate.identification.time.output_error import OutputError
 
 WARM = {"output-error": 5.0, "prediction-error": 20.0}
 COLD = 60.0
@@ -47,7 +47,7 @@ def identify(method: str, logged: sp.Flight, *, iterations: int = 60) -> float:
     begin = time.perf_counter()
     fit = sp.identify(_start(), logged, free="full", method=method, keep_unexcited=True, iterations=iterations)
     seconds = time.perf_counter() - begin
-    assert len(fit.names) == len(CHOICES["full"].free)
+    assert len(fit.names) == len(sp.CHOICES["full"].free)
     return seconds
 
 

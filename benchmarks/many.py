@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.simulation.batch import fly_batch
 from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle as load_vehicle
 
 TARGETS = {"float64": 0.8e6, "float32": 2.5e6}
 VEHICLES = 4096

@@ -12,11 +12,12 @@ import jax
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
+from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.physics.backend import CasadiBackend
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row, rk4_step, unpack_rows
+from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row, unpack_rows
 from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle as load_vehicle
 
 TARGET = 180_000.0
 DT = 0.01
@@ -81,7 +82,7 @@ def numpy_loop(*, steps: int, repeats: int) -> Result:
     def run() -> None:
         x = start
         for _ in range(steps):
-            x = rk4_step(rates, x, (row, row, row), DT)
+            x = rk4_step(rates, x, lambda _: row, DT, looped=False)
 
     return Result("plain NumPy loop", best_rate(run, steps, repeats=repeats))
 
@@ -100,7 +101,7 @@ def c_loop(*, steps: int, repeats: int) -> Result:
         u, parameters, environment = unpack_rows(equations, w, q)
         return casadi.vertcat(*vehicle.rates(x, u, parameters, environment, xp))
 
-    step = casadi.Function("coax_step", [x, w, q], [rk4_step(rates, x, (w, w, w), DT)])
+    step = casadi.Function("coax_step", [x, w, q], [rk4_step(rates, x, lambda _: w, DT, looped=False)])
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder)
         source = Path(step.generate("coax_step.c", {"main": False}))

@@ -6,16 +6,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import swashplate as sp
-from swashplate.identification.bench.evaluate import evaluate
-from swashplate.identification.bench.plan import planned
-from swashplate.identification.bench.tilt import torques
-from swashplate.simulation.bench import virtual_bench
+from swashplate.bench.evaluate import evaluate
+from swashplate.bench.plan import planned
+from swashplate.bench.tilt import torques
+from swashplate.bench.virtual_bench import virtual_bench
 
 coax = sp.vehicle("coax")
 records = virtual_bench(coax, planned(coax, ["thrust", "swashplate"]), seed=1)
 bench = evaluate(records, coax)
-card = bench.card.values()
-measured = next(result for result in bench.results if result.procedure == "swashplate")
+card = bench.model.card.values()
+measured = next(result for result in bench.details.results if result.procedure == "swashplate")
 
 tilt = np.radians(np.linspace(-6.0, 6.0, 61))
 lines = torques(

@@ -26,7 +26,7 @@ fit = sp.identify(
 )
 for name, truth in TRUTH.items():
     e = fit[name]
-    print(f"{name}: card {e.published:g}, true {truth:g}, found {e.value:.4f} +- {2 * e.sigma_corrected:.4f} {e.unit}")
+    print(f"{name}: card {e.start:g}, true {truth:g}, found {e.value:.4f} +- {2 * e.sigma_corrected:.4f} {e.unit}")
 
 validation = sp.validate(fit, log("multisine:roll+pitch,0.5-4Hz,8s,0.1", seed=2), horizons=(0.5, 1.0), every=0.5)
 for predictor in ("model", "published card"):

@@ -24,11 +24,11 @@ from typing import Any
 from unittest import mock
 
 from swashplate.atomic import write_text
+from swashplate.models import coax
+from swashplate.models.catalogue import vehicle
+from swashplate.models.nesting import leaves, rebuild
 from swashplate.physics import drive_train, fuselage, rigid_body, rotor, stabilizer_bar, swashplate
 from swashplate.physics.environment import Environment
-from swashplate.vehicles import coax
-from swashplate.vehicles.catalogue import vehicle
-from swashplate.vehicles.structure import leaves, rebuild
 
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "pictures" / "coax-block-diagram.svg"
 _COMPONENTS = (drive_train, stabilizer_bar, swashplate, rotor, fuselage, rigid_body)

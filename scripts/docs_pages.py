@@ -9,6 +9,7 @@ On a page,
 * a fence `python` is run, in the page's order and one namespace; a fence `text` right after it is what it prints;
 * a fence `console` holds commands `$ swash ...` and under each what it prints (`| head -n N` and `| tail -n N` work);
 * a comment `<!-- file: NAME -->` before a fence writes the fence into the page's folder as NAME;
+* a comment `<!-- package: NAME -->` installs `examples/NAME` while the page runs;
 * what lies between `<!-- generated: NAME -->` and `<!-- end -->` is made by the function NAME of `GENERATED`.
 """
 
@@ -29,12 +30,15 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from own_package import EXAMPLES, installed
+
 from swashplate.atomic import write_bytes, write_text
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"<!-- file: (\S+) -->\s*$")
+_PACKAGE = re.compile(r"<!-- package: (\w+) -->")
 _REGION = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _SLOW = ("identify", "validate", "demo")
 _REAL = "coax56/"
@@ -157,7 +161,12 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
         and any(_REAL in f.text for f in programs)
     )
     namespace: dict[str, Any] = {}
-    with stand_ins() if standing_in else contextlib.nullcontext():
+    with contextlib.ExitStack() as around:
+        if standing_in:
+            around.enter_context(stand_ins())
+        for name in _PACKAGE.findall(text):
+            site = Path(around.enter_context(tempfile.TemporaryDirectory()))
+            around.enter_context(installed(name, site))
         for number, fence in enumerate(found):
             if fence.file:
                 Path(fence.file).write_text(fence.text, encoding="utf-8")
@@ -196,7 +205,7 @@ def _log(name: str) -> Any:
 def stand_ins() -> Iterator[None]:
     """Short simulated logs in place of the real flights, a small fit in place of a long one: the calls are tried."""
     import swashplate as sp
-    from swashplate.identification.parameters import parameterize
+    from swashplate.identification.core.parameters import parameterize
 
     read, identify, validate = sp.read, sp.identify, sp.validate
 
@@ -206,9 +215,9 @@ def stand_ins() -> Iterator[None]:
     def identifying(*given: Any, **options: Any) -> Any:
         asked = inspect.signature(identify).bind(*given, **options)
         asked.apply_defaults()
-        vehicle, flights = asked.arguments["vehicle"], asked.arguments["flights"]
+        vehicle, flights = asked.arguments["model"], asked.arguments["flights"]
         question = {name: asked.arguments[name] for name in ("ties", "fixed", "priors")}
-        parameterize(vehicle, asked.arguments["free"], **question)  # are the names right?
+        parameterize(vehicle, asked.arguments["free"] or "full", **question)  # are the names right?
         small = {"free": ["tau_f_upper", "linkage_lower"], "method": "output-error", "iterations": 3}
         return _once(("identify", flights.provenance.source), lambda: identify(vehicle, flights, **small))
 
@@ -278,8 +287,8 @@ def commands_text() -> str:
 
 def parameters_text() -> str:
     """The coax card as a table."""
+    from swashplate.models.card import packaged_cards
     from swashplate.reporting.glossary import meaning
-    from swashplate.vehicles.card import packaged_cards
 
     rows = []
     for name, p in packaged_cards()["coax"].parameters.items():
@@ -297,7 +306,7 @@ def _bound(value: float | None) -> str:
 
 def trust_text() -> str:
     """What the coax card says of itself."""
-    from swashplate.vehicles.card import packaged_cards
+    from swashplate.models.card import packaged_cards
 
     card = packaged_cards()["coax"]
     options = ", ".join(f"`{name} = {str(value).lower()}`" for name, value in card.options.items())
@@ -307,10 +316,9 @@ def trust_text() -> str:
 def choices_text() -> str:
     """The ready choices of free parameters with their priors."""
     import swashplate as sp
-    from swashplate.identification.choices import choices_for
 
     coax = "\n\n".join(map(_choice, sp.CHOICES.values()))
-    others = "\n\n".join(map(_choice, choices_for(sp.vehicle("raptor50", bar=True)).values()))
+    others = "\n\n".join(map(_choice, sp.vehicle("raptor50", bar=True).choices.values()))
     words = "A single-rotor helicopter's take their priors from its card; here those of `raptor50` with `bar = true`."
     return f"For the CoaX:\n\n{coax}\n\n{words}\n\n{others}"
 
@@ -335,7 +343,7 @@ def channels_text() -> str:
 
 def thresholds_text() -> str:
     """The verdict's thresholds."""
-    from swashplate.identification import feedback
+    from swashplate.identification.time import feedback
     from swashplate.validation.verdict import THRESHOLDS
 
     rows = [
@@ -354,7 +362,7 @@ def thresholds_text() -> str:
 
 def bench_columns_text() -> str:
     """The columns of a bench record."""
-    from swashplate.flights.bench_record import COLUMNS
+    from swashplate.bench.record import COLUMNS
 
     return _table(
         ("column", "unit", "meaning and sign"), [(f"`{n}`", unit, words) for n, (unit, words) in COLUMNS.items()]
@@ -363,13 +371,23 @@ def bench_columns_text() -> str:
 
 def bench_procedures_text() -> str:
     """The bench's procedures with what they need."""
-    from swashplate.identification.bench.evaluate import PROCEDURES
+    from swashplate.bench.evaluate import PROCEDURES
 
     rows = [
         (f"`{name}`", module.TITLE, ", ".join(f"`{column}`" for column in module.COLUMNS), module.SOURCE)
         for name, module in PROCEDURES.items()
     ]
     return _table(("procedure", "measures", "needs the columns", "by"), rows)
+
+
+def ducted_fan_text() -> str:
+    """The example of a model of one's own, and its entry point."""
+    code, project = ((EXAMPLES / "ducted_fan" / name).read_text(encoding="utf-8") for name in _DUCTED_FAN)
+    points = project[project.index("[project.entry-points") :].split("\n\n")[0]
+    return f"```python\n{code}```\n\nIts `pyproject.toml` names it:\n\n```toml\n{points}\n```"
+
+
+_DUCTED_FAN = ("ducted_fan.py", "pyproject.toml")
 
 
 GENERATED: Mapping[str, Callable[[], str]] = {
@@ -381,6 +399,7 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "thresholds": thresholds_text,
     "bench_columns": bench_columns_text,
     "bench_procedures": bench_procedures_text,
+    "ducted_fan": ducted_fan_text,
 }
 
 

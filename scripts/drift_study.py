@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 import swashplate as sp
-from swashplate.control.autopilot import autopilot
-from swashplate.control.learning import corrected_by_step, drift_sources
-from swashplate.control.robustness import draw_models
-from swashplate.control.straightness import command_for_speed, paths_of, step_paths
+from swashplate.control.analysis.straightness import command_for_speed, paths_of, step_paths
+from swashplate.control.draws.robustness import draw_models
+from swashplate.control.laws.autopilot import autopilot
+from swashplate.control.laws.learning import corrected_by_step, drift_sources
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 
 SPEED, TAUGHT = 1.8, 100

@@ -19,18 +19,24 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import swashplate as sp
-from swashplate.flights.flight import Array, Flight, Provenance, stream
-from swashplate.identification.linear_simulation import delayed, free_and_forced
-from swashplate.identification.respond import respond
-from swashplate.identification.transfer_function_fit import TransferFunctionFit, as_state_space, fit_transfer_function
+from swashplate.arrays import Array
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.frequency.transfer_function_fit import (
+    TransferFunctionFit,
+    as_state_space,
+    fit_transfer_function,
+)
+from swashplate.identification.responses.respond import respond
+from swashplate.identification.time.linear_simulation import delayed, free_and_forced
+from swashplate.models.conventional.helicopter_vehicle import conventional
+from swashplate.models.conventional.new_card import new_card
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.theme import BLACK, BLUE, GREEN, VERMILION
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.lpv import simulate_lpv
 from swashplate.simulation.reduction import LONGITUDINAL, PAPER_INPUTS, PAPER_STATES, paper_model, part, residualise
 from swashplate.simulation.wind import dryden, outdoor
-from swashplate.vehicles.conventional import conventional
-from swashplate.vehicles.new_card import new_card
-from swashplate.vehicles.vehicle import Vehicle
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 RATE = 100.0
@@ -226,7 +232,7 @@ def paper_figures() -> None:
             row = [(words, black, shown), model]
             for form, name, style in (("0/0", "gain and delay", blue), ("1/2", "one zero, two poles", green)):
                 fit = identified(columns, time, pair, form)
-                print(f"  {fit.models[0]!r}   J = {fit.cost:.0f}")
+                print(f"  {fit.model[0]!r}   J = {fit.cost:.0f}")
                 row.append((name, style, {pair[0]: answered(fit, columns, pair, here)}))
             rates.append((pair[0], time[here], row))
         title = f"Fig. {number + 2}: {pair[0]} in the {axis} sweep, with identified transfer functions.\n{SAID}"
@@ -266,7 +272,7 @@ def trex_figure(file: Path) -> None:
         fit = identified(
             {name: values[:cut] for name, values in columns.items()}, time[:cut], pair, "0/0", band=(0.1, 2.0)
         )
-        print(f"  {fit.models[0]!r}   J = {fit.cost:.0f}")
+        print(f"  {fit.model[0]!r}   J = {fit.cost:.0f}")
         row: list[Line] = [
             ("T-Rex 550", (BLACK, "-"), {pair[0]: columns[pair[0]][here]}),
             ("gain and delay", (BLUE, "-."), {pair[0]: answered(fit, columns, pair, here)}),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import swashplate as sp
 from swashplate.reporting.pictures import prediction_picture
@@ -63,29 +64,27 @@ def missed(validation: sp.Validation) -> list[str]:
     return found
 
 
-def parameters(fit: sp.Fit) -> str:
+def parameters(fit: sp.Result[Any, Any]) -> str:
     lines = [
         "| parameter | unit | published | identified | ± σ (corrected) | |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for e in fit.parameters:
+    for e in fit.estimates:
         if not e.tie:
             bound = "at its bound" if e.at_bound else ""
             unit = e.unit or "1"
-            lines.append(
-                f"| `{e.name}` | {unit} | {e.published:.4g} | {e.value:.4g} | {e.sigma_corrected:.2g} | {bound} |"
-            )
+            lines.append(f"| `{e.name}` | {unit} | {e.start:.4g} | {e.value:.4g} | {e.sigma_corrected:.2g} | {bound} |")
     return "\n".join(lines)
 
 
-def of_the_flight(fit: sp.Fit) -> str:
+def of_the_flight(fit: sp.Result[Any, Any]) -> str:
     units = {"1": ""}
     return ", ".join(
-        f"{e.name} {e.value:.3f} ± {e.sigma:.2g} {units.get(e.unit, e.unit)}".rstrip() for e in fit.record_estimates
+        f"{e.name} {e.value:.3f} ± {e.sigma:.2g} {units.get(e.unit, e.unit)}".rstrip() for e in fit.constants
     )
 
 
-def section(learnt: str, predicted: str, fit: sp.Fit, validation: sp.Validation) -> str:
+def section(learnt: str, predicted: str, fit: sp.Result[Any, Any], validation: sp.Validation) -> str:
     """One direction: what was identified, how it predicts, what is missed, the verdict."""
     misses = missed(validation)
     total = sum(len(channels) for channels in WANTED.values())

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import swashplate as sp
-from swashplate.control.stability_limit import Limit, limit
+from swashplate.control.analysis.stability_limit import Limit, limit
 from swashplate.errors import ControllerError
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "stability-limit.png"

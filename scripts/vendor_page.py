@@ -2,12 +2,15 @@
 
     python scripts/vendor_page.py            does nothing where the folder is current
     python scripts/vendor_page.py --if-npm   the same, but without npm only says so
+    python scripts/vendor_page.py --pin      after a change of the lock: the files' hashes are written down anew
 
 Needs Node's npm; run by `make test` and when a wheel is built. Users of a wheel need neither.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shutil
 import subprocess
 import sys
@@ -18,6 +21,8 @@ ROOT = Path(__file__).resolve().parent.parent
 WEB = ROOT / "web"
 VENDOR = ROOT / "src" / "swashplate" / "links" / "live" / "page" / "vendor"
 STAMP = "package-lock.json"
+HASHES = VENDOR.parent.parent / "libraries.json"
+"""SHA-256 of each file; the server refuses to serve others. With `--pin` they are those of what was fetched."""
 FILES = {
     "three/build/three.module.min.js": "three.module.min.js",
     "three/build/three.core.min.js": "three.core.min.js",
@@ -30,18 +35,30 @@ FILES = {
 
 
 def current() -> bool:
-    """Whether the folder holds every file, taken under the lock file as it is now."""
+    """Whether the folder holds every file as pinned, taken under the lock file as it is now."""
     stamp, lock = VENDOR / STAMP, WEB / "package-lock.json"
-    whole = all((VENDOR / name).is_file() for name in FILES.values())
-    return whole and stamp.is_file() and stamp.read_bytes() == lock.read_bytes()
+    return not changed() and stamp.is_file() and stamp.read_bytes() == lock.read_bytes()
 
 
-def fetch() -> None:
+def digests() -> dict[str, str]:
+    """SHA-256 of the files that are there."""
+    there = [name for name in FILES.values() if (VENDOR / name).is_file()]
+    return {name: hashlib.sha256((VENDOR / name).read_bytes()).hexdigest() for name in there}
+
+
+def changed() -> list[str]:
+    """Files that are missing or are not those that were pinned."""
+    pinned, found = json.loads(HASHES.read_text(encoding="utf-8")), digests()
+    return [name for name in FILES.values() if name not in found or found[name] != pinned.get(name)]
+
+
+def fetch(*, pin: bool = False) -> None:
     """Install the locked packages in a temporary folder (no scripts of theirs run) and copy what the page needs.
 
     Raises:
         FileNotFoundError: where npm is missing.
         subprocess.CalledProcessError: where it fails (no network, a hash that differs).
+        ValueError: where a file is not the one that was pinned, unless it is pinned now.
     """
     npm = shutil.which("npm")
     if npm is None:
@@ -53,15 +70,20 @@ def fetch() -> None:
         VENDOR.mkdir(parents=True, exist_ok=True)
         for source, name in FILES.items():
             shutil.copyfile(Path(folder) / "node_modules" / source, VENDOR / name)
+    if pin:
+        HASHES.write_text(json.dumps(digests(), indent=2) + "\n", encoding="utf-8")
+    if changed():
+        raise ValueError(f"{', '.join(changed())}: not as in {HASHES.name}; after a new version run with --pin")
     shutil.copyfile(WEB / "package-lock.json", VENDOR / STAMP)  # last: an interrupted run is done again
 
 
 def main() -> int:
-    if current():
+    pin = "--pin" in sys.argv[1:]
+    if current() and not pin:
         return 0
     try:
-        fetch()
-    except (FileNotFoundError, subprocess.CalledProcessError) as error:
+        fetch(pin=pin)
+    except (FileNotFoundError, ValueError, subprocess.CalledProcessError) as error:
         print(f"The live page's libraries could not be fetched: {error}.", file=sys.stderr)
         return 0 if "--if-npm" in sys.argv[1:] else 1
     print(f"Written: {VENDOR.relative_to(ROOT)}")

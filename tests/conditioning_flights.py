@@ -10,7 +10,8 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.signal import chirp
 from scipy.spatial.transform import Rotation
 
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
 
 Array = NDArray[np.float64]
 G = 9.80665

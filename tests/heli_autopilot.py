@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from made_autopilot_logs import Row, dataflash
-from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 
 MAGIC_16, MAGIC_32 = 18458, 29569
 Send = Callable[[bytes], bytes | None]
@@ -88,6 +88,10 @@ SETPOINT, RAMP, RUN_UP = 0.66, 8.0, 15.0
 """H_RSC_SETPOINT as a share, H_RSC_RAMP_TIME and H_RSC_RUNUP_TIME [s]."""
 
 
+EKF_WAIT = 40.0
+"""s from the start until the firmware's EKF has aligned and found its place, before which it refuses to be armed."""
+
+
 class LowPass:
     """First or second order (Butterworth), from its first sample on."""
 
@@ -120,6 +124,7 @@ class HeliAutopilot:
         rate: frames per second [Hz] (SIM_RATE_HZ). every: the loops run in every so many of them.
         outputs: 16 or 32.
         sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
+        sticks: roll, pitch, yaw and collective that reach the servos while it does not fly.
         log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
     """
 
@@ -131,6 +136,7 @@ class HeliAutopilot:
     armed: bool = False
     interlock: bool = False
     height: float = 0.0
+    sticks: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     sweep: tuple[int, Callable[[float], float]] | None = None
     count: int = 0
     log: list[tuple[float, ...]] = field(default_factory=list)
@@ -165,6 +171,22 @@ class HeliAutopilot:
     def fly(self, seconds: float) -> dict[str, list[float]]:
         for _ in range(round(seconds * self.rate)):
             state = self.exchange()
+        return state
+
+    def wait_for_ekf(self, seconds: float = EKF_WAIT, *, seed: int = 0) -> dict[str, list[float]]:
+        """Disarmed on the ground for as long as the EKF takes, at 100 frames a second; the pilot stirs the sticks.
+
+        What moves meanwhile is refused, as the firmware does ("gyros still settling", "EKF velocity variance").
+        """
+        flown, random = self.rate, np.random.default_rng(seed)
+        self.rate = 100
+        for _ in range(round(2.0 * seconds)):
+            roll, pitch, yaw, collective = random.uniform((-1.0, -1.0, -1.0, 0.0), 1.0).tolist()
+            self.sticks = (roll, pitch, yaw, collective)
+            state = self.fly(0.5)
+            moving = max(map(abs, state["gyro"] + state["velocity"]))
+            assert moving < 0.02, f"the EKF does not settle: {moving:.3g} rad/s or m/s on the ground"
+        self.rate, self.sticks = flown, (0.0, 0.0, 0.0, 0.0)
         return state
 
     def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
@@ -221,6 +243,7 @@ class HeliAutopilot:
         else:
             self._heading = attitude[2]
             self._sums[:] = 0.0
+            mixer, collective = np.array(self.sticks[:3]), self.sticks[3]
         mixer = np.clip(mixer, -1.0, 1.0)
         mixer[:2] *= min(1.0, CYCLIC / max(1e-9, math.hypot(mixer[0], mixer[1])))
         self.collective = collective

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.flights.flight import Flight, stream
+from swashplate.models.card import Card, Parameter
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
-from swashplate.vehicles.card import Card, Parameter
-from swashplate.vehicles.vehicle import Vehicle
 
 MASS, TILT, V0, CHORD, AREA, TURN, ARM = 7472.0, 0.0524, 104.67, 1.215, 4.028e-3, 8.0027e-4, -7.0153e-6
 """Mass [kg], engine's tilt [rad], speed [m/s] and chord [m] of reference, S/m, Sc/Iy, thrust's arm over Iy."""

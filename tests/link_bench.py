@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from swashplate.links.ardupilot.session import Session
+from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.notices import Notices
-from swashplate.links.plant import Plant, Surroundings
+from swashplate.links.plant import Plant, Surroundings, unflown
+from swashplate.links.recorder import Recorder
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import servo_mapping
+from swashplate.models.catalogue import vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
-from swashplate.vehicles.catalogue import vehicle
 
 
 @dataclass
 class Bench:
     """A session and what it said; `send` is the loss-free line to it."""
 
-    session: Session
+    session: ArduPilotSession
     plant: Plant
     said: list[str]
+    recorder: Recorder | None = None
     sender: tuple[str, int] = ("127.0.0.1", 50_001)
     now: float = 0.0
     sent: int = field(default=0)
@@ -39,10 +42,16 @@ def bench(
     unit: InertialUnit | None = None,
     seed: int = 0,
     sag: float = 0.0,
-    record_rate: float = 0.0,
+    record: Path | None = None,
+    record_rate: float = 200.0,
 ) -> Bench:
     made = standing(vehicle(name))
     around = Surroundings(environment or Environment(), sag)
-    plant = Plant(made, servo_mapping(name, made), around, record_rate=record_rate)
     said: list[str] = []
-    return Bench(Session(plant, Sensing(plant, unit=unit, seed=seed), Notices(said.append)), plant, said)
+    recorder = None
+    if record is not None:
+        recorder = Recorder(record, like=unflown(made, record_rate=record_rate), say=said.append)
+    plant = Plant(made, servo_mapping(name, made), around, recorder=recorder, record_rate=record_rate)
+    return Bench(
+        ArduPilotSession(plant, Sensing(plant, unit=unit, seed=seed), Notices(said.append)), plant, said, recorder
+    )

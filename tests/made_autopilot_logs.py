@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.ardupilot_chirp import Chirp
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 
 Row = tuple[str, tuple[Any, ...]]
 

@@ -10,10 +10,11 @@ import numpy as np
 import tomli_w
 from scipy.linalg import expm, solve_continuous_are
 
-from swashplate.flights.flight import Flight, Provenance, stream
-from swashplate.flights.maneuvers import Maneuver
-from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_file import parse, structure, to_toml
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.flights.provenance import Provenance
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import parse, structure, to_toml
 
 RATE = 100.0
 NOISE = {"p": 0.005, "q": 0.005, "r": 0.005, "ax": 0.05, "ay": 0.05, "az": 0.05, "u": 0.03, "v": 0.03, "w": 0.03}
@@ -22,15 +23,18 @@ AMPLITUDE = {"lateral": 0.3, "longitudinal": 0.4, "pedal": 0.2, "collective": 0.
 DELAYS = {"tau_lat": 0.03, "tau_lon": 0.03, "tau_ped": 0.02, "tau_col": 0.04}
 
 
-def truth(data: Path) -> StateSpaceModel:
-    """The published hover derivatives (Mettler, Tischler and Kanade) in the 13-state structure."""
+def truth(data: Path, flight: str = "hover") -> StateSpaceModel:
+    """The published derivatives (Mettler, Tischler and Kanade) in the 13-state structure, in hover or at 15 m/s."""
     names = {"tf": "tau_f", "ts": "tau_s"}
     with (data / "vehicles" / "derivs_mettler_r50.csv").open(encoding="utf-8") as file:
-        rows = {names.get(r["param"], r["param"]): float(r["hover_SI"]) for r in csv.DictReader(file)}
+        rows = {names.get(r["param"], r["param"]): float(r[f"{flight}_SI"]) for r in csv.DictReader(file)}
     model = without_angles(structure("thirteen_state"))
     model = model.with_values({n: v for n, v in rows.items() if n in model.free} | DELAYS)
-    # Zero in hover, and fixed there by Mettler, too.
-    return model.with_values(dict.fromkeys(("Lw", "Mw", "Mcol", "Yped"), 0.0), free=False)
+    if flight == "cruise":
+        model = model.with_values({"U0": 15.0})
+    # What is zero is fixed there by Mettler, too.
+    absent = [n for n, v in rows.items() if v == 0.0 and n in model.free]
+    return model.with_values(dict.fromkeys(absent, 0.0), free=False)
 
 
 def without_angles(model: StateSpaceModel) -> StateSpaceModel:
@@ -41,7 +45,9 @@ def without_angles(model: StateSpaceModel) -> StateSpaceModel:
     return parse(tomli_w.dumps(document))
 
 
-def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0, gust: float = 0.2) -> Flight:
+def fly(
+    model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0, gust: float = 0.2, size: float = 1.0
+) -> Flight:
     """One sweep record: the loop holds the helicopter and moves every control, the pilot mixes a little.
 
     Args:
@@ -50,6 +56,7 @@ def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0,
         seed: of gust and noise.
         seconds: length.
         gust: standard deviation of the wind along each axis [m/s], correlated over 1.5 s.
+        size: of the sweep, in `AMPLITUDE`.
     """
     random = np.random.default_rng(seed)
     a, b, c, d = model.explicit()
@@ -69,7 +76,7 @@ def fly(model: StateSpaceModel, axis: str, *, seed: int, seconds: float = 120.0,
     phi, g0, g1 = step[:n, :n], step[:n, n : n + k], step[:n, n + k :]
     count = round(seconds * RATE)
     time = np.arange(count) * dt
-    sweep = Maneuver("sweep", (axis,), seconds - 6.0, AMPLITUDE[axis], (0.05, 6.0)).signals(time - 3.0)[axis]
+    sweep = Maneuver("sweep", (axis,), seconds - 6.0, size * AMPLITUDE[axis], (0.05, 6.0)).signals(time - 3.0)[axis]
     place = model.inputs.index(axis)
     mixing = 0.15 * random.standard_normal(m)
     mixing[place] = 1.0

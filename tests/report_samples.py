@@ -6,11 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.flight import Array, Flight, Provenance, stream
-from swashplate.identification.fit import AxisExcitation, Comparison, Direction, Estimate, Fit, RecordEstimate
-from swashplate.identification.kinematics import PREDICTED
-from swashplate.identification.records import POSE, Record
-from swashplate.identification.stochastic import Noise, Nuisance
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.records import POSE, Record
+from swashplate.identification.core.result import Constant, Direction, Estimate, Result
+from swashplate.identification.core.sources import sources_of
+from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.models.catalogue import vehicle
 from swashplate.simulation.linearize import Mode
 from swashplate.validation.validation import (
     PREDICTORS,
@@ -20,7 +27,6 @@ from swashplate.validation.validation import (
     Score,
     Validation,
 )
-from swashplate.vehicles.catalogue import vehicle
 
 INPUTS = ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")
 HORIZONS = (0.5, 1.0, 2.0, 5.0)
@@ -80,7 +86,7 @@ def record(of: Flight, *, start: int = 0, stop: int | None = None) -> Record:
 
 def fit(
     *, name: str = "sweep.mat", failed: bool = False, simulated: bool = False, method: str = "prediction-error"
-) -> Fit:
+) -> Result[Any, Any]:
     """A fit of the CoaX to two pieces of a flight."""
     flown = flight(name=name, simulated=simulated)
     rng = np.random.default_rng(2)
@@ -124,14 +130,13 @@ def fit(
     covariance = half @ half.T + np.eye(5)
     scale = np.sqrt(np.diag(covariance))
     identified = published.with_values(values, status="identified", source="identified from sweep.mat")
-    return Fit(
-        vehicle=identified,
-        published=published,
+    return Result(
         method=method,
-        choice="full",
-        parameters=tuple(estimates),
-        record_estimates=tuple(
-            RecordEstimate(log, n, u, v, s)
+        model=identified,
+        start=published,
+        estimates=tuple(estimates),
+        constants=tuple(
+            Constant(log, n, u, v, s)
             for log in dict.fromkeys(c.record.log for c in comparisons)
             for n, u, v, s in (("delay_servo", "s", 0.021, 0.002), ("lever_y", "m", 0.17, 0.004))
         ),
@@ -142,30 +147,32 @@ def fit(
         covariance_corrected=4.0 * covariance,
         correlation=covariance / np.outer(scale, scale),
         directions=(Direction({"inertia_zz": 0.8, "damping_r": 0.6}, 2.5, "inertia_zz and damping_r up together"),),
-        excitation=(
-            AxisExcitation(
-                flown.provenance.source, "roll", "servo_roll", 0.6, 0.8, -1.2, 0.05, True, "Moved by itself."
-            ),
-            AxisExcitation(
-                flown.provenance.source,
-                "yaw",
-                "motor_upper - motor_lower",
-                0.99,
-                0.99,
-                1.6,
-                0.02,
-                False,
-                "The command answers the motion. Fly a yaw sweep on the reference.",
-            ),
+        details=FlightDetails(
+            excitation=(
+                AxisExcitation(
+                    flown.provenance.source, "roll", "servo_roll", 0.6, 0.8, -1.2, 0.05, True, "Moved by itself."
+                ),
+                AxisExcitation(
+                    flown.provenance.source,
+                    "yaw",
+                    "motor_upper - motor_lower",
+                    0.99,
+                    0.99,
+                    1.6,
+                    0.02,
+                    False,
+                    "The command answers the motion. Fly a yaw sweep on the reference.",
+                ),
+            )
         ),
         history=(5000.0, 3200.0, 3100.0, 3099.5),
         converged=True,
         problems=("inertia_zz ended at its physical bound.",) if failed else (),
         failed=failed,
         comparisons=tuple(comparisons),
-        flights=(flown,),
+        data=sources_of([flown]),
         seconds=12.3,
-        settings={"free": "full", "flights": [name], "max_iterations": 30},
+        settings={"choice": "full", "flights": [name], "max_iterations": 30},
     )
 
 

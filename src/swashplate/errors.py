@@ -8,6 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 
+def _shortened(text: str, longest: int) -> str:
+    """A text whose middle is left out where nobody would read it: a file's content may stand in a message."""
+    return text if len(text) <= longest else f"{text[: longest // 2]} [...] {text[7 - longest // 2 :]}"
+
+
 class SwashError(Exception):
     """Base of every error that a user's input can cause.
 
@@ -30,9 +35,17 @@ class SwashError(Exception):
         self.where = None if where is None else str(where)
         self.channel = channel
         self.hint = hint
-        place = ": ".join(part for part in (self.where, channel) if part)
-        text = f"{place}: {problem}" if place else problem
-        super().__init__(f"{text} {hint}" if hint else text)
+        place = ": ".join(_shortened(part, 250) for part in (self.where, channel) if part)
+        text = f"{place}: {_shortened(problem, 800)}" if place else _shortened(problem, 800)
+        super().__init__(f"{text} {_shortened(hint, 500)}" if hint else text)
+
+
+class WriteError(SwashError):
+    """A file or folder that cannot be written: no space, no permission, no such folder."""
+
+
+class DocumentError(SwashError):
+    """A TOML or JSON document that cannot be read or says something impossible."""
 
 
 class FlightError(SwashError):

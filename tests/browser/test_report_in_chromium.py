@@ -11,11 +11,12 @@ import pytest
 import swashplate as sp
 from chromium import Visit, running_browser
 from report_samples import fit, modes, validation
-from swashplate.control.check import check_controller
-from swashplate.control.straightness import step_run
-from swashplate.reporting.control_check import control_report
+from swashplate.control.analysis.check import check_controller
+from swashplate.control.analysis.straightness import step_run
+from swashplate.reporting.control_check import compose_check
+from swashplate.reporting.html import write_page
 from swashplate.reporting.report import report
-from swashplate.reporting.straightness import straightness_report
+from swashplate.reporting.straightness import compose_straightness
 
 NASTY = "<script>document.title='broken'</script><img src=x onerror=\"document.title='broken'\">.mat"
 SIZES = {"desk": (1200, 900), "telephone": (390, 844)}
@@ -48,8 +49,8 @@ def controllers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
     check = check_controller(coax, sp.autopilot(coax, hover), hover, duration=6.0)
     return {
-        "check": control_report(check, path=folder / "check.html"),
-        "path": straightness_report(coax, runs, command=0.2, lag=17.0, path=folder / "path.html"),
+        "check": write_page(folder / "check.html", compose_check(check)),
+        "path": write_page(folder / "path.html", compose_straightness(coax, runs, command=0.2, lag=17.0)),
     }
 
 

@@ -15,7 +15,7 @@ from scipy.io import savemat
 from made_logs import coax_record, dimensions, write_coax
 from simulated_flights import FREE, TIE
 from swashplate.flights.flight import Flight
-from swashplate.vehicles.card import packaged_cards
+from swashplate.models.card import packaged_cards
 
 LONG = 600  # samples: 4 s, long enough for what is not about length
 SERVOS = ("servo_roll", "servo_pitch")
@@ -240,7 +240,7 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--free", "tau_f_uper"), ("tau_f_uper",)),
         (("--free", "mass,mass"), ("twice",)),
         (("--unit", "x"), ("--unit", "NAME=VALUE")),
-        (("--wind", "--method", "output-error"), ("--wind", "prediction-error")),
+        (("--wind", "--method", "output-error"), ("wind", "'output-error' does not know it", "choose another method")),
         (("--cutoff", "80"), ("80",)),
         (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
     ],

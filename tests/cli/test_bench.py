@@ -14,13 +14,13 @@ from commands import one_message, swash
 
 import swashplate as sp
 from simulated_flights import FREE, TIE
-from swashplate.flights.bench_record import BenchRecord, write_record
-from swashplate.identification.bench.evaluate import MEASURED, evaluate
-from swashplate.identification.bench.plan import plan, planned
+from swashplate.bench.evaluate import MEASURED, evaluate
+from swashplate.bench.plan import plan, planned
+from swashplate.bench.record import BenchRecord, write_record
+from swashplate.bench.virtual_bench import virtual_bench
+from swashplate.models.card import read_card
 from swashplate.reporting.bench import compose_bench
 from swashplate.reporting.structure import Table
-from swashplate.simulation.bench import virtual_bench
-from swashplate.vehicles.card import read_card
 
 
 @pytest.fixture(scope="module")

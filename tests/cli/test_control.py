@@ -17,7 +17,7 @@ def test_a_design_is_flown_from_its_file(tmp_path: Path) -> None:
     made = swash("control", "design", "coax", "--method", "lqr", "--delay", "servo_roll=20", "--out", file)
     assert made.code == 0, made.err
     assert "all at once: gain" in made.out
-    assert "servo_roll 20 ms" in made.out
+    assert "late: servo_roll 20 ms (as given); computation: not known" in made.out
     command = ("simulate", "--vehicle", "coax", "--controller", file, "--maneuver", "doublet:pitch,0.5s,0.1")
     outcome = swash(*command, "--out", flown, "--quiet")
     assert outcome.code == 0, outcome.err
@@ -67,7 +67,7 @@ def test_a_state_space_file_is_held_with_its_delays(tmp_path: Path) -> None:
     file, flown = tmp_path / "lqr.toml", tmp_path / "f.nc"
     made = swash("control", "design", "thirteen_state", "--method", "lqr", "--out", file)
     assert made.code == 0, made.err
-    assert "lateral 20 ms, longitudinal 20 ms, pedal 20 ms, collective 20 ms" in made.out
+    assert "lateral 20 ms, longitudinal 20 ms, pedal 20 ms, collective 20 ms (identified)" in made.out
     assert "range of lateral, longitudinal, pedal, collective: assumed, 1 either way" in made.err
     command = (
         "simulate",
@@ -103,7 +103,7 @@ def test_a_card_without_a_number_is_named(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_held_is_named(tmp_path: Path) -> None:
-    from swashplate.identification.state_space_file import structure, to_toml
+    from swashplate.models.linear.state_space_file import structure, to_toml
 
     model = structure("six_dof")
     floating = tmp_path / "floating.toml"

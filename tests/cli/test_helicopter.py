@@ -11,10 +11,10 @@ import pytest
 from commands import one_message, swash
 
 from swashplate.flights.flight import Flight
-from swashplate.vehicles.card import read_card
-from swashplate.vehicles.catalogue import vehicle
-from swashplate.vehicles.helicopter_parameters import ADDED, MEANING
-from swashplate.vehicles.new_card import new_card as new_card_of
+from swashplate.models.card import read_card
+from swashplate.models.catalogue import vehicle
+from swashplate.models.conventional.helicopter_parameters import ADDED, MEANING
+from swashplate.models.conventional.new_card import new_card as new_card_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -245,7 +245,7 @@ def _changed(text: str, name: str, **entries: object) -> str:
     ("name", "value", "said"),
     [
         ("mass", -5, "is -5, expected more than 0"),
-        ("mass", "nan", "value is nan, expected a finite number"),
+        ("mass", "nan", "is nan, expected a finite number"),
         ("mass", '"heavy"', "value is 'heavy', expected a number"),
         ("mass", "true", "value is True, expected a number"),
         ("inertia_yy", -0.1, "is -0.1, expected more than 0"),
@@ -279,7 +279,7 @@ def test_a_card_with_a_number_that_no_helicopter_has(
     card = tmp_path / "mine.toml"
     card.write_text(_changed(new_card, name, value=value), encoding="utf-8")
     message = one_message(swash("trim", card))
-    assert message.startswith(f"Error: {card}: {name}: ")
+    assert message.startswith((f"Error: {card}: {name}: ", f"Error: {card}: parameters.{name}.value: "))
     assert said in message
 
 
@@ -376,7 +376,10 @@ def test_a_new_card_that_cannot_be_is_not_written(arguments: tuple[str, ...], sa
         (("--maneuver", "doublet:roll,0.5s,0.02", "--gusts", "3"), "is for --monte-carlo"),
         (("--maneuver", "doublet:roll,0.5s,0.02", "--pilot"), "is for a --controller"),
         (("--maneuver", "doublet:roll,0.5s,0.02", "--plot", "flight.pdf"), "ends in '.pdf', expected .html"),
-        (("--maneuver", "doublet:roll,0.5s,0.02", "--monte-carlo", "9", "--json"), "--json: is for one flight"),
+        (
+            ("--maneuver", "doublet:roll,0.5s,0.02", "--monte-carlo", "9", "--json"),
+            "--monte-carlo: needs a --controller",
+        ),
     ],
 )
 def test_a_simulation_that_cannot_be_leaves_no_file(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,32 +9,26 @@ import pytest
 from commands import swash
 
 import swashplate as sp
-from swashplate.control.linear_draws import draw_parameters, entries_of, vary_parameters
+from made_results import result
+from swashplate.control.draws.linear_draws import entries_of, vary_parameters
+from swashplate.control.draws.robustness import draw_models
 from swashplate.errors import ControllerError
-from swashplate.identification.state_space_file import structure
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import structure
 
 
-def fit_of(path: Path, **changes: object) -> Path:
+def fit_of(path: Path, model: StateSpaceModel | None = None, free: tuple[str, str] = ("Lb", "Ma")) -> Path:
     """A fit.json as `swash fit-ss` writes it, of two parameters that are nearly one."""
-    model = structure("thirteen_state")
-    free = ("Lb", "Ma")
-    document = {
-        "kind": "state-space-fit",
-        "model": model.name,
-        "free": list(free),
-        "correlation": [[1.0, 0.95], [0.95, 1.0]],
-        "parameters": [
-            {"name": n, "value": model.parameters[n].value, "cramer_rao": 0.05 * model.parameters[n].value}
-            for n in free
-        ],
-    }
-    path.write_text(json.dumps(document | changes))
-    return path
+    model = model or structure("thirteen_state")
+    values = {name: model.parameters[name].value for name in free}
+    sigma = np.array([0.05 * value for value in values.values()])
+    covariance = np.array([[1.0, 0.95], [0.95, 1.0]]) * np.outer(sigma, sigma)
+    return result(model, values, covariance).save(path)
 
 
 def test_draws_keep_the_fits_correlation_and_ties_follow(tmp_path: Path) -> None:
     model = structure("thirteen_state")
-    drawn = draw_parameters(model, fit_of(tmp_path / "fit.json"), count=400, seed=1)
+    drawn = draw_models(model, fit_of(tmp_path / "fit.json"), count=400, seed=1)
     assert np.corrcoef(drawn["Lb"], drawn["Ma"])[0, 1] == pytest.approx(0.95, abs=0.02)
     assert np.std(drawn["Lb"]) == pytest.approx(0.05 * 166.0, rel=0.1)
     both = vary_parameters(model, {"tau_f": 0.02}, count=400, seed=2, about=drawn)
@@ -45,10 +38,8 @@ def test_draws_keep_the_fits_correlation_and_ties_follow(tmp_path: Path) -> None
     A = model.with_values({name: float(values[3]) for name, values in few.items()}).explicit()[0]
     a, q = model.states.index("a"), model.states.index("q")
     assert entries["a_by_q"][3] == pytest.approx(A[a, q])
-    with pytest.raises(ControllerError, match=r"is of another model: .* has no Mq"):
-        draw_parameters(model, fit_of(tmp_path / "fit.json", free=["Mq"]), count=2, seed=1)
-    with pytest.raises(ControllerError, match="found 'time-fit', expected 'state-space-fit'"):
-        draw_parameters(model, fit_of(tmp_path / "fit.json", kind="time-fit"), count=2, seed=1)
+    with pytest.raises(ControllerError, match=r"is of another model: .* has no Lp, Mq"):
+        draw_models(model, fit_of(tmp_path / "fit.json", structure("six_dof"), ("Lp", "Mq")), count=2, seed=1)
 
 
 def test_linear_models_are_flown_in_many_versions(tmp_path: Path) -> None:
@@ -70,7 +61,7 @@ def test_linear_models_are_flown_in_many_versions(tmp_path: Path) -> None:
         (("--gusts", "indoor", "--payload", "0.1"), "--gusts, --payload: a linear model has no equations for wind"),
         (("--tolerances",), "no number of the file has a Cramér-Rao bound"),
         (("--vary", "Mq=5%"), "Mq: is no parameter of the model"),
-        (("--fit", worst), "cannot be read as a fit"),
+        (("--fit", worst), "is no text file, expected JSON. `swash identify"),
     ):
         refused = swash(*many, *options)
         assert refused.code == 2

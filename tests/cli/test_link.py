@@ -82,6 +82,37 @@ def test_a_link_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert flight.values("motor_lower")[-1] == pytest.approx(0.3)
 
 
+def test_a_killed_link_loses_nothing_of_what_it_answered(tmp_path: Path) -> None:
+    """`kill -9` in flight, beside an older file of that name; the next link saves the flight before it begins."""
+    record = tmp_path / "flown.nc"
+    record.write_text("an older flight")
+    command = [sys.executable, "-m", "swashplate", "link", "ardupilot", "--vehicle", "coax", "--port", "0"]
+    with (
+        subprocess.Popen([*command, "--record", str(record)], stderr=subprocess.PIPE, text=True) as link,
+        ExitStack() as clean,
+    ):
+        clean.callback(link.kill)
+        assert link.stderr is not None
+        found = re.search(r"UDP (\S+):(\d+)", link.stderr.readline())
+        assert found
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+            client.settimeout(10.0)
+            client.connect(("127.0.0.1", int(found[2])))
+            for count in range(400):
+                client.send(servo_packet(400, count, [*IDLE[:4], 1300, 1300]))
+                told = json.loads(client.recv(4096))
+        link.send_signal(signal.SIGKILL)
+    left = sp.read(tmp_path / "flown-2.growing")
+    assert left.stop == pytest.approx(told["timestamp"], abs=0.006)
+    assert left.provenance.damage == ()
+    again = swash("link", "ardupilot", "--vehicle", "coax", "--port", "0", "--idle-exit", "0.1", "--record", record)
+    assert again.code == 0, again.err
+    assert "an earlier recording was cut off; its 1.0 s are saved" in " ".join(again.err.split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["flown-2.nc", "flown.nc"]
+    assert sp.read(tmp_path / "flown-2.nc").streams["uniform"].identical(left.streams["uniform"])
+    assert record.read_text() == "an older flight"
+
+
 def test_a_model_file_is_a_vehicle(tmp_path: Path) -> None:
     file = tmp_path / "model.toml"
     sp.vehicle("coax").with_values({"mass": 0.333}, source="test", status="identified").save(file)

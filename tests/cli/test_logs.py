@@ -8,7 +8,7 @@ from pathlib import Path
 from commands import one_message, swash
 
 from made_autopilot_logs import ardupilot_rows, dataflash, ulog
-from swashplate.identification.state_space_file import structure, to_toml
+from swashplate.models.linear.state_space_file import structure, to_toml
 
 
 def test_a_log_is_shown_with_rates_and_sweeps(tmp_path: Path) -> None:

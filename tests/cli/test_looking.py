@@ -11,8 +11,8 @@ from commands import swash
 
 from swashplate.flights.datasets import REGISTRY
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import read
-from swashplate.vehicles.card import packaged_cards
+from swashplate.flights.readers.read import read
+from swashplate.models.card import packaged_cards
 
 
 def test_inspect_shows_streams_channels_and_problems(simulated: Path) -> None:

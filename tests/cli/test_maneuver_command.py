@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from commands import one_message, swash
 
-from swashplate.flights.ardupilot_chirp import Chirp
-from swashplate.flights.maneuvers import parse
-from swashplate.flights.readers import read
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
+from swashplate.flights.maneuvers.series import parse
+from swashplate.flights.readers.read import read
 
 SWEEP = "sweep:roll,0.5-8Hz,60s,0.1"
 

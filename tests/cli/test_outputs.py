@@ -16,50 +16,44 @@ from commands import one_message, swash
 import swashplate as sp
 from swashplate.cli.console import as_json
 from swashplate.cli.outputs import folder_when_complete
+from swashplate.filtering.disturbed_model import Nuisance
 from swashplate.flights.flight import Flight
-from swashplate.identification.fit import Estimate, Fit
-from swashplate.identification.stochastic import Nuisance
+from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.core.sources import sources_of
+from swashplate.identification.time.flight_details import FlightDetails
+from swashplate.models.vehicle import Vehicle
 from swashplate.validation.validation import AxisVerdict, Score, Validation
-from swashplate.vehicles.vehicle import Vehicle
 
 
-def _fit(vehicle: Vehicle, flights: list[Flight]) -> Fit:
+def _fit(vehicle: Vehicle, flights: list[Flight]) -> Result[Any, Any]:
     one = np.eye(1)
     estimate = Estimate("tau_f_upper", "s", 1.6, 1.3, 0.02, float("nan"))
-    return Fit(
-        vehicle=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
-        published=vehicle,
+    return Result(
         method="prediction-error",
-        choice="given",
-        parameters=(estimate,),
-        record_estimates=(),
-        noise=None,
-        nuisance=Nuisance(),
+        model=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
+        start=vehicle,
+        estimates=(estimate,),
         names=("tau_f_upper",),
         covariance=one,
         covariance_corrected=one,
         correlation=one,
-        directions=(),
-        excitation=(),
+        details=FlightDetails(),
+        nuisance=Nuisance(),
         history=(3.0, 1.0),
-        converged=True,
-        problems=(),
-        failed=False,
-        comparisons=(),
-        flights=tuple(flights),
+        data=sources_of(flights),
         seconds=0.5,
     )
 
 
-def _validation(fit: Fit, flights: list[Flight]) -> Validation:
+def _validation(fit: Result[Any, Any], flights: list[Flight]) -> Validation:
     scores = [
         Score(channel, 1.0, predictor, fit_percent, 0.02, 0.3, 40)
         for channel in ("phi", "theta")
         for predictor, fit_percent in (("model", 81.0), ("published card", 35.0), ("hold", 0.0))
     ]
     return Validation(
-        vehicle=fit.vehicle,
-        published=fit.published,
+        vehicle=fit.model,
+        published=fit.start,
         scores=tuple(scores),
         innovations=(),
         log_likelihood={},
@@ -81,7 +75,7 @@ class Work:
         self.changes: dict[str, Any] = {}
         self.trouble: BaseException | None = None
 
-    def identify(self, vehicle: Vehicle, flights: list[Flight], *, progress: Any, **asked: Any) -> Fit:
+    def identify(self, vehicle: Vehicle, flights: list[Flight], *, progress: Any, **asked: Any) -> Result[Any, Any]:
         self.asked = {"vehicle": vehicle, "flights": flights, **asked}
         progress(1, 2.0)
         return replace(_fit(vehicle, flights), **self.changes)
@@ -89,10 +83,11 @@ class Work:
     def validate(self, model: Any, flights: list[Flight], *, progress: Any, **asked: Any) -> Validation:
         progress(0, 1)
         self.asked |= {"model": model, "hold_outs": flights, **asked}
-        fit = model if isinstance(model, Fit) else _fit(model, flights)
+        fit = model if isinstance(model, Result) else _fit(model, flights)
         return _validation(fit, flights)
 
-    def report(self, fit: Any = None, validation: Any = None, *, path: Path, title: str | None = None) -> Path:
+    def report(self, *results: Any, path: Path, title: str | None = None) -> Path:
+        fit = next((one for one in results if isinstance(one, Result)), None)
         if self.trouble is not None:
             raise self.trouble
         Path(path).write_text(f"{'FAILED' if fit and fit.failed else 'fine'} {title}", encoding="utf-8")
@@ -123,7 +118,7 @@ def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simula
     assert _names(tmp_path) == ["deep"]
     assert _names(tmp_path / "deep") == ["fit"]
     assert sp.vehicle(out / "model.toml").card.values()["tau_f_upper"] == 1.3
-    assert json.loads((out / "fit.json").read_text())["parameters"][0]["sigma_corrected"] is None  # NaN is not JSON
+    assert json.loads((out / "fit.json").read_text())["estimates"][0]["sigma_corrected"] is None  # NaN is not JSON
     last = outcome.out.rstrip().splitlines()[-6:]
     assert [line.split(":")[0] for line in last] == ["What", "Fit", "Prediction", "Verdict", "Beware", "Report"]
     assert "81" in last[2]
@@ -190,7 +185,7 @@ def test_trouble_leaves_the_folder_as_it_was(
 
 def test_json_is_all_that_stands_on_standard_output(work: Work, simulated: Path) -> None:
     document = json.loads(_identify(simulated, "--json").out)
-    assert document["fit"]["parameters"][0]["name"] == "tau_f_upper"
+    assert document["fit"]["estimates"][0]["name"] == "tau_f_upper"
     assert document["validation"] is None
     assert json.loads(swash("validate", "--model", "coax", "--flight", simulated, "--json").out)["kind"] == "validation"
 

@@ -10,7 +10,7 @@ import pytest
 from commands import swash
 
 from made_autopilot_logs import Row, dataflash
-from swashplate.flights.ardupilot_chirp import Chirp
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 
 CHIRP = Chirp(axis=12, magnitude=0.1, start_hz=0.15, stop_hz=8.0, record=40.0, fade_in=2.0, fade_out=1.0, dwell=13.0)
 DAMPING, EFFECT, DELAY = 1.2, 25.0, 0.05
@@ -60,7 +60,7 @@ def test_from_a_yaw_sweep_to_gains(tmp_path: Path) -> None:
     done = swash("fit-ss", "yaw", responses, "--gains", "--json")
     assert done.code == 0, done.err
     document = json.loads(done.out)
-    found = {p["name"]: p["value"] for p in document["fit"]["parameters"]}
+    found = {p["name"]: p["value"] for p in document["fit"]["estimates"]}
     assert found["Nr"] == pytest.approx(-DAMPING, rel=0.05)
     assert found["Nped"] == pytest.approx(EFFECT, rel=0.03)
     assert found["tau_yaw"] == pytest.approx(DELAY - 0.5 / 400.0, abs=0.002)  # a step acts at once, half a step early

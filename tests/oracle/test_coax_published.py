@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from swashplate.errors import TrimError
+from swashplate.models.catalogue import vehicle
 from swashplate.physics import rotor
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import LABORATORY_GRAVITY
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from scipy import io
 from scipy.interpolate import CubicSpline
 
 from swashplate.errors import IdentificationError
-from swashplate.identification.equation_error import equation_error, stepwise
+from swashplate.identification.time.equation_error import equation_error, stepwise
 
 
 def test_stepwise_regression_chooses_and_finds_what_sidpac_does(shared_data: Path) -> None:

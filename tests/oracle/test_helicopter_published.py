@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swashplate.models.catalogue import vehicle
+from swashplate.models.conventional.buildup import build_up
+from swashplate.models.conventional.derivative_table import DerivativeTable
+from swashplate.models.published import read_published
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim, trim
-from swashplate.vehicles.buildup import build_up
-from swashplate.vehicles.catalogue import vehicle
-from swashplate.vehicles.derivatives import DerivativeTable
-from swashplate.vehicles.published import read_published
-from swashplate.vehicles.vehicle import Vehicle
 
 AIR = Environment(air_density=1.225, gravity=9.81)
 

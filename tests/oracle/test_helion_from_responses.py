@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_file import structure
-from swashplate.identification.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import structure
 
 TAU = 1.0 / 8.1222
 HELION = {
@@ -75,6 +75,6 @@ def test_with_three_times_the_noise_each_mode_is_as_far_off_as_its_bound_says(tr
     off = {n: truth.parameters[n].value * (1.0 + 0.3 * random.choice([-1.0, 1.0])) for n in truth.free}
     fit = fit_state_space(truth.with_values(off), measured(truth, noise=0.03), starts=2)
     known = truth.eigenvalues()
-    for mode in fit.modes:
+    for mode in fit.details.modes:
         error = min(abs(known - mode.eigenvalue))
         assert error < 0.03 * mode.frequency + 2.0 * mode.frequency_bound, mode

@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swashplate.flights.flight import Array
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.start_values import at_flown_trim
-from swashplate.identification.state_space_file import structure
-from swashplate.identification.state_space_fit import fit_state_space
-from swashplate.identification.state_space_result import StateSpaceFit
+from swashplate.arrays import Array
+from swashplate.identification.frequency.start_values import at_flown_trim
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_result import StateSpaceFit
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space_file import structure
 
 STATES = ("theta", "phi", "p", "q", "r", "u", "v", "w")
 INPUTS = ("collective", "longitudinal", "lateral", "pedal")

@@ -10,12 +10,13 @@ import pytest
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, stream
-from swashplate.identification.equation_error import equation_error
-from swashplate.identification.linear_frequency_fit import fit_in_frequency
-from swashplate.identification.linear_simulation import delayed, hold_matrices
-from swashplate.identification.linear_time_fit import fit_in_time
-from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_file import parse, structure
+from swashplate.identification.time.equation_error import equation_error
+from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
+from swashplate.identification.time.linear_simulation import delayed
+from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import parse, structure
+from swashplate.simulation.discretisation import first_order_hold
 
 
 def model(
@@ -94,13 +95,13 @@ def test_aircraft_in_turbulence_comes_back_with_its_bounds(shared_data: Path) ->
     # By the rates alone, which the gusts move: bounds hold where gusts are in the model, and nowhere else.
     for method, rms, worst in (("filter-error", 1.3, 3.0), ("prediction-error", 1.3, 3.0)):
         fit = fit_in_time(aircraft("", "LN"), flight, method=method)
-        off = np.array([(p.value - truth[p.name]) / p.cramer_rao for p in fit.parameters])
+        off = np.array([(p.value - truth[p.name]) / p.sigma for p in fit.estimates])
         assert fit.converged
         assert np.sqrt(np.mean(off**2)) < rms, method  # measured: 1.0 and 0.9
         assert np.max(np.abs(off)) < worst, method
         assert fit["Lp"].value == pytest.approx(truth["Lp"], rel=0.2)
     naive = fit_in_time(aircraft("", "LN"), flight, iterations=25)
-    off = np.array([(p.value - truth[p.name]) / p.cramer_rao for p in naive.parameters])
+    off = np.array([(p.value - truth[p.name]) / p.sigma for p in naive.estimates])
     assert np.max(np.abs(off)) > 8.0
 
 
@@ -110,7 +111,7 @@ def test_delays_and_heave_come_back_with_their_bounds() -> None:
     time = np.arange(2000) * 0.01
     u = np.cumsum(random.standard_normal(time.size)) * 0.01
     truth = structure("heave").with_values({"Zw": -2.25, "Zcol": -27.43, "tau_collective": 0.0527})
-    phi, q0, q1 = hold_matrices(*truth.explicit()[:2], 0.01)
+    phi, q0, q1 = first_order_hold(*truth.explicit()[:2], 0.01)
     late, w = delayed(u, 5.27)[:, None], np.zeros((time.size, 1))
     for k in range(1, time.size):
         w[k] = phi @ w[k - 1] + q0 @ late[k - 1] + q1 @ (late[k] - late[k - 1])
@@ -119,8 +120,8 @@ def test_delays_and_heave_come_back_with_their_bounds() -> None:
     flight = Flight({"uniform": stream(time, {"mixer_collective": u, "az": az}, {"mixer_collective": "1"})})
     fit = fit_in_time(structure("heave"), flight, shifts=False)
     for name, value in (("Zw", -2.25), ("Zcol", -27.43), ("tau_collective", 0.0527)):
-        assert abs(fit[name].value - value) < 3.0 * fit[name].cramer_rao
-        assert fit[name].cramer_rao < 0.03 * abs(value)
+        assert abs(fit[name].value - value) < 3.0 * fit[name].sigma
+        assert fit[name].sigma < 0.03 * abs(value)
 
 
 def test_gusts_need_the_innovations() -> None:
@@ -139,9 +140,9 @@ def test_gusts_need_the_innovations() -> None:
     found = fit_in_time(aircraft, flight, shifts=False, method="prediction-error")
     assert found.converged
     for name, value in (("Lp", -1.0), ("Lstick", 2.0)):
-        assert abs(found[name].value - value) < 3.0 * found[name].cramer_rao, found
+        assert abs(found[name].value - value) < 3.0 * found[name].sigma, found
     naive = fit_in_time(aircraft, flight, shifts=False)
-    assert abs(naive["Lp"].value + 1.0) > 4.0 * naive["Lp"].cramer_rao  # its bound knows nothing of gusts
+    assert abs(naive["Lp"].value + 1.0) > 4.0 * naive["Lp"].sigma  # its bound knows nothing of gusts
 
 
 def test_what_the_fit_in_time_cannot_do_is_said() -> None:

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from made_autopilot_logs import PX4LOG, ardupilot_rows, dataflash, dataflash_text, px4_rows, ulog
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import clocked, read
+from swashplate.flights.readers import clocked
+from swashplate.flights.readers.read import read
 
 few = settings(max_examples=60, deadline=None, derandomize=True)
 

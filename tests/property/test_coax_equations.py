@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swashplate.models import catalogue
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend, FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.simulation.dynamics import enable_double_precision, rates_function
-from swashplate.vehicles import catalogue
-from swashplate.vehicles.vehicle import Vehicle
 
 FLOATS = FloatBackend()
 SEED = st.integers(0, 2**32 - 1)

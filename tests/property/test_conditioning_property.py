@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swashplate.errors import FlightError
-from swashplate.flights.attitude import continuous, euler_from_quaternion, quaternion_from_euler
-from swashplate.flights.condition import condition
+from swashplate.flights.conditioning.attitude import continuous, euler_from_quaternion, quaternion_from_euler
+from swashplate.flights.conditioning.condition import condition
+from swashplate.flights.conditioning.outliers import outliers
+from swashplate.flights.conditioning.resample import resample
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.outliers import outliers
-from swashplate.flights.resample import resample
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swashplate.errors import ExpressionError
-from swashplate.identification.expressions import Expression, parse_tie
+from swashplate.models.linear.expressions import Expression, parse_tie
 
 NAMES = ("mass", "a_beta_u", "tau")
 VALUES = {"mass": 0.3, "a_beta_u": -1.25, "tau": 1.6}

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from swashplate.errors import CardError
+from swashplate.models import catalogue
+from swashplate.models.conventional.helicopter import Controls, loads
+from swashplate.models.nesting import leaves, rebuild
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend, FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.simulation.dynamics import enable_double_precision, rates_function
-from swashplate.vehicles import catalogue
-from swashplate.vehicles.conventional import Controls, loads
-from swashplate.vehicles.structure import leaves, rebuild
-from swashplate.vehicles.vehicle import Vehicle
 
 FLOATS = FloatBackend()
 EVERYTHING = {

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.control.ardupilot_gains import suggest_gains
+from swashplate.control.analysis.ardupilot_gains import suggest_gains
 from swashplate.flights.flight import Flight
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.respond import respond
-from swashplate.identification.state_space_file import structure
-from swashplate.identification.state_space_fit import fit_state_space
-from swashplate.identification.transfer_function_fit import fit_transfer_function
-from swashplate.identification.verification import verify
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.respond import respond
+from swashplate.models.linear.state_space_file import structure
+from swashplate.validation.verification import verify
 
 A = np.array([[0, 0, 3588.6, 0], [0, 0, 0, 617.5], [-1, 0, -14.6559, 18.9984], [0, -1, -19.6418, -14.6559]])
 B = np.array([[0, 0], [0, 0], [3.58967, -1.24391], [1.06772, 3.95150]])
@@ -111,7 +111,7 @@ def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     s = 1j * found.omega[:, None, None]
     assert np.max(gain_errors(found, -27.43 * s / (s + 2.25))) < 0.3
     fit = fit_transfer_function(found, "0/1-1s", input="mixer_collective", band=(0.15, 7.0))
-    values = fit.models[0].values
+    values = fit.model[0].values
     assert fit.cost < 5.0
     assert values["K"] == pytest.approx(-27.43, rel=0.03)
     assert values["pole"] == pytest.approx(2.25, rel=0.03)
@@ -132,12 +132,26 @@ def test_given_windows_that_blur_are_said(shared_data: Path) -> None:
     )
 
 
-def test_the_model_follows_a_log_that_no_fit_has_seen(shared_data: Path, responses: FrequencyResponse) -> None:
+def test_a_log_that_no_fit_has_seen_refutes_wrong_models_and_not_the_identified_one(
+    shared_data: Path, responses: FrequencyResponse
+) -> None:
     """A roll-rate sweep of 3 s under the rate loop, in time."""
     fit = fit_state_space(structure("rotor_body"), responses)
-    found = verify(fit.model, flight(shared_data, "heli_sid_allbits_roll_rate.BIN", *INPUTS, *OUTPUTS))
+    unseen = flight(shared_data, "heli_sid_allbits_roll_rate.BIN", *INPUTS, *OUTPUTS)
+    found = verify(fit.model, unseen)
     assert found.cost < 0.4, found
     assert all(found[name].theil < 0.03 for name in OUTPUTS), found
+    assert found.verdict == "not refuted", found
+    values = {name: fit[name].value for name in ("Lb", "Ma", "Blat", "Alon")}
+    wrong = [
+        {"Blat": -values["Blat"], "Alon": -values["Alon"]},
+        *({name: factor * values[name]} for name in values for factor in (0.5, 1.5)),
+    ]
+    verdicts = {str(change): verify(fit.model.with_values(change), unseen).verdict for change in wrong}
+    # Half more Lb moves the pitch rate by 1.0 times what is allowed there: these 3 s of a roll sweep cannot tell.
+    borderline = verdicts.pop(str({"Lb": 1.5 * values["Lb"]}))
+    assert borderline == "not refuted"
+    assert set(verdicts.values()) == {"refuted"}, verdicts
 
 
 def test_a_log_that_was_cut_off_is_named_and_what_is_left_is_used(shared_data: Path, tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import read
+from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.flights.readers.dataflash import messages
-from swashplate.flights.sweeps import sweeps
+from swashplate.flights.readers.read import read
 
 # NOTES.md beside the logs: file, axis, magnitude, band, fades and record as flown, rate of the fast messages.
 FLOWN = [

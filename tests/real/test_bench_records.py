@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.bench.bar_orientation import cone_of
+from swashplate.bench.evaluate import Bench, evaluate
+from swashplate.bench.record_files import read_bench, read_records
+from swashplate.bench.record_tables import read_rig, read_table
+from swashplate.bench.result import BenchFinding
+from swashplate.bench.speed_map import fit_map
+from swashplate.bench.supply import together
+from swashplate.bench.thrust_loss import thrust_loss
 from swashplate.errors import BenchError, FlightError
-from swashplate.flights.bench_files import read_bench, read_records
-from swashplate.flights.bench_tables import read_rig, read_table
-from swashplate.identification.bench.bar_orientation import cone_of
-from swashplate.identification.bench.evaluate import Bench, evaluate
-from swashplate.identification.bench.result import Finding
-from swashplate.identification.bench.speed_map import fit_map
-from swashplate.identification.bench.supply import together
-from swashplate.identification.bench.thrust_loss import thrust_loss
 
 PUBLISHED = {"upper": (421.3723, -0.2555), "lower": (437.7036, -2.9047)}
 
@@ -37,20 +37,20 @@ def test_speed_map_without_dead_zone_and_saturation_is_the_published_one(shared_
     ]
 
 
-def _bench(shared_data: Path, *files: str) -> tuple[Bench, dict[str, Finding]]:
+def _bench(shared_data: Path, *files: str) -> tuple[Bench, dict[str, BenchFinding]]:
     records = read_records(*(shared_data / file for file in files))
     found = evaluate(records, sp.vehicle("coax"))
-    return found, {f.name: f for result in found.results for f in result.findings}
+    return found, {f.name: f for result in found.details.results for f in result.findings}
 
 
 def test_the_whole_command_gives_the_same_map_and_says_what_it_does_not_know(shared_data: Path) -> None:
     found, _ = _bench(shared_data, "coax56/bench_input_to_rpm.mat")
     for rotor, (slope, offset) in PUBLISHED.items():
         for name, value in ((f"k_drive_{rotor}", slope), (f"o_drive_{rotor}", offset)):
-            entry = found.card.parameters[name]
+            entry = found.model.card.parameters[name]
             assert abs(entry.value - value) < 2.0 * (entry.sigma or 0.0)
-    assert len(found.results[0].left_out) == 6
-    doubts = [check.words for check in found.results[0].checks if not check.good]
+    assert len(found.details.results[0].left_out) == 6
+    doubts = [check.words for check in found.details.results[0].checks if not check.good]
     assert any("the voltage was not recorded" in words for words in doubts)
 
 
@@ -63,7 +63,7 @@ def test_speed_against_voltage(shared_data: Path) -> None:
     mean, sigma, apart = together([s.value for s in slopes], [s.sigma for s in slopes])
     assert abs(apart) < 3.0  # one factor for both rotors is not contradicted
     assert abs(mean - 13.6) < 2.0 * sigma  # the card's
-    entry = found.card.parameters["k_drive_voltage"]
+    entry = found.model.card.parameters["k_drive_voltage"]
     assert (entry.value, entry.sigma) == pytest.approx((mean, sigma))
 
 
@@ -90,7 +90,7 @@ def test_the_bar_tells_how_far_it_leans_and_not_how_fast(shared_data: Path) -> N
     found, findings = _bench(shared_data, "coax56/stabilizer_bar_orientation.mat")
     assert found.names == ()
     assert findings["largest lean of the bar from its mean plane"].value == pytest.approx(angles.max())
-    assert any("A time constant cannot be had" in check.words for check in found.results[0].checks)
+    assert any("A time constant cannot be had" in check.words for check in found.details.results[0].checks)
 
 
 def test_a_coaxial_pair_loses_thrust_against_two_single_propellers(shared_data: Path) -> None:
@@ -119,7 +119,7 @@ def test_the_whole_rig_by_its_files(shared_data: Path) -> None:
     (loss,) = findings.values()  # the pair whose lower propeller is marked +2 has no run of that propeller alone
     assert loss.value == pytest.approx(0.154, abs=0.001)
     assert loss.sigma == pytest.approx(0.0044, abs=0.0003)
-    (result,) = found.results
+    (result,) = found.details.results
     assert len(result.tables) == 5  # four set-ups and the loss
     assert any("+2: no run of the same propellers alone" in check.words for check in result.checks)
 

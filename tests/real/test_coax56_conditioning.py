@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate.flights.condition import condition, replay
-from swashplate.flights.derive import derive
+from swashplate.flights.conditioning.condition import condition, replay
+from swashplate.flights.conditioning.derive import derive
+from swashplate.flights.conditioning.ground import flying_interval
+from swashplate.flights.conditioning.lever_arm import lever_arm, move_to_cg, percussion_offset
+from swashplate.flights.conditioning.outliers import remove_outliers
+from swashplate.flights.conditioning.reconstruction import reconstruct
 from swashplate.flights.flight import Flight
-from swashplate.flights.ground import flying_interval
-from swashplate.flights.lever_arm import lever_arm, move_to_cg, percussion_offset
-from swashplate.flights.outliers import remove_outliers
-from swashplate.flights.readers import read
-from swashplate.flights.reconstruction import reconstruct
+from swashplate.flights.readers.read import read
 
 # Card values (params_coax.csv): inertia, hub stiffness of both rotors, thrust times height of both rotors in hover.
 PERCUSSION = percussion_offset(
@@ -23,7 +23,7 @@ PERCUSSION = percussion_offset(
 
 @cache
 def conditioned(path: Path) -> Flight:
-    return condition(read(path))
+    return condition(read(path), cutoff=15.0)
 
 
 def test_july_ends_before_the_yaw_breaks_away(flight_july: Path) -> None:
@@ -42,7 +42,7 @@ def test_august_ends_where_something_holds_it(flight_august: Path) -> None:
     found = flying_interval(remove_outliers(read(flight_august)))
     assert 39.0 < found.stop < 41.0
     assert "held" in found.reasons[-1]
-    rest = condition(read(flight_august), trim_ground=False).between(42.0, 44.0)
+    rest = condition(read(flight_august), trim_ground=False, cutoff=15.0).between(42.0, 44.0)
     free = conditioned(flight_august)
     for flight, low, high in ((rest, 0.8, 1.5), (free, 0.0, 0.15)):
         assert low < np.linalg.norm(np.mean(flight.array(("ax", "ay")), axis=0)) < high
@@ -87,7 +87,7 @@ def test_the_tracked_point_lies_far_to_the_right(
         assert coherence > 0.7
     assert abs(found.x.value) < 0.04
     assert abs(found.z.value) < 0.02
-    moved = derive(move_to_cg(condition(read(path), derive=False), found.vector))
+    moved = derive(move_to_cg(condition(read(path), derive=False, cutoff=15.0), found.vector))
     left = lever_arm(moved)
     assert abs(left.y.value) < 0.01
     assert np.std(moved.values("ax")) < 0.6 * np.std(conditioned(path).values("ax"))

@@ -14,32 +14,32 @@ RIVALS = ("published card", "hold", "constant rates")
 
 
 @pytest.fixture(scope="module")
-def fit(flight_august: Path) -> sp.Fit:
+def fit(flight_august: Path) -> sp.Result:
     return sp.identify(sp.vehicle("coax"), sp.read(flight_august).condition(rate=100.0, cutoff=0.0))
 
 
 @pytest.fixture(scope="module")
-def validation(fit: sp.Fit, flight_july: Path) -> sp.Validation:
+def validation(fit: sp.Result, flight_july: Path) -> sp.Validation:
     july = sp.read(flight_july).condition(rate=100.0, cutoff=0.0)
     return sp.validate(fit, july, horizons=HORIZONS)
 
 
-def test_every_identified_value_is_physical(fit: sp.Fit) -> None:
+def test_every_identified_value_is_physical(fit: sp.Result) -> None:
     assert fit.converged
     assert not fit.failed
-    for estimate in fit.parameters:
-        parameter = fit.vehicle.card.parameters[estimate.name]
+    for estimate in fit.estimates:
+        parameter = fit.model.card.parameters[estimate.name]
         assert parameter.lower is None or estimate.value >= parameter.lower
         assert parameter.upper is None or estimate.value <= parameter.upper
-    values = fit.vehicle.card.values()
+    values = fit.model.card.values()
     assert values["inertia_zz"] > 0.0
     # An inertia cannot exceed the sum of the other two.
     assert values["inertia_zz"] < values["inertia_xx"] + values["inertia_yy"]
 
 
-def test_the_tracked_point_is_far_from_the_centre_of_gravity(fit: sp.Fit) -> None:
+def test_the_tracked_point_is_far_from_the_centre_of_gravity(fit: sp.Result) -> None:
     """0.17 m or more to the right, as the regression of the measured accelerations says independently."""
-    levers = {e.name: e.value for e in fit.record_estimates if e.name.startswith("lever")}
+    levers = {e.name: e.value for e in fit.constants if e.name.startswith("lever")}
     assert np.hypot(levers["lever_x"], levers["lever_y"]) == pytest.approx(0.188, abs=0.03)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.control.lqg_design import design
-from swashplate.control.observer import Unrest
-from swashplate.control.observer_log import Along, along, at_centre
-from swashplate.control.sensor_suite import suite
+from swashplate.control.lqg.design import design
+from swashplate.control.lqg.observer_log import Along, along, at_centre
+from swashplate.filtering.disturbances import Unrest
+from swashplate.filtering.sensor_suite import suite
 from swashplate.validation.innovations import check
 
 LEARNT = {

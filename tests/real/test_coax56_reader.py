@@ -13,7 +13,7 @@ from swashplate.errors import FlightError
 from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import inspect
-from swashplate.flights.readers import read
+from swashplate.flights.readers.read import read
 from swashplate.flights.schema import POSITION, QUATERNION
 
 GRAVITY = 9.81

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy import io
 
-from swashplate.flights.flight import Flight, Provenance, stream
-from swashplate.identification.respond import respond
-from swashplate.identification.response_cost import cost_of, target
-from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function
-from swashplate.identification.verification import verify_inside
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.frequency.response_cost import cost_of, target
+from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
+from swashplate.identification.responses.respond import respond
+from swashplate.validation.verification import verify_inside
 
 
 def x8(folder: Path, part: slice) -> Flight:
@@ -37,12 +38,14 @@ def test_x8_second_order_model_of_one_half_answers_as_the_other_half(shared_data
     early = respond(x8(shared_data, slice(0, n // 2)), inputs=["command"], outputs=["p"], band=(0.2, 10.0))
     unseen = target(early, "p", "command", band=(0.7, 8.7))
     assert unseen is not None
-    assert cost_of(fit.models[0].response(unseen.omega), unseen) < 100.0
+    assert cost_of(fit.model[0].response(unseen.omega), unseen) < 100.0
     # In time on that half, within the fitted band, it is good. Below the band the loop answers disturbances with slow
     # commands, which a model this near to an integrator adds up: 5.9 rad/s of error over the whole record.
     verified = verify_inside(as_state_space(fit), x8(shared_data, slice(0, n // 2)), band=(0.7, 8.7))
     assert verified.inside is not None
-    assert verified.inside.good, verified
+    assert verified.inside.cost < 2.0
+    # Behind the noise filter half a sweep up to 3 Hz hardly stands out of what shakes this aircraft.
+    assert verified.verdict == "cannot be judged", verified
     assert verified.inside["p"].theil < 0.15
     assert not verified.good
 
@@ -82,9 +85,9 @@ def test_sidpac_frequency_domain_example(shared_data: Path) -> None:
         responses = respond(flight, inputs=["stick"], outputs=["out"], band=(0.02, 1.0), windows=[80.0, 40.0, 20.0])
         fit = fit_transfer_function(responses, "1/2", input="stick")
         assert fit.cost < 50.0
-        for parameter in fit.parameters:
+        for parameter in fit.estimates:
             off = abs(parameter.value - truth[parameter.name])
-            assert off < 0.03 * truth[parameter.name] + sigmas * parameter.cramer_rao, (key, parameter)
+            assert off < 0.03 * truth[parameter.name] + sigmas * parameter.sigma, (key, parameter)
 
 
 @pytest.mark.parametrize("rows", [slice(0, 10), slice(0, 60)])

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 import swashplate as sp
-from swashplate.flights.flight import Array, Flight
+from swashplate.arrays import Array
+from swashplate.flights.flight import Flight
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.sensors import MotionCapture
-from swashplate.vehicles.vehicle import Vehicle
 
 MANEUVER = "sweep:pitch,0.5-8Hz,34s"
 """The band that Fankhauser et al. flew; 40 s with the hover before and after it."""
@@ -82,7 +83,7 @@ def recover(
     if unbroken:
         logged = logged.between(logged.start, logged.start + 39.505)
     fit = sp.identify(vehicle.with_values(OFF), logged, free="flight", method=method, wind=wind)
-    free = [estimate for estimate in fit.parameters if not estimate.tie]
+    free = [estimate for estimate in fit.estimates if not estimate.tie]
     known = vehicle.card.values()
     return Recovery(
         names=tuple(estimate.name for estimate in free),

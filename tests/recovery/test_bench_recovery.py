@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.flights.bench_record import BenchRecord
-from swashplate.identification.bench.evaluate import MEASURED, Bench, evaluate, hover_commands, schedules
-from swashplate.identification.bench.tilt import torques
-from swashplate.simulation.bench import Schedule, Setup, virtual_bench
-from swashplate.vehicles.card import parse_card
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.bench.evaluate import MEASURED, Bench, evaluate, hover_commands, schedules
+from swashplate.bench.record import BenchRecord
+from swashplate.bench.tilt import torques
+from swashplate.bench.virtual_bench import RecordSchedule, Setup, virtual_bench
+from swashplate.models.card import parse_card
+from swashplate.models.vehicle import Vehicle
 
 TRUTH = {
     "k_drive_upper": 405.0,
@@ -44,7 +44,7 @@ def aircraft() -> Vehicle:
     return sp.vehicle("coax").with_values(TRUTH)
 
 
-def _planned() -> list[Schedule]:
+def _planned() -> list[RecordSchedule]:
     return schedules(hover_commands(sp.vehicle("coax").card.values()))
 
 
@@ -59,8 +59,8 @@ def bench(aircraft: Vehicle) -> Bench:
 
 def _away(benches: Sequence[Bench], truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Errors and promised sigmas, shape (seeds, parameters)."""
-    values = np.array([[b.card.parameters[n].value - truth[n] for n in MEASURED] for b in benches])
-    return values, np.array([[b.card.parameters[n].sigma for n in MEASURED] for b in benches])
+    values = np.array([[b.model.card.parameters[n].value - truth[n] for n in MEASURED] for b in benches])
+    return values, np.array([[b.model.card.parameters[n].sigma for n in MEASURED] for b in benches])
 
 
 def _leave(name: str, title: str, text: str, inside: float, ratio: dict[str, float]) -> None:
@@ -113,7 +113,7 @@ def test_bounds_of_findings_hold_over_a_hundred_seeds(hundred: list[Bench], airc
     lost = Setup().interference
     truth = {f"thrust of the {rotor} rotor alone over coaxial, less one": lost for rotor in ("upper", "lower")}
     truth |= {f"torque of the {rotor} rotor alone over coaxial, less one": 0.0 for rotor in ("upper", "lower")}
-    by_seed = [{f.name: f for result in b.results for f in result.findings} for b in hundred]
+    by_seed = [{f.name: f for result in b.details.results for f in result.findings} for b in hundred]
     errors = np.array([[found[name].value - value for name, value in truth.items()] for found in by_seed])
     sigmas = np.array([[found[name].sigma for name in truth] for found in by_seed])
     inside, ratio = _spread(errors, sigmas, list(truth))
@@ -172,23 +172,23 @@ def test_what_is_held_widens_the_bounds_and_is_correlated(aircraft: Vehicle) -> 
     records = [s for s in _planned() if s.name == "swashplate"]
     alone = evaluate(virtual_bench(aircraft, records, seed=1), exact)
     for name in ("linkage_lower", "hub_stiffness_lower"):
-        assert bench.card.parameters[name].sigma > 3.0 * alone.card.parameters[name].sigma
-    told = [c.words for result in alone.results for c in result.checks]
+        assert bench.model.card.parameters[name].sigma > 3.0 * alone.model.card.parameters[name].sigma
+    told = [c.words for result in alone.details.results for c in result.checks]
     assert any("k_thrust_lower = " in words and "no bound: taken as exact, 1 % of it moves" in words for words in told)
-    told = [c.words for result in bench.results for c in result.checks]
+    told = [c.words for result in bench.details.results for c in result.checks]
     assert any("hub_height_lower = " in words and "+-" in words for words in told)
     # A thrust factor that is too large makes the same force a smaller tilt; a hub too high leaves too little flapping.
-    assert bench.card.correlations["k_thrust_lower"]["linkage_lower"] < -0.9
-    assert bench.card.correlations["hub_height_lower"]["hub_stiffness_lower"] < -0.1
+    assert bench.model.card.correlations["k_thrust_lower"]["linkage_lower"] < -0.9
+    assert bench.model.card.correlations["hub_height_lower"]["hub_stiffness_lower"] < -0.1
     # The derivative itself: another factor held, another estimate.
-    by = next(r for r in bench.results if r.procedure == "swashplate").leans_on["k_thrust_lower"]
+    by = next(r for r in bench.details.results if r.procedure == "swashplate").leans_on["k_thrust_lower"]
     step = 1e-3 * exact.card.values()["k_thrust_lower"]
     record = virtual_bench(aircraft, records, seed=1)
     moved = [
         np.array([b[n].value for n in ("linkage_lower", "hub_stiffness_lower")])
         for sign in (1.0, -1.0)
         for held in [exact.card.values()["k_thrust_lower"] + sign * step]
-        for b in [evaluate(record, exact.with_values({"k_thrust_lower": held})).card.parameters]
+        for b in [evaluate(record, exact.with_values({"k_thrust_lower": held})).model.card.parameters]
     ]
     np.testing.assert_allclose((moved[0] - moved[1]) / (2.0 * step), by, rtol=0.01)
 
@@ -209,13 +209,13 @@ def test_bounds_with_uncertain_held_parameters_hold_over_a_hundred_seeds(aircraf
 
 
 def test_the_card_says_what_was_measured_and_how(bench: Bench, aircraft: Vehicle) -> None:
-    assert bench.kept == ()
+    assert bench.details.kept == ()
     assert set(bench.names) == set(MEASURED)
-    entry = bench.card.parameters["k_drive_upper"]
+    entry = bench.model.card.parameters["k_drive_upper"]
     assert (entry.status, entry.source) == ("measured", "bench: speed_map from sweep_upper.csv")
-    assert bench.card.parameters["mass"] == sp.vehicle("coax").card.parameters["mass"]
-    assert bench.card.parameters["k_zeta_upper"].status == "derived"
-    again = parse_card(bench.card.to_toml())
+    assert bench.model.card.parameters["mass"] == sp.vehicle("coax").card.parameters["mass"]
+    assert bench.model.card.parameters["k_zeta_upper"].status == "derived"
+    again = parse_card(bench.model.card.to_toml())
     sigma = np.sqrt(np.diag(bench.covariance))
     found = again.covariance(bench.names) / np.outer(sigma, sigma)
     np.testing.assert_allclose(found, bench.covariance / np.outer(sigma, sigma), atol=1.1e-4)  # smaller are not written
@@ -225,7 +225,7 @@ def test_the_card_says_what_was_measured_and_how(bench: Bench, aircraft: Vehicle
 
 
 def test_interference_is_found_and_dead_zone_and_saturation_are_left_out(bench: Bench) -> None:
-    by_name = {result.procedure: result for result in bench.results}
+    by_name = {result.procedure: result for result in bench.details.results}
     found = {f.name: f for f in by_name["single_rotor"].findings}
     for rotor in ("upper", "lower"):
         for load, lost in (("thrust", 0.15), ("torque", 0.0)):
@@ -241,13 +241,13 @@ def test_interference_is_found_and_dead_zone_and_saturation_are_left_out(bench: 
 def test_a_bench_of_thin_air_gives_the_factors_at_the_card_s_density(aircraft: Vehicle) -> None:
     found = evaluate(_records(aircraft, 2, Setup(air_density=0.95)), sp.vehicle("coax"))
     for name in ("k_thrust_lower", "drag_x", "hub_stiffness_lower"):
-        entry = found.card.parameters[name]
+        entry = found.model.card.parameters[name]
         assert abs(entry.value - aircraft.card.values()[name]) < 4.0 * entry.sigma
 
 
 def test_figure_6_from_a_bench_of_the_published_aircraft() -> None:
     coax = sp.vehicle("coax")
-    card = evaluate(_records(coax, 3), coax).card.values()
+    card = evaluate(_records(coax, 3), coax).model.card.values()
     hover = card["k_thrust_lower"] * 238.97**2
     total, flapping, tilting = (
         1e3 * float(curve[0])

@@ -14,10 +14,10 @@ import swashplate as sp
 from heli_autopilot import HeliAutopilot
 from link_bench import bench
 from swashplate.cli.app import app
-from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.flights.flight import Flight
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.vehicles.catalogue import vehicle
+from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.catalogue import vehicle
 
 RATE = 200
 BAND = (0.5, 6.0)
@@ -128,7 +128,7 @@ def test_the_sweep_stays_about_hover(logs: list[Path]) -> None:
 def test_the_roll_mode_is_fitted(responses: FrequencyResponse, truth: Callable[[np.ndarray], np.ndarray]) -> None:
     """A second-order roll response: its slow pole is the roll subsidence of the linearised helicopter."""
     fit = sp.fit_transfer_function(responses.select(("p",), ("mixer_roll",)), "0/2", input="mixer_roll")
-    values = fit.models[0].values
+    values = fit.model[0].values
     damping, natural = values["zeta_pole"], values["omega_pole"]
     slow = natural * (damping - math.sqrt(damping**2 - 1.0))
     free = vehicle("raptor50", rotor_speed="throttle")
@@ -136,5 +136,5 @@ def test_the_roll_mode_is_fitted(responses: FrequencyResponse, truth: Callable[[
     expected = min((-m.real for m in modes if abs(m.imag) < 1e-9 and m.real < -6.0), key=lambda r: abs(r - 10.0))
     assert fit.cost < 10.0
     assert slow == pytest.approx(expected, rel=0.05)
-    ratio = fit.models[0].response(responses.omega) / truth(responses.omega)[:, 0, 0]
+    ratio = fit.model[0].response(responses.omega) / truth(responses.omega)[:, 0, 0]
     assert np.abs(20.0 * np.log10(np.abs(ratio[responses.omega > 2.0 * np.pi]))).max() < 0.5

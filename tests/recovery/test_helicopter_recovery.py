@@ -11,19 +11,19 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli.app import app
-from swashplate.control.state_hold import state_hold
+from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Flight, Provenance, stream
-from swashplate.identification.choices import choices_for
-from swashplate.identification.parameters import parameterize
-from swashplate.identification.respond import respond
-from swashplate.identification.start_values import from_linear_model
-from swashplate.identification.state_space_file import structure
-from swashplate.identification.state_space_fit import fit_state_space
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.frequency.start_values import from_linear_model
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.responses.respond import respond
+from swashplate.models.catalogue import vehicle
+from swashplate.models.linear.state_space_file import structure
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import trim
-from swashplate.vehicles.catalogue import vehicle
 
 TRUE = {"hub_stiffness": 35.0, "wake_distortion": 1.0, "blade_inertia": 0.023}
 
@@ -92,7 +92,7 @@ def test_they_come_back_by_prediction_error_and_the_model_predicts_another_fligh
 
 
 def test_ready_choices_follow_the_card_and_its_options() -> None:
-    plain, barred = (choices_for(vehicle("raptor50", bar=switch)) for switch in (False, True))
+    plain, barred = (vehicle("raptor50", bar=switch).choices for switch in (False, True))
     assert "bar_gain" not in {free.name for free in plain["full"].free}
     assert {"bar_gain", "bar_inertia"} < {free.name for free in barred["full"].free}
     prior = next(free for free in plain["full"].free if free.name == "hub_stiffness")
@@ -102,7 +102,9 @@ def test_ready_choices_follow_the_card_and_its_options() -> None:
 
 
 def test_a_choice_for_coaxial_helicopters_is_refused() -> None:
-    with pytest.raises(IdentificationError, match=r"is for another kind of vehicle.\s+Ready here: rotor, full"):
+    with pytest.raises(
+        IdentificationError, match=r"has neither a ready choice nor a parameter 'flight'.\s+Ready here: rotor, full"
+    ):
         parameterize(vehicle("raptor50"), "flight")
 
 

@@ -11,12 +11,12 @@ import pytest
 
 import r50
 from swashplate.flights.flight import Flight
-from swashplate.identification.frequency_response import FrequencyResponse
-from swashplate.identification.respond import respond
-from swashplate.identification.state_space import StateSpaceModel
-from swashplate.identification.state_space_fit import fit_state_space
-from swashplate.identification.state_space_result import StateSpaceFit
-from swashplate.identification.verification import verify
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_result import StateSpaceFit
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.responses.respond import respond
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.validation.verification import verify
 
 BAND = (0.05, 6.0)
 

@@ -56,9 +56,9 @@ def evaluate(
     of what was not. Records are this project's CSV files, the CoaX-56's bench tables (.mat) or propeller-rig runs.
     """
     from swashplate.atomic import write_text
+    from swashplate.bench.record_files import read_records
     from swashplate.cli.console import as_json, console, progress
-    from swashplate.flights.bench_files import read_records
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     _check_places(out, report)
     aircraft = find(vehicle)
@@ -66,9 +66,9 @@ def evaluate(
         line.say("reading records")
         read = read_records(*records)
         line.say("evaluating the bench")
-        from swashplate.identification.bench.evaluate import evaluate as run
+        from swashplate.api.bench import document, doubts, evaluate_bench
 
-        found = run(read, aircraft)
+        found = evaluate_bench(*read, vehicle=aircraft)
         if out is not None and not found.names:
             from swashplate.reporting.words import listed
 
@@ -83,33 +83,18 @@ def evaluate(
 
             bench_report(found, path=report)
         if out is not None:
-            write_text(out, found.card.to_toml())
-    doubts = [check.words for result in found.results for check in result.checks if not check.good]
-    doubts += [check.words for check in found.disagreements if not check.good]
-    doubts = list(dict.fromkeys(doubts))
+            write_text(out, found.model.card.to_toml())
     if json:
-        document = {
-            "parameters": {name: vars(found.card.parameters[name]) for name in found.names},
-            "kept": found.kept,
-            "doubts": doubts,
-            "left_out": [words for result in found.results for words in result.left_out],
-            "findings": [
-                {"name": f.name, "value": f.value, "sigma": f.sigma, "unit": f.unit}
-                for result in found.results
-                for f in result.findings
-            ],
-            "tables": [vars(rows) for result in found.results for rows in result.tables],
-        }
-        typer.echo(as_json(document))
+        typer.echo(as_json(document(found)))
     elif not quiet:
         from swashplate.cli.bench_tables import bench_tables
 
         for made in bench_tables(found):
             console().print(made)
-        lines = [f"! {words}" for words in doubts]
-        lines += [f"Left out: {words}" for result in found.results for words in result.left_out]
-        if found.names and found.kept:
-            lines.append(f"Kept as published, no record: {', '.join(found.kept)}")
+        lines = [f"! {words}" for words in doubts(found)]
+        lines += [f"Left out: {words}" for result in found.details.results for words in result.left_out]
+        if found.names and found.details.kept:
+            lines.append(f"Kept as published, no record: {', '.join(found.details.kept)}")
         if found.names:
             lines.append(f"Card:   {out or 'not written (give --out FILE)'}")
         lines.append(f"Report: {report or 'not written (give --report FILE)'}")
@@ -126,18 +111,14 @@ def plan(
     json: options.Json = False,
 ) -> None:
     """Print the measurement plan: the records, how long each takes, and how many passes the wanted accuracy needs."""
+    from swashplate.bench.plan import plan as make
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.identification.bench.plan import plan as make
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     made = make(find(vehicle), only=tuple(only or ()), accuracy=accuracy)
     if json:
-        records = [
-            {"record": r.name, "procedures": r.procedures, "seconds": r.duration, "points": r.words}
-            for r in made.records
-        ]
-        typer.echo(as_json({"records": records, "parameters": [vars(aim) for aim in made.aims]}))
+        typer.echo(as_json(made.as_dict()))
         return
     screen = console()
     rows = [(r.name, ", ".join(r.procedures), f"{r.duration:.0f}", r.words) for r in made.records]
@@ -166,17 +147,15 @@ def simulate(
     """Make the records of the virtual bench: the vehicle held still, by the equations of flight."""
     from swashplate.cli.console import progress
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     aircraft = find(vehicle)
     with progress(quiet=quiet) as line:
         line.say("simulating the bench (compiling takes longest the first time)")
-        from swashplate.flights.bench_record import write_record
-        from swashplate.identification.bench.plan import planned
-        from swashplate.simulation.bench import repeated, virtual_bench
+        from swashplate.api.bench import simulate_bench
+        from swashplate.bench.record import write_record
 
-        wanted = [repeated(record, repeats) for record in planned(aircraft, tuple(only or ()))]
-        records = virtual_bench(aircraft, wanted, seed=seed)
+        records = simulate_bench(aircraft, only=tuple(only or ()), repeats=repeats, seed=seed)
         with folder_when_complete(out, ours=()) as folder:
             assert folder is not None
             for record in records:

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swashplate.bench.record import COLUMNS, BenchRecord
 from swashplate.cli.tables import table
-from swashplate.flights.bench_record import COLUMNS, BenchRecord
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.identification.bench.evaluate import Bench
+    from swashplate.bench.evaluate import Bench
 
 
 def bench_tables(bench: Bench) -> Iterator[Table]:
     """The measured parameters against the published ones, the tables of the procedures, and the findings."""
-    published = bench.published.parameters
-    measured = {name: bench.card.parameters[name] for name in bench.names}
+    published = bench.start.card.parameters
+    measured = {name: bench.model.card.parameters[name] for name in bench.names}
     if measured:
         rows = [
             (name, f"{published[name].value:.5g}", f"{e.value:.5g}", f"{2.0 * (e.sigma or 0.0):.2g}", e.unit, e.source)
@@ -29,10 +29,10 @@ def bench_tables(bench: Bench) -> Iterator[Table]:
         made = table(("parameter", "published", "measured", "+- 2 sigma", "unit", "source"), rows)
         made.columns[4].justify = made.columns[5].justify = "left"
         yield made
-    for result in bench.results:
+    for result in bench.details.results:
         for shown in result.tables:
             yield table(shown.columns, shown.rows, left=0, title=f"\n{shown.title}")
-    findings = [f for result in bench.results for f in result.findings]
+    findings = [f for result in bench.details.results for f in result.findings]
     if findings:
         cells = [
             (f.name, f"{f.value:.4g}", f"{2.0 * f.sigma:.2g}" if math.isfinite(f.sigma) else "-", f.unit)

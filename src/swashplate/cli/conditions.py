@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,10 +17,11 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from swashplate.identification.state_space import StateSpaceModel
+    from swashplate.models.linear.state_space import StateSpaceModel
+    from swashplate.models.vehicle import Vehicle
     from swashplate.physics.environment import Environment
     from swashplate.simulation.trim import Trim
-    from swashplate.vehicles.vehicle import Vehicle
+    from swashplate.simulation.trim_curve import TrimCurve
 
 _RANGE_POINTS = 11
 
@@ -70,11 +71,11 @@ class Conditions:
     turn: float
     environment: Environment
 
-    def trims(self) -> tuple[Trim, ...]:
+    def curve(self) -> TrimCurve:
         """A trim at every speed."""
-        from swashplate.simulation.speeds import trims_over_speed
+        from swashplate.simulation.trim_curve import trim_curve
 
-        return trims_over_speed(
+        return trim_curve(
             self.vehicle,
             self.speeds,
             climb=self.climb,
@@ -83,18 +84,15 @@ class Conditions:
             environment=self.environment,
         )
 
-    def doubts(self, trims: Sequence[Trim]) -> tuple[str, ...]:
-        """Where the vehicle's equations do not hold; said on standard error."""
-        from swashplate.vehicles.helicopter_limits import doubts
+    def trims(self) -> tuple[Trim, ...]:
+        """The trims of the curve."""
+        return self.curve().trims
 
-        found = tuple(
-            f"At {at.speed:g} m/s {words}."
-            for at in trims
-            for words in doubts(self.vehicle, at.state, at.inputs, at.environment)
-        )
-        for words in found:
+    def tell(self, curve: TrimCurve) -> tuple[str, ...]:
+        """Where the vehicle's equations do not hold; said on standard error."""
+        for words in curve.remarks:
             typer.echo(f"Careful: {words}", err=True)
-        return found
+        return curve.remarks
 
 
 def speeds(text: str) -> tuple[float, ...]:
@@ -115,36 +113,34 @@ def _switch(text: str) -> Any:
 
 def linear_model(name: str) -> StateSpaceModel | None:
     """The model of a state-space file or a ready structure; None for anything else."""
-    from swashplate.identification.state_space_file import is_state_space, structure, structure_names
+    from swashplate.models.catalogue import is_state_space, structure
 
-    is_one = name in structure_names() or (Path(name).is_file() and is_state_space(name))
-    return structure(name) if is_one else None
+    return structure(name).structure if is_state_space(name) else None
 
 
-def _linear(name: str, switches: dict[str, str]) -> Vehicle | None:
-    """The vehicle of a linear model."""
-    if (model := linear_model(name)) is None:
-        return None
-    if switches:
-        raise SwashError("has no options: it is a linear model.", where=name, channel="--option")
-    from swashplate.control.linear_vehicle import linear_vehicle, unlimited
+def _tell_assumed_ranges(made: Vehicle, model: StateSpaceModel) -> None:
+    """What of a state-space model's inputs the file does not say."""
+    from swashplate.models.linear.linear_vehicle import unlimited
 
-    made = linear_vehicle(model)
     if usual := unlimited(model):
         ranges = dict(zip(made.input_names, made.input_limits, strict=True))
         told = ", ".join(sorted({f"{ranges[n][1]:.3g} {model.units.get(n, '')}".removesuffix(" 1") for n in usual}))
         typer.echo(f"Careful: range of {', '.join(usual)}: assumed, {told} either way; [limits] says it.", err=True)
-    return made
 
 
-def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None, mass: float | None = None) -> Vehicle:
-    """A vehicle with other numbers and options; of a state-space file the linear one."""
-    from swashplate.vehicles.catalogue import from_card
-    from swashplate.vehicles.catalogue import vehicle as find
+def vehicle_of(
+    name: str,
+    changed: list[str] | None,
+    switched: list[str] | None,
+    mass: float | None = None,
+    *,
+    whole: bool = False,
+) -> Vehicle:
+    """A vehicle with other numbers and options; with `whole`, one that flies, told before its assumed ranges are."""
+    from swashplate.models.catalogue import from_card
+    from swashplate.models.catalogue import vehicle as find
 
     switches = options.assignments(switched, option="--option")
-    if (found := _linear(name, switches)) is not None:
-        return found
     made = find(name, **{key: _switch(value) for key, value in switches.items()})
     numbers = {
         key: options.numbers(value, option="--set", count=1)[0]
@@ -152,7 +148,15 @@ def vehicle_of(name: str, changed: list[str] | None, switched: list[str] | None,
     }
     if mass is not None:
         numbers["mass"] = mass
-    return from_card(made.card.with_values(numbers, source="the command line", status="assumed")) if numbers else made
+    how = {"source": "the command line", "status": "assumed"}
+    if whole:
+        from swashplate.simulation.trim import need_whole_body
+
+        need_whole_body(made)
+    if made.structure is not None:
+        _tell_assumed_ranges(made, made.structure)
+        return made.with_values(numbers, **how) if numbers else made
+    return from_card(made.card.with_values(numbers, **how)) if numbers else made
 
 
 def conditions(

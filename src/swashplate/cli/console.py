@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from swashplate import progress_lines
+from swashplate.json_text import as_json, plain
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+__all__ = ["Progress", "as_json", "console", "plain", "progress"]
 
 _PIPED_WIDTH = 400  # columns: wide enough for every line, so that a file or a pipe gets whole ones
 _NARROWEST = 80  # columns: below this a table would cut its numbers off, so that the terminal wraps whole lines instead
@@ -26,26 +27,6 @@ def console() -> Console:
 
     screen = Console(highlight=False)
     return Console(highlight=False, width=max(screen.width, _NARROWEST) if sys.stdout.isatty() else _PIPED_WIDTH)
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON types: arrays as lists, and null for what JSON has no word for (NaN, infinity)."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, str | bool | int) or value is None:
-        return value
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    if hasattr(value, "tolist"):  # NumPy and JAX arrays and numbers
-        return plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(entry) for entry in value]
-    return str(value)
-
-
-def as_json(value: Any) -> str:
-    """A value as the text of a JSON document, valid everywhere (RFC 8259: no NaN)."""
-    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)
 
 
 class Progress:

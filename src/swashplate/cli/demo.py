@@ -11,7 +11,7 @@ from swashplate.cli import options
 
 if TYPE_CHECKING:
     from swashplate.flights.flight import Flight
-    from swashplate.vehicles.vehicle import Vehicle
+    from swashplate.models.vehicle import Vehicle
 
 FITTED = "flight_2011-08-01_vertical.mat"
 HELD_OUT = "flight_2011-07-25_hover_crash.mat"
@@ -38,7 +38,7 @@ def demo(
     from swashplate.cli.console import progress
     from swashplate.cli.reading import conditioned
     from swashplate.flights import datasets
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     coax = find("coax")
     found = [] if simulated else [path for f in (FITTED, HELD_OUT) if (path := datasets.find("coax56", f))]
@@ -52,7 +52,7 @@ def demo(
                 simulated_log(coax, maneuver, seed=seed + i).condition(rate=100.0, cutoff=0.0)
                 for i, maneuver in enumerate(_MANEUVERS)
             )
-        fit, validation = identify.run(coax, [fitted], [held_out], identify.Question(), out=out, line=line)
+        fit, validation = identify.run(coax, [fitted], [held_out], identify.AskedIdentification(), out=out, line=line)
     if len(found) < 2 and not quiet:
         typer.echo("On simulated flights; `swash data fetch coax56` gets the real ones.\n")
     identify.show(fit, validation, out=out, json=False, quiet=quiet)
@@ -72,7 +72,7 @@ def simulated_log(vehicle: Vehicle, maneuver: str, *, seed: int, rate: float = 1
     import numpy as np
 
     import swashplate as sp
-    from swashplate.flights.maneuvers import AXES
+    from swashplate.flights.maneuvers.series import AXES
 
     aircraft = vehicle.with_values(_TRUTH, status="assumed", source="the demo's simulated aircraft")
     excitation = sp.maneuver(maneuver)

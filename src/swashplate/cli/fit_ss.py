@@ -11,8 +11,8 @@ from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
 
 if TYPE_CHECKING:
-    from swashplate.identification.frequency_response import FrequencyResponse
-    from swashplate.identification.state_space import StateSpaceModel
+    from swashplate.identification.responses.frequency_response import FrequencyResponse
+    from swashplate.models.linear.state_space import StateSpaceModel
 
 FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
@@ -62,19 +62,20 @@ def fit_ss(
 
     Writes report.html, model.toml, fit.json and (with --hold-out) verification.json to --out.
     """
+    from swashplate.api.gains import suggest_gains
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
-    from swashplate.cli.gain_lines import gain_words, suggested
+    from swashplate.cli.gain_lines import gain_words
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.reduction import reduce as reduced
-    from swashplate.identification.response_warnings import damaged
-    from swashplate.identification.start_values import at_flown_trim
-    from swashplate.identification.state_space_file import structure as find
-    from swashplate.identification.state_space_file import to_toml
-    from swashplate.identification.state_space_fit import fit_state_space
-    from swashplate.identification.verification import verify_inside
+    from swashplate.identification.frequency.start_values import at_flown_trim
+    from swashplate.identification.frequency.state_space_fit import fit_state_space
+    from swashplate.identification.responses.response_warnings import damaged
+    from swashplate.models.linear.state_space_file import structure as find
+    from swashplate.models.linear.state_space_file import to_toml
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
+    from swashplate.validation.structure_reduction import reduce as reduced
+    from swashplate.validation.verification import verify_inside
 
     model = find(structure)
     found, limits = flying.load_responses(responses), flying.band(band)
@@ -95,25 +96,29 @@ def fit_ss(
             seed=seed,
             progress=lambda i, cost: line.say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
         )
+        flights = []
+        if hold_out:
+            wanted = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
+            flights = flying.flown(hold_out, wanted, rate=rate, cutoff=cutoff, how=how)
         if reduce:
-            fit = reduced(fit, progress=lambda i, cost: line.say("reducing", note=f"step {i}, J_ave {cost:.4g}"))
+            fit = reduced(
+                fit, hold_out=flights, progress=lambda i, cost: line.say("reducing", note=f"step {i}, J_ave {cost:.4g}")
+            )
         verification = None
         if hold_out:
             line.say("flying the model along what the fit has not seen")
-            wanted = (*model.inputs, *(t for t in model.outputs if t in found.outputs))
-            flights = flying.flown(hold_out, wanted, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(fit.model, flights, band=limits), found.sources)
-        advice = suggested(fit, found) if gains else ()
+        advice = suggest_gains(fit, found) if gains else ()
         if folder is not None:
             line.say("writing the report")
             material = ResponseMaterial(found, fit=fit, verification=verification, gains=advice)
             response_report(material, path=folder / "report.html")
-            write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+            fit.save(folder / "fit.json")
             write_text(folder / "model.toml", to_toml(fit.model))
             if verification is not None:
                 write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
     if json:
-        document = {"fit": fit.as_dict(), "verification": verification and verification.as_dict()}
+        document = {"fit": fit.to_document(comparisons=False), "verification": verification and verification.as_dict()}
         typer.echo(as_json({**document, "gains": [s.as_dict() for s in advice]}))
     elif not quiet:
         typer.echo(repr(fit))
@@ -127,9 +132,9 @@ def fit_ss(
 
 def _started(model: StateSpaceModel, source: str, responses: FrequencyResponse, *, seed: int) -> StateSpaceModel:
     """The model with start values from fitted transfer functions (files or their folders) or from a vehicle."""
-    from swashplate.identification.start_values import from_linear_model, from_models
-    from swashplate.identification.state_space_file import is_state_space
-    from swashplate.identification.state_space_file import structure as find
+    from swashplate.identification.frequency.start_values import from_linear_model, from_models
+    from swashplate.models.linear.state_space_file import is_state_space
+    from swashplate.models.linear.state_space_file import structure as find
 
     places = [Path(name) / "model.toml" if Path(name).is_dir() else Path(name) for name in flying.names(source)]
     if places and all(is_state_space(str(place)) for place in places):

@@ -49,18 +49,19 @@ def fit_tf(
 
     Writes report.html, fit.json and (where it can be flown) model.toml to --out; --hold-out verifies it in time.
     """
+    from swashplate.api.gains import suggest_gains
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
-    from swashplate.cli.gain_lines import gain_words, suggested
+    from swashplate.cli.gain_lines import gain_words
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import IdentificationError
-    from swashplate.identification.readings import handling_lines, margin_lines
-    from swashplate.identification.response_warnings import damaged
-    from swashplate.identification.state_space_file import to_toml
-    from swashplate.identification.transfer_function_fit import as_state_space, fit_transfer_function, suggest
-    from swashplate.identification.verification import verify_inside
+    from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines
+    from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function, suggest
+    from swashplate.identification.responses.response_warnings import damaged
+    from swashplate.models.linear.state_space_file import to_toml
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
+    from swashplate.validation.verification import verify_inside
 
     found = flying.load_responses(responses)
     limits, wanted = flying.band(band), flying.names(outputs) or None
@@ -82,7 +83,7 @@ def fit_tf(
                 fixed=options.fixed_values(fix),
                 least_coherence=coherence,
             )
-        pairs = tuple(m.output for m in fit.models)
+        pairs = tuple(m.output for m in fit.model)
         model = verification = None
         try:
             model = as_state_space(fit)
@@ -95,12 +96,12 @@ def fit_tf(
             flown = (*model.inputs, *model.outputs)
             flights = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how)
             verification = flying.seen_before(verify_inside(model, flights, band=limits), found.sources)
-        advice = suggested(fit, found) if gains else ()
+        advice = suggest_gains(fit, found) if gains else ()
         if folder is not None:
             measured = found.select(pairs, (input,))
             material = ResponseMaterial(measured, (fit,), trials, verification=verification, gains=advice)
             response_report(material, path=folder / "report.html")
-            write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+            fit.save(folder / "fit.json")
             if model is not None:
                 write_text(folder / "model.toml", to_toml(model))
             if verification is not None:
@@ -110,7 +111,7 @@ def fit_tf(
     )
     if json:
         document = {
-            "fit": fit.as_dict(),
+            "fit": fit.to_document(comparisons=False),
             "margins": [r.as_dict() for r in read],
             "gains": [s.as_dict() for s in advice],
             "verification": verification and verification.as_dict(),

@@ -55,13 +55,13 @@ def fit_time(
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.linear_time_fit import fit_in_time
-    from swashplate.identification.response_warnings import damaged
-    from swashplate.identification.state_space_file import structure as find
-    from swashplate.identification.state_space_file import to_toml
-    from swashplate.identification.verification import verify
+    from swashplate.identification.responses.response_warnings import damaged
+    from swashplate.identification.time.linear_time_fit import fit_in_time
+    from swashplate.models.linear.state_space_file import structure as find
+    from swashplate.models.linear.state_space_file import to_toml
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
+    from swashplate.validation.verification import verify
 
     model = find(structure)
     wanted = flying.names(outputs) or model.outputs
@@ -85,15 +85,15 @@ def fit_time(
         )
         line.say("flying the model")
         unseen = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how) if hold_out else flights
-        verification = flying.seen_before(verify(fit.model, unseen, outputs=wanted), fit.sources)
+        verification = flying.seen_before(verify(fit.model, unseen, outputs=wanted), fit.settings["records"])
         if folder is not None:
             line.say("writing the report")
             response_report(ResponseMaterial(time_fit=fit, verification=verification), path=folder / "report.html")
-            write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+            fit.save(folder / "fit.json")
             write_text(folder / "model.toml", to_toml(fit.model))
             write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
     if json:
-        typer.echo(as_json({"fit": fit.as_dict(), "verification": verification.as_dict()}))
+        typer.echo(as_json({"fit": fit.to_document(comparisons=False), "verification": verification.as_dict()}))
     elif not quiet:
         typer.echo(repr(fit))
         typer.echo(f"\n{verification!r}")

@@ -17,9 +17,9 @@ from swashplate.errors import SwashError
 if TYPE_CHECKING:
     from swashplate.cli.reading import Reading
     from swashplate.flights.flight import Flight
-    from swashplate.identification.frequency_response import FrequencyResponse
-    from swashplate.identification.state_space import StateSpaceModel
-    from swashplate.identification.verification import Verification
+    from swashplate.identification.responses.frequency_response import FrequencyResponse
+    from swashplate.models.linear.state_space import StateSpaceModel
+    from swashplate.validation.verification import Verification
 
 RESPONSES = "responses.nc"
 
@@ -104,10 +104,12 @@ def flown(
     Between samples goes a spline: lines would take 3 dB off a channel at a third of its rate.
     """
     from swashplate.cli.reading import read
+    from swashplate.flights.consistency import refuse_inconsistent
 
     made = []
     for text in texts:
         flight = read(text, how=how)
+        refuse_inconsistent(flight)  # whole: the streams that are left out below may be what shows a wrong unit
         logged = {name: source for name, source in how.channels.items() if source in flight}
         flight = with_names(flight, logged)
         whole = all(name in flight for name in channels)
@@ -137,7 +139,7 @@ def with_given(model: StateSpaceModel, start: Sequence[str] | None, fix: Sequenc
 
 def load_responses(path: Path) -> FrequencyResponse:
     """The responses in a file, or in a folder that `swash respond` wrote."""
-    from swashplate.identification.frequency_response import FrequencyResponse
+    from swashplate.identification.responses.frequency_response import FrequencyResponse
 
     return FrequencyResponse.load(path / RESPONSES if path.is_dir() else path)
 

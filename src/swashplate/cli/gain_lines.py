@@ -6,30 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from swashplate.control.ardupilot_gains import Suggestion
-    from swashplate.identification.frequency_response import FrequencyResponse
-    from swashplate.identification.spread import Fitted
-
-
-def suggested(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion, ...]:
-    """Gains for every axis of a fit, with what the responses remember of their logs.
-
-    Raises:
-        SwashError: no axis joins a rate with its mixer command.
-    """
-    from swashplate.control.ardupilot_gains import AXES, suggest_gains
-    from swashplate.errors import SwashError
-
-    settings: dict[str, Any] = dict(responses.settings)
-    found = suggest_gains(fit, autopilot=settings.get("autopilot"), sources=settings.get("channels"))
-    if not found:
-        pairs = ", ".join(f"{rate} with {command}" for rate, command in AXES.values())
-        raise SwashError(
-            f"the model joins no rate with its mixer command ({pairs}).",
-            channel="--gains",
-            hint="Name the log's own channels in `swash respond`, for example --inputs mixer_yaw --outputs r.",
-        )
-    return found
+    from swashplate.control.analysis.ardupilot_gains import Suggestion
 
 
 def gain_words(suggestions: Sequence[Suggestion]) -> str:

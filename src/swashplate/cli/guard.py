@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 from swashplate.errors import SwashError
 
 _LONGEST = 200  # characters of a foreign error that are shown
+_LONGEST_LINE = 1_900  # of a whole message: file names may have thousands
 
 
 class Exit(IntEnum):
@@ -40,7 +41,8 @@ def complain(message: str) -> None:
     """One line of error on standard error; red where there is a terminal and nobody asked for no colour."""
     colour = False if os.environ.get("NO_COLOR") else None  # no-color.org: set and not empty
     typer.secho("Error: ", fg="red", bold=True, err=True, nl=False, color=colour)
-    typer.echo(" ".join(message.split()), err=True)
+    line = " ".join(message.split())
+    typer.echo(line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 6]} [...]", err=True)
 
 
 def _file_trouble(error: OSError) -> str:

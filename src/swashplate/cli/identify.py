@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
     from swashplate.cli.console import Progress
     from swashplate.flights.flight import Flight
-    from swashplate.identification.fit import Fit
+    from swashplate.identification.core.result import Result
+    from swashplate.identification.time.flight_details import FlightDetails
+    from swashplate.models.card import Card
+    from swashplate.models.vehicle import Vehicle
     from swashplate.validation.validation import Validation
-    from swashplate.vehicles.card import Card
-    from swashplate.vehicles.vehicle import Vehicle
 
 FILES = ("report.html", "model.toml", "fit.json", "validation.json")
 """What `--out` gets."""
@@ -34,7 +35,7 @@ class Method(StrEnum):
 
 
 @dataclass(frozen=True)
-class Question:
+class AskedIdentification:
     """What an identification is asked.
 
     Attributes:
@@ -97,11 +98,11 @@ def identify(
     which physics forbids has failed: exit code 2, a report that says so, and no model.
     """
     from swashplate.cli.console import progress
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     card, texts = options.prior_card_name(prior)
     names = [name.strip() for name in free.split(",") if name.strip()]
-    question = Question(
+    question = AskedIdentification(
         free=names[0] if len(names) == 1 else names,
         method=method.value,
         ties=tuple(tie or ()),
@@ -139,16 +140,16 @@ def run(
     vehicle: Vehicle,
     flights: list[Flight],
     hold_outs: list[Flight],
-    question: Question,
+    question: AskedIdentification,
     *,
     out: Path | None,
     line: Progress,
-) -> tuple[Fit, Validation | None]:
+) -> tuple[Result[Vehicle, FlightDetails], Validation | None]:
     """Identifies, validates and writes the files; they appear in `out` together when all are complete."""
     import swashplate as sp
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.parameters import parameterize
-    from swashplate.identification.records import records
+    from swashplate.identification.core.parameters import parameterize
+    from swashplate.identification.core.records import records
 
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     free, ties = question.free, question.ties
@@ -186,28 +187,32 @@ def run(
     return fit, validation
 
 
-def write(fit: Fit, validation: Validation | None, *, folder: Path) -> None:
+def write(fit: Result[Vehicle, FlightDetails], validation: Validation | None, *, folder: Path) -> None:
     """All files of an identification; a failed one has no model."""
     import swashplate as sp
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json
 
     sp.report(fit, validation, path=folder / "report.html")
-    write_text(folder / "fit.json", as_json(fit.as_dict()) + "\n")
+    fit.save(folder / "fit.json")
     if validation is not None:
         write_text(folder / "validation.json", as_json(validation.as_dict()) + "\n")
     if not fit.failed:
-        fit.vehicle.save(folder / "model.toml")
+        fit.model.save(folder / "model.toml")
 
 
-def show(fit: Fit, validation: Validation | None, *, out: Path | None, json: bool, quiet: bool) -> None:
+def show(
+    fit: Result[Vehicle, FlightDetails], validation: Validation | None, *, out: Path | None, json: bool, quiet: bool
+) -> None:
     """The result on standard output: JSON, or a table, the report's own five lines and where the report is."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import fit_table
     from swashplate.reporting.summary import banners, summary
 
     if json:
-        typer.echo(as_json({"fit": fit.as_dict(), "validation": validation and validation.as_dict()}))
+        typer.echo(
+            as_json({"fit": fit.to_document(comparisons=False), "validation": validation and validation.as_dict()})
+        )
     elif not quiet:
         console().print(fit_table(fit))
         lines = [f"! {text}" for _, text in banners(fit, validation)]

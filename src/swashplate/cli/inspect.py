@@ -24,9 +24,9 @@ def inspect(
     A log that is itself damaged (cut off, bytes lost, its clock set back) is shown as far as it could be read, and ends
     with an error.
     """
+    from swashplate.bench.record_files import is_bench, read_bench
     from swashplate.cli.console import as_json, console
     from swashplate.cli.reading import read
-    from swashplate.flights.bench_files import is_bench, read_bench
     from swashplate.flights.datasets import locate
     from swashplate.flights.inspect import inspect as look
 

@@ -11,8 +11,8 @@ from swashplate.cli import options
 from swashplate.errors import ManeuverError, SwashError
 
 if TYPE_CHECKING:
-    from swashplate.flights.ardupilot_chirp import Chirp
-    from swashplate.flights.maneuvers import Maneuver
+    from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
+    from swashplate.flights.maneuvers.series import Maneuver
 
 
 def maneuver(
@@ -55,8 +55,8 @@ def maneuver(
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
     from swashplate.flights.csv_export import as_csv
-    from swashplate.flights.maneuver_design import Vehicle, checks, sampled
-    from swashplate.flights.maneuvers import parse
+    from swashplate.flights.maneuvers.maneuver_design import ExpectedResponse, checks, sampled
+    from swashplate.flights.maneuvers.series import parse
 
     if out is not None and out.suffix.lower() != ".csv":
         raise SwashError(f"ends in '{out.suffix}', expected .csv.", where=out, channel="--out")
@@ -66,7 +66,7 @@ def maneuver(
         raise SwashError("is given without --ardupilot.", channel="--sid-axis", hint="Add --ardupilot.")
     planned = parse(spec)
     chirp = _chirp(planned, sid_axis) if ardupilot else None
-    known = Vehicle(noise, gain, coherence, bandwidth, f180)
+    known = ExpectedResponse(noise, gain, coherence, bandwidth, f180)
     found = checks(planned, rate=rate, vehicle=known, chirp=chirp)
     written: list[Path] = []
     if out is not None:
@@ -92,8 +92,8 @@ def maneuver(
 
 def _chirp(planned: Maneuver, axis: int | None) -> Chirp:
     """The chirp that ArduPilot flies in place of a sweep."""
-    from swashplate.flights.ardupilot_chirp import AXES, MIXER, Chirp
-    from swashplate.flights.maneuvers import FADE
+    from swashplate.flights.maneuvers.ardupilot_chirp import AXES, MIXER, Chirp
+    from swashplate.flights.maneuvers.series import FADE
 
     if planned.kind != "sweep" or planned.band is None:
         raise ManeuverError(

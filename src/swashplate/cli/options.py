@@ -16,7 +16,7 @@ def _vehicle_names(incomplete: str) -> list[str]:
     """Packaged vehicles for shell completion (files are completed by the shell itself)."""
     from importlib import resources
 
-    files = (resources.files("swashplate.vehicles") / "data").iterdir()
+    files = (resources.files("swashplate.models") / "data").iterdir()
     names = sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml"))
     return [name for name in names if name.startswith(incomplete)]
 
@@ -29,7 +29,10 @@ def _flight_names(incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-_FLIGHT = "a log, or a data set's file as coax56/flight_2011-08-01_vertical; FILE@5-30 takes the seconds 5 to 30"
+_FLIGHT = (
+    "a log, or a data set's file as coax56/flight_2011-08-01_vertical; FILE@5-30 takes the seconds 5 to 30, "
+    "FILE#2 the second log of a Blackbox file"
+)
 
 VehicleName = Annotated[
     str, typer.Option("--vehicle", help="A vehicle's name, or a card or model file.", autocompletion=_vehicle_names)

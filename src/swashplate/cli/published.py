@@ -11,7 +11,7 @@ from swashplate.cli import conditions as given
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from swashplate.simulation.published import Comparison
+    from swashplate.simulation.published import PublishedComparison
     from swashplate.simulation.trim import Trim
 
 
@@ -23,13 +23,12 @@ def compare(asked: given.Conditions, at: Trim, path: Path, *, primed: bool, json
     """
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table as tabulate
-    from swashplate.simulation.derivatives import options_of
+    from swashplate.models.published import read_published
     from swashplate.simulation.published import hold_against
-    from swashplate.vehicles.published import read_published
 
     if at.turn:
         raise SwashError("takes straight flight.", channel="--published", hint="Leave out --turn.")
-    sense = getattr(options_of(asked.vehicle), "sense", 1.0)
+    sense = getattr(asked.vehicle.options, "sense", 1.0)
     flight = {name: at.states().get(name, 0.0) for name in ("u", "v", "w")}
     found = hold_against(asked.vehicle, at, read_published(path, sense=sense, flight=flight), primed=primed)
     if json:
@@ -43,8 +42,8 @@ def compare(asked: given.Conditions, at: Trim, path: Path, *, primed: bool, json
     console().print(tabulate(("with, one after another", "mean", "within 10 %"), steps))
 
 
-def _rows(found: Comparison) -> tuple[list[str], list[list[str]]]:
-    from swashplate.vehicles.derivatives import split_name, unit
+def _rows(found: PublishedComparison) -> tuple[list[str], list[list[str]]]:
+    from swashplate.models.conventional.derivative_table import split_name, unit
 
     first, last = found.steps[0].table, found.steps[-1].table
     before, after = found.differences(first), found.differences(last)
@@ -67,8 +66,8 @@ def _off(difference: float, small: bool) -> str:
     return "small" if small else f"{100 * difference:+.0f} %"
 
 
-def _document(found: Comparison) -> dict[str, Any]:
-    from swashplate.vehicles.derivatives import unit
+def _document(found: PublishedComparison) -> dict[str, Any]:
+    from swashplate.models.conventional.derivative_table import unit
 
     steps = [{"with": s.words, "mean": s.mean, "within 10 %": s.near} for s in found.steps]
     off = [found.differences(step.table) for step in found.steps]

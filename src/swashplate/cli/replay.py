@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from swashplate.cli import conditions as given
 from swashplate.cli import live, options
 from swashplate.cli.reading import Reading
 from swashplate.errors import SwashError
+
+if TYPE_CHECKING:
+    from swashplate.links.live.replay import Replay
 
 
 def replay(
@@ -26,6 +29,10 @@ def replay(
     ahead: Annotated[
         float, typer.Option("--ahead", help="Seconds after which the prediction starts anew.", min=0.1, max=60.0)
     ] = 2.0,
+    hold_missing: Annotated[
+        bool,
+        typer.Option("--hold-missing", help="Hold the model's inputs that the log lacks at hover; the page says so."),
+    ] = False,
     video: Annotated[
         Path | None, typer.Option("--video", metavar="FILE", help="Write a film (.mp4) instead of opening a page.")
     ] = None,
@@ -45,10 +52,10 @@ def replay(
     quiet: options.Quiet = False,
 ) -> None:
     """Replay a flight: scrub through it in the browser, or film it."""
+    from swashplate.api.live import need_live_extra, show_replay
     from swashplate.cli.console import progress
     from swashplate.cli.reading import read
 
-    filming = video is not None or frames is not None
     if video is not None and frames is not None:
         raise SwashError("and --frames are one too many.", channel="--video", hint="Give one of them.")
     if video is not None and not video.absolute().parent.is_dir():
@@ -56,46 +63,47 @@ def replay(
     if frames is not None and frames.exists() and not frames.is_dir():
         raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
     chosen = None if model is None else given.vehicle_of(model, None, None)
-    listening = None
-    if not filming:
-        live.need_live_extra()
-        from swashplate.links.live import server
+    film_place = video or frames
+    if film_place is None:
+        need_live_extra()
+    with progress(quiet=quiet) as line:
 
-        listening = server.listen(host, port, allow_remote=allow_remote)
-    try:
-        how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
-        with progress(quiet=quiet) as line:
-            line.say("reading the flight")
-            log = read(flight, how=how)
-            if not filming:
-                server.check_page()
-            # A simulation's true states have no outliers, and what looks like one is a maneuver.
-            clean = log.provenance.simulated and "phi" in log
-            logged = log.condition(rate=rate, cutoff=cutoff, outliers=not clean, trim_ground=not clean)
-            from swashplate.links.live.replay import as_json
+        def prepared() -> Replay:
             from swashplate.links.live.replay import replay as prepare
             from swashplate.simulation.compilation import enable_compilation_cache
 
+            line.say("reading the flight")
+            how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+            log = read(flight, how=how)
+            # A simulation's true states have no outliers, and what looks like one is a maneuver.
+            clean = log.provenance.simulated and "phi" in log
+            logged = log.condition(rate=rate, cutoff=cutoff, outliers=not clean, trim_ground=not clean)
             enable_compilation_cache()
             line.say("predicting (compiling takes longest the first time)" if chosen else "preparing")
-            shown = prepare(logged, model=chosen, ahead=ahead)
-            if filming:
-                from swashplate.links.live import film
+            shown = prepare(logged, model=chosen, ahead=ahead, hold_missing=hold_missing)
+            for note in shown.notes:
+                typer.echo(note, err=True)
+            return shown
 
-                def told(done: int, total: int) -> None:
-                    line.say("drawing", done=done, total=total)
-
-                if video is not None:
-                    count = film.write_film(shown, video, rate=frame_rate, tell=told)
-                else:
-                    assert frames is not None
-                    count = film.write_pictures(shown, frames, rate=frame_rate, tell=told)
-        if listening is None:
-            if not quiet:
-                typer.echo(f"Written: {video or frames} ({count} pictures, {count / frame_rate:.1f} s)")
+        if film_place is None:
+            show_replay(
+                prepared,
+                host=host,
+                port=port,
+                allow_remote=allow_remote,
+                open_page=open_page,
+                say=line.say,
+                ready=lambda address: live.told(address, quiet=quiet),
+            )
             return
-        live.announce(server.address_of(listening), open_page=open_page, quiet=quiet)
-        server.serve(server.replay_app(as_json(shown), remote=allow_remote), listening)
-    finally:
-        if listening is not None:
-            listening.close()
+        from swashplate.links.live import film
+
+        write = film.write_pictures if video is None else film.write_film
+        count = write(
+            prepared(),
+            film_place,
+            rate=frame_rate,
+            tell=lambda done, total: line.say("drawing", done=done, total=total),
+        )
+    if not quiet:
+        typer.echo(f"Written: {film_place} ({count} pictures, {count / frame_rate:.1f} s)")

@@ -52,8 +52,8 @@ def respond(
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import SwashError
-    from swashplate.identification.readings import handling_lines
-    from swashplate.identification.respond import respond as answer
+    from swashplate.identification.frequency.handling_readings import handling_lines
+    from swashplate.identification.responses.respond import respond as answer
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from swashplate.identification.fit import Fit
+    from swashplate.identification.core.result import Result
+    from swashplate.models.vehicle import Vehicle
     from swashplate.validation.validation import Score, Validation
-    from swashplate.vehicles.vehicle import Vehicle
 
 _FIGURES_FROM = 110  # columns of a terminal that hold all three figures side by side
 
@@ -30,16 +30,16 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], *, left: int = 1, 
     return made
 
 
-def fit_table(fit: Fit) -> RenderableType:
+def fit_table(fit: Result[Any, Any]) -> RenderableType:
     """Published and identified value of each parameter, two corrected sigmas, and what decided it."""
     rows = []
-    for e in fit.parameters:
+    for e in fit.estimates:
         remarks = [f"= {e.tie}"] if e.tie else []
         remarks += ["at its bound"] if e.at_bound else []
         remarks += [f"{100 * e.prior_share:.0f} % from the prior"] if e.prior_share > 0.1 else []
-        known = math.isfinite(e.sigma_corrected) and not e.tie
-        bound = f"{2 * e.sigma_corrected:.2g}" if known else "-"
-        rows.append((e.name, f"{e.published:.4g}", f"{e.value:.4g}", bound, e.unit, ", ".join(remarks)))
+        known = math.isfinite(e.best_sigma) and not e.tie
+        bound = f"{2 * e.best_sigma:.2g}" if known else "-"
+        rows.append((e.name, f"{e.start:.4g}", f"{e.value:.4g}", bound, e.unit, ", ".join(remarks)))
     made = table(("parameter", "published", "identified", "+- 2 sigma", "unit", "remark"), rows)
     made.columns[4].justify = made.columns[5].justify = "left"
     return made

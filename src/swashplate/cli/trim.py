@@ -13,8 +13,7 @@ from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.simulation.linearize import LinearModel
-    from swashplate.simulation.trim import Trim
-    from swashplate.vehicles.vehicle import Vehicle
+    from swashplate.simulation.trim_curve import TrimCurve
 
 
 @given.flown
@@ -27,80 +26,40 @@ def trim(
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
 
-    found = asked.trims()
-    remarks = asked.doubts(found)
+    found = asked.curve()
+    remarks = asked.tell(found)
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 
-        speed_page(asked.vehicle, found, path=plot, remarks=remarks)
+        speed_page(asked.vehicle, found.trims, path=plot, remarks=remarks)
     if json:
-        trims = [_document(asked.vehicle, at) for at in found]
-        document = {"vehicle": asked.name, "trims": trims, "units": _units(asked.vehicle), "remarks": remarks}
-        typer.echo(as_json(document))
+        typer.echo(as_json({"vehicle": asked.name, **found.as_dict()}))
         return
-    if len(found) == 1:
-        typer.echo(repr(found[0]).splitlines()[0])
-        console().print(_one(asked.vehicle, found[0]))
+    if len(found.trims) == 1:
+        typer.echo(repr(found.trims[0]).splitlines()[0])
+        console().print(_one(found))
     else:
-        shown = (*asked.vehicle.input_names, *(n for n in ("phi", "theta", "a1", "b1") if n in found[0].state_names))
-        head = ["speed [m/s]", *(f"{name} [{_unit(asked.vehicle, name)}]" for name in shown)]
-        rows = [[f"{at.speed:g}", *(f"{_shown(asked.vehicle, name, at):.3f}" for name in shown)] for at in found]
-        powers = [_power(asked.vehicle, at) for at in found]
-        if any(power is not None for power in powers):
-            head.append("power [W]")
-            rows = [[*row, f"{power:.1f}"] for row, power in zip(rows, powers, strict=True)]
-        console().print(table(head, rows, left=0))
+        columns = {"speed [m/s]": [f"{at.speed:g}" for at in found.trims]}
+        columns |= {head: [f"{v:.3f}" for v in values] for head, values in list(found.columns().items())[1:]}
+        if "power [W]" in columns:
+            columns["power [W]"] = [f"{v:.1f}" for v in found.columns()["power [W]"]]
+        console().print(table(list(columns), list(zip(*columns.values(), strict=True)), left=0))
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
 
-def _one(vehicle: Vehicle, at: Trim) -> Any:
+def _one(found: TrimCurve) -> Any:
     """Every input and state of a trim with its unit, angles also in degrees."""
     from swashplate.cli.tables import table
 
+    at = found.trims[0]
     values, rows = {**at.commands(), **at.states()}, []
-    if (power := _power(vehicle, at)) is not None:
+    if (power := found.power(at)) is not None:
         rows.append(("shaft power", f"{power:.1f}", "W", ""))
-    for name, unit in _units(vehicle).items():
+    for name, unit in found.units().items():
         degrees = f"{round(math.degrees(values[name]), 3) + 0.0:.3f}" if unit == "rad" else ""
         rows.append((name, f"{round(values[name], 5) + 0.0:.5f}", unit, degrees))
     return table(("", "value", "unit", "in degrees"), rows, left=1)
-
-
-def _units(vehicle: Vehicle) -> dict[str, str]:
-    """The unit of every input and state."""
-    inputs, states = (vehicle.input_names, vehicle.input_units), (vehicle.state_names, vehicle.state_units)
-    return {name: unit for both in (inputs, states) for name, unit in zip(*both, strict=True)}
-
-
-def _power(vehicle: Vehicle, at: Trim) -> float | None:
-    """Shaft power [W] of a helicopter."""
-    from swashplate.vehicles.helicopter_limits import shaft_power
-
-    return shaft_power(vehicle, at.state, at.inputs, at.environment)
-
-
-def _unit(vehicle: Vehicle, name: str) -> str:
-    return "deg" if _units(vehicle)[name] == "rad" else _units(vehicle)[name]
-
-
-def _shown(vehicle: Vehicle, name: str, at: Trim) -> float:
-    value = {**at.states(), **at.commands()}[name]
-    return math.degrees(value) if _unit(vehicle, name) == "deg" else value
-
-
-def _document(vehicle: Vehicle, at: Trim) -> dict[str, Any]:
-    power = _power(vehicle, at)
-    return {
-        "speed": at.speed,
-        "climb": at.climb,
-        "lateral": at.lateral,
-        "turn": at.turn,
-        "inputs": at.commands(),
-        "states": at.states(),
-        "residual": at.residual,
-        **({} if power is None else {"power": power}),
-    }
 
 
 @given.flown
@@ -124,13 +83,14 @@ def linearize(
 
     if form not in FORMS:
         raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="--form")
-    if form != "full" and asked.vehicle.name != "conventional":
+    if form != "full" and not asked.vehicle.traits.rotorcraft:
         raise SwashError("is for single-rotor helicopters.", where=asked.name, channel="--form")
     if form != "full" and plot is not None:
         raise SwashError("is of the full model.", where=plot, channel="--plot", hint="Leave out --form or --plot.")
-    found = asked.trims()
+    curve = asked.curve()
+    found = curve.trims
     models = [in_form(about(asked.vehicle, at), form) for at in found]
-    remarks = asked.doubts(found)
+    remarks = asked.tell(curve)
     if plot is not None:
         from swashplate.reporting.speed_page import speed_page
 

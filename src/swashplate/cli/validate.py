@@ -11,7 +11,7 @@ from swashplate.cli import flying, options
 from swashplate.cli.reading import Reading
 
 if TYPE_CHECKING:
-    from swashplate.identification.state_space import StateSpaceModel
+    from swashplate.models.linear.state_space import StateSpaceModel
 
 FILES = ("report.html", "validation.json", "verification.json")
 
@@ -54,8 +54,8 @@ def validate(
     from swashplate.cli.reading import check_disjoint, conditioned
     from swashplate.cli.tables import validation_table
     from swashplate.errors import SwashError
-    from swashplate.identification.state_space_file import is_state_space
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
+    from swashplate.models.linear.state_space_file import is_state_space
 
     channels = flying.renamed(rename, option="--rename")
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
@@ -77,7 +77,7 @@ def validate(
         check_disjoint(flights, flight)
 
         import swashplate as sp
-        from swashplate.identification.records import records
+        from swashplate.identification.core.records import records
 
         records(flights, aircraft)
         with folder_when_complete(out, ours=FILES) as folder:
@@ -91,9 +91,10 @@ def validate(
                 calibration=calibration,
                 progress=lambda done, total: line.say("predicting", done=done, total=total),
             )
+            assert isinstance(validation, sp.Validation)  # `records` has found the pose
             if folder is not None:
                 line.say("writing the report")
-                sp.report(validation=validation, path=folder / "report.html")
+                sp.report(validation, path=folder / "report.html")
                 write_text(folder / "validation.json", as_json(validation.as_dict()) + "\n")
     if json:
         typer.echo(as_json(validation.as_dict()))
@@ -107,14 +108,12 @@ def validate(
 
 def _other(name: str) -> StateSpaceModel:
     """What an identified model is compared with: another model, or a vehicle linearised in hover."""
-    from swashplate.identification.state_space_file import is_state_space, structure, structure_names
-
-    if name in structure_names() or is_state_space(name):
-        return structure(name)
     import swashplate as sp
-    from swashplate.identification.vehicle_model import model_of
+    from swashplate.identification.time.linearised_model import model_of
 
     aircraft = sp.vehicle(name)
+    if aircraft.structure is not None:
+        return aircraft.structure
     return model_of(sp.linearize(aircraft), name=f"{aircraft.name}, linearised in hover")
 
 
@@ -135,11 +134,11 @@ def _verify(
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.response_warnings import damaged
-    from swashplate.identification.state_space_file import structure
-    from swashplate.identification.verification import verify_inside
+    from swashplate.identification.responses.response_warnings import damaged
+    from swashplate.models.linear.state_space_file import structure
     from swashplate.reporting.response_report import response_report
     from swashplate.reporting.sections_responses import ResponseMaterial
+    from swashplate.validation.verification import verify_inside
 
     identified, compared = structure(model), None if other is None else _other(other)
     with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:

@@ -34,9 +34,11 @@ def list_(json: options.Json = False) -> None:
     """List the vehicles by name."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.vehicles.card import packaged_cards
+    from swashplate.models.catalogue import cards_by_name
 
-    cards = packaged_cards()
+    cards, faults = cards_by_name()
+    for fault in faults:
+        typer.echo(f"Careful: {fault}", err=True)
     if json:
         typer.echo(as_json({name: {"title": card.title, "trust": card.trust} for name, card in cards.items()}))
         return
@@ -54,8 +56,8 @@ def new(
 ) -> None:
     """Write a commented card for your own single-rotor helicopter: guesses scaled to its size, to be measured."""
     from swashplate.atomic import write_text
-    from swashplate.vehicles.catalogue import from_card
-    from swashplate.vehicles.new_card import commented, new_card
+    from swashplate.models.catalogue import from_card
+    from swashplate.models.conventional.new_card import commented, new_card
 
     if out.exists():
         raise SwashError("exists already; it is not overwritten.", where=out, hint="Choose another name.")
@@ -74,7 +76,7 @@ def show(
     """Show what a vehicle is, where its card may be trusted, and every number with unit, status and source."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import parameter_table
-    from swashplate.vehicles.catalogue import vehicle as find
+    from swashplate.models.catalogue import vehicle as find
 
     vehicle = find(name)
     card = vehicle.card

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from swashplate import documents
+from swashplate.arrays import Complex
 from swashplate.errors import ExportError
 from swashplate.export.linear import Linear
-from swashplate.identification.spectra import Complex
 
 KEYS = (
     "Ma1s", "Lb1s", "Xa1s", "Yb1s", "Mu", "Mv", "Mq", "Mp", "Lu",
@@ -124,12 +125,7 @@ def read_ardupilot(path: str | Path) -> dict[str, float]:
     Raises:
         ExportError: naming the entry that is unknown or no number.
     """
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ExportError(f"cannot be read as JSON: {error}.", where=path) from None
-    if not isinstance(document, dict):
-        raise ExportError("is no JSON object of numbers.", where=path)
+    document = documents.read_document(path, form="json", error=ExportError)
     for key, value in document.items():
         if key not in KEYS:
             raise ExportError("is no number of ArduPilot's state-space helicopter.", where=path, channel=key)
@@ -204,12 +200,10 @@ def _in_sticks(model: Linear, sticks: Sticks) -> Linear:
 
 def _early(model: Linear, state: str, name: str) -> float:
     """What a held input has done to a state after a quarter of a second: its sense, the rotor's lag included."""
-    from scipy.linalg import expm
+    from swashplate.simulation.discretisation import zero_order_hold
 
-    n = len(model.states)
-    whole = np.zeros((n + 1, n + 1))
-    whole[:n, :n], whole[:n, n] = model.A, model.B[:, model.inputs.index(name)]
-    return float(expm(0.25 * whole)[model.states.index(state), n])
+    _, G = zero_order_hold(model.A, model.B, 0.25)
+    return float(G[model.states.index(state), model.inputs.index(name)])
 
 
 def _without(model: Linear, names: list[str], *, steady: bool) -> Linear:

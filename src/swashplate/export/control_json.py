@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from swashplate import documents
+from swashplate.arrays import Array
 from swashplate.errors import ExportError
-from swashplate.export.linear import Array, Linear
+from swashplate.export.linear import Linear
 
 SCHEMA = 1
 KIND = "state-space"
@@ -46,11 +48,8 @@ def read_linear(path: str | Path) -> Linear:
     Raises:
         ExportError: naming the file and the entry that is missing, of another shape or no number.
     """
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ExportError(f"cannot be read as JSON: {error}.", where=path) from None
-    if not isinstance(document, dict) or document.get("kind") != KIND or document.get("schema") != SCHEMA:
+    document = documents.read_document(path, form="json", error=ExportError)
+    if document.get("kind") != KIND or document.get("schema") != SCHEMA:
         raise ExportError(
             f"is no linear model of kind '{KIND}' and schema {SCHEMA}.",
             where=path,

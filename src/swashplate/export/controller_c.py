@@ -14,31 +14,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from swashplate.atomic import write_text
-from swashplate.control.autopilot import Autopilot, Memory, Reference, step
-from swashplate.control.height_yaw import HeightYawMemory
-from swashplate.control.lqg import Lqg
+from swashplate.control.kinds import TracedStep, kind_of
 from swashplate.errors import ControllerError
-from swashplate.export.lqg_c import lqg_function, measured_names
-from swashplate.physics.backend import CasadiBackend
-from swashplate.physics.rigid_body import RigidBody
-from swashplate.vehicles.coax import CoaxInputs
+from swashplate.simulation.closed_loop import REFERENCES, Controller
 
 Precision = Literal["double", "float"]
 
 _OWN = {"fmax(x, y)": "x > y ? x : y", "fmin(x, y)": "x < y ? x : y", "fabs(x)": "x > 0 ? x : -x"}
 """What CasADi takes from the C library, written out."""
-
-
-@dataclass(frozen=True)
-class _Traced:
-    """A step as a CasADi function of (memory, measured, reference) to (memory, command), and what its rows hold."""
-
-    function: Any
-    start: tuple[float, ...]
-    memory: str
-    measured: tuple[str, ...]
-    commands: tuple[str, ...]
-    about: str
 
 
 @dataclass(frozen=True)
@@ -67,7 +50,7 @@ class ControllerCode:
         write_text(path, self.source)
 
 
-def controller_code(controller: Autopilot | Lqg, *, precision: Precision = "double") -> ControllerCode:
+def controller_code(controller: Controller, *, precision: Precision = "double") -> ControllerCode:
     """The C source of one step of a controller, with its numbers as constants.
 
     Args:
@@ -75,7 +58,7 @@ def controller_code(controller: Autopilot | Lqg, *, precision: Precision = "doub
         precision: of every number in it.
 
     Raises:
-        ControllerError: where CasADi is not installed.
+        ControllerError: where CasADi is not installed, or this kind of controller has no C.
     """
     try:
         import casadi
@@ -83,7 +66,7 @@ def controller_code(controller: Autopilot | Lqg, *, precision: Precision = "doub
         raise ControllerError(
             "needs CasADi.", channel="C code", hint="Install swashplate with the extra 'export'."
         ) from None
-    traced = _lqg(controller) if isinstance(controller, Lqg) else _autopilot(controller)
+    traced = kind_of(controller).traced(controller)
     function = traced.function
     with tempfile.TemporaryDirectory() as folder:
         made = casadi.CodeGenerator("controller.c", {"casadi_real": precision, "casadi_int": "int"})
@@ -106,41 +89,6 @@ def controller_code(controller: Autopilot | Lqg, *, precision: Precision = "doub
     )
 
 
-def _autopilot(controller: Autopilot) -> _Traced:
-    import casadi
-
-    names = ("height", "heading", "spool", "ahead", "right")
-    memory, measured, reference = (
-        casadi.SX.sym(name, n)
-        for name, n in (("memory", len(names)), ("measured", len(RigidBody._fields) + 1), ("reference", 8))
-    )
-    carried = Memory(HeightYawMemory(memory[0], memory[1], memory[2]), memory[3], memory[4])
-    body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
-    wanted = Reference(*(reference[i] for i in range(len(Reference._fields))))
-    after, command = step(carried, body, measured[len(body)], wanted, controller.numbers, CasadiBackend())
-    results = casadi.vertcat(*after.motors, after.ahead, after.right, *command)
-    return _Traced(
-        casadi.Function("swash_traced", [memory, measured, reference], [results]),
-        tuple(controller.memory.tolist()),
-        ", ".join(names),
-        (*RigidBody._fields, "voltage"),
-        CoaxInputs._fields,
-        f"{controller.vehicle}, mode {controller.mode}, designed on: {controller.model}",
-    )
-
-
-def _lqg(controller: Lqg) -> _Traced:
-    vehicle = controller.vehicle
-    return _Traced(
-        lqg_function(controller),
-        tuple(controller.inner_memory.tolist()),
-        "estimates, their covariance, commands given, counts, integrals and speeds",
-        measured_names(controller),
-        vehicle.input_names,
-        f"{vehicle.name}, LQG, designed on: {vehicle.card.title}",
-    )
-
-
 def _operations(function: Any) -> int:
     """Instructions of the trace but reading inputs, writing outputs and constants; loops count by their rounds."""
     import casadi
@@ -150,7 +98,7 @@ def _operations(function: Any) -> int:
     return sum(scalar.instruction_id(i) not in moved for i in range(scalar.n_instructions()))
 
 
-def _heading(controller: Autopilot | Lqg, traced: _Traced, precision: Precision) -> str:
+def _heading(controller: Controller, traced: TracedStep, precision: Precision) -> str:
     counts = len(traced.start), len(traced.measured), len(traced.commands)
     lines = textwrap.wrap(", ".join(traced.measured), 100)
     return f"""/* One step of a swashplate controller, to be called at {controller.rate:g} Hz.
@@ -159,9 +107,10 @@ def _heading(controller: Autopilot | Lqg, traced: _Traced, precision: Precision)
  *                   const {precision} reference[8], {precision} command[{counts[2]}]);
  *
  * vehicle    {traced.about.replace("*/", "* /")}
+ * late       {_late(controller)}
  * measured   {f"{chr(10)} *            ".join(lines)}
  *            [SI, radians, forward-right-down and north-east-down]
- * reference  {", ".join(Reference._fields)}
+ * reference  {", ".join(REFERENCES)}
  * command    {", ".join(traced.commands)}
  * memory     {traced.memory}; starts as swash_memory says
  *
@@ -173,7 +122,13 @@ def _heading(controller: Autopilot | Lqg, traced: _Traced, precision: Precision)
 """
 
 
-def _ending(traced: _Traced, precision: Precision) -> str:
+def _late(controller: Controller) -> str:
+    """From reading to action, as it was designed for."""
+    waits = ", ".join(f"{n} {1e3 * d:g} ms" for n, d in getattr(controller, "delays", {}).items() if d)
+    return f"{waits}, computation included" if waits else "designed for commands that act at once"
+
+
+def _ending(traced: TracedStep, precision: Precision) -> str:
     f, n, m = traced.function, len(traced.start), len(traced.commands)
     suffix = "f" if precision == "float" else ""
     # Dots keep them floating numbers; 17 digits bring a double back as it was.

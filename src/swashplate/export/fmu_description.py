@@ -11,7 +11,7 @@ from swashplate.flights.base_units import base_units
 
 
 @dataclass(frozen=True)
-class Entry:
+class FmuVariable:
     """One real variable of the description; its place in the list is its value reference plus one."""
 
     name: str
@@ -22,24 +22,24 @@ class Entry:
     derivative: int = 0
 
 
-def entries(model: Traced, *, step: float) -> list[Entry]:
+def entries(model: Traced, *, step: float) -> list[FmuVariable]:
     """Every variable in the order of the value references in runtime/fmu2.c; `step` is the internal one [s]."""
     n = len(model.states)
-    made = [Entry(v.name, v, "output", "continuous", "exact") for v in model.states]
+    made = [FmuVariable(v.name, v, "output", "continuous", "exact") for v in model.states]
     made += [
-        Entry(f"der({v.name})", Variable(v.name, _per_second(v.unit)), "local", "continuous", "calculated", i + 1)
+        FmuVariable(f"der({v.name})", Variable(v.name, _per_second(v.unit)), "local", "continuous", "calculated", i + 1)
         for i, v in enumerate(model.states)
     ]
     taken = {v.name for v in model.states}
     for v in (*model.inputs, *model.surroundings):
-        made.append(Entry(v.name, v, "input", "continuous"))
+        made.append(FmuVariable(v.name, v, "input", "continuous"))
         taken.add(v.name)
-    made += [Entry(f"parameters.{v.name}", v, "parameter", "tunable", "exact") for v in model.parameters]
+    made += [FmuVariable(f"parameters.{v.name}", v, "parameter", "tunable", "exact") for v in model.parameters]
     for v in model.outputs:
         name = f"{v.name}_measured" if v.name in taken else v.name
-        made.append(Entry(name, v, "output", "continuous", "calculated"))
+        made.append(FmuVariable(name, v, "output", "continuous", "calculated"))
     longest = Variable("step_size", "s", step, meaning="longest internal step of the Runge-Kutta integration")
-    made.append(Entry(longest.name, longest, "parameter", "tunable", "exact"))
+    made.append(FmuVariable(longest.name, longest, "parameter", "tunable", "exact"))
     assert [e.derivative for e in made[n : 2 * n]] == list(range(1, n + 1))
     return made
 
@@ -94,7 +94,7 @@ def description(model: Traced, *, guid: str, version: str, sources: tuple[str, .
     return bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)) + b"\n"
 
 
-def _variable(parent: ElementTree.Element, reference: int, entry: Entry) -> None:
+def _variable(parent: ElementTree.Element, reference: int, entry: FmuVariable) -> None:
     v = entry.variable
     element = ElementTree.SubElement(
         parent, "ScalarVariable", name=entry.name, valueReference=str(reference), causality=entry.causality

@@ -6,17 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from swashplate.control.linear_vehicle import delays_of
+from swashplate.arrays import Array
 from swashplate.errors import ExportError
-from swashplate.identification.state_space import StateSpaceModel
+from swashplate.models.delays import input_delays
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -67,26 +63,19 @@ class Linear:
 
 
 def logged_delays(vehicle: Vehicle) -> dict[str, float]:
-    """By how much the motion lagged each logged input when a vehicle was identified [s].
-
-    Latency of the radio, the servo pulses and the logger's clock: the equations do not have it, the card's observer
-    section remembers it (`delay_motor` for motors, `delay_servo` for all else; a linear model's card by input).
+    """The identified delays of a vehicle's inputs [s] (see `input_delays`).
 
     Raises:
         ExportError: where the card remembers none.
     """
-    if own := delays_of(vehicle):
-        return own
-    found = vehicle.card.observer.get("nuisance", {})
-    names = {i: "delay_motor" if i.startswith("motor") else "delay_servo" for i in vehicle.input_names}
-    if not found.keys() & set(names.values()):
+    if not (found := input_delays(vehicle)):
         raise ExportError(
             "the card remembers no delays.",
             where=vehicle.card.path or vehicle.name,
             channel="--delays",
             hint="Only a model that `swash identify` wrote has them.",
         )
-    return {name: max(0.0, float(found.get(key, 0.0))) for name, key in names.items()}
+    return found
 
 
 def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Linear:

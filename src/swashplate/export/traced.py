@@ -12,11 +12,11 @@ from swashplate.errors import ExportError
 from swashplate.export.c_text import identifier
 from swashplate.export.linear import Linear
 from swashplate.flights.schema import channel, is_known
+from swashplate.models.nesting import rebuild
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.structure import rebuild
-from swashplate.vehicles.vehicle import Vehicle
 
 _SURROUNDINGS = {
     "wind_north": ("m/s", "wind towards north"),

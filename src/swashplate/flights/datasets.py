@@ -35,7 +35,7 @@ class Dataset:
 
 
 @dataclass(frozen=True)
-class Row:
+class DatasetFile:
     """A line of `listing`: the file's path where it is found, else None."""
 
     name: str
@@ -52,6 +52,15 @@ _RIG = "https://raw.githubusercontent.com/Aeronavics/coax-testrig/495689fb67fa7d
 def _run(sha256: str, folder: str, name: str, description: str) -> DataFile:
     """A run of the propeller rig."""
     return DataFile(sha256, f"{_RIG}/{quote(f'Data_scripts/{folder}/{name}')}", description, "bench")
+
+
+_NANOBENCH = "https://raw.githubusercontent.com/syediu/nanobench-iros2026/d45bc5a6090a8a4e522009c06edb1b7ad897891b"
+
+
+def _nanobench(sha256: str, name: str) -> tuple[str, DataFile]:
+    """A flight of the Crazyflie, by its trajectory."""
+    told = name.split("_", 1)[1].replace("_rep", ", flight ").replace("_", " ")
+    return f"{name}.csv", DataFile(sha256, f"{_NANOBENCH}/datasets/dataset/{name}.csv", f"{told}; at 100 Hz")
 
 
 _PAIR, _RAISED = "two XOAR 18 x 6.5 in, one above the other", "two XOAR 18 x 6.5 in, the lower marked +2"
@@ -167,6 +176,28 @@ REGISTRY: Mapping[str, Dataset] = {
             ),
         },
     ),
+    "nanobench": Dataset(
+        "Crazyflie 2.1 under motion capture, with motor commands, IMU and battery (2026; syediu/nanobench-iros2026)",
+        dict(
+            (
+                _nanobench(
+                    "14e6ae607bd6bc507b3a3acc53a7e97df3539f3d2c862a4f5d073f610d18f1d0", "B10_lissajous_fast_rep1"
+                ),
+                _nanobench("0f3c20f91b466a4050f223120d46d332c65c88ff3870b430d832385abb7c08ae", "B2_circle_fast_rep2"),
+                _nanobench("926a2881ad3590692047d193e1f9f0090b9dc258de7475f0e3038586fcbf9d89", "B2_circle_slow_rep2"),
+                _nanobench("b99c65e1dd518c26b4f9fbad5d57fed09d627ad045a431a6fb27adacfeca0329", "B3_figure8_fast_rep1"),
+                _nanobench(
+                    "6c5e7d6feb79c3e99c2f222c53a089a4884c09caf7e7397b3056437ccd0f6f2e", "B3_figure8_medium_rep2"
+                ),
+                _nanobench("f2a7e983721b3ca40afc426d2e3f095043a2b3c9b847c8dcf911851fd785c99c", "B5_helix_fast_rep2"),
+                _nanobench("b4c2a87c43dc5b19511d863cc8456b2ed7ffbe1dcf29579a05f232a292dae38c", "B5_helix_medium_rep1"),
+                _nanobench("a4d1281854d937c94680ed8b49e176a1ac612c994c01d88964dff6689e73199a", "B6_linear_ramp_rep1"),
+                _nanobench("d7b67a4f7c7136b0ccbd272b9329b4b248a7841ae64fc7612f5b1f15d78b0654", "B6_linear_ramp_rep2"),
+                _nanobench("a2134e0d4e814deefb916f7034cddbcf5b5033d326545063378a383e0f2d85e9", "B8_star_fast_rep1"),
+                _nanobench("bb515fdd874f2cbc68e99b082cb7fa7c27fd593f54b568e23342f90df6fbeb06", "B8_star_medium_rep1"),
+            )
+        ),
+    ),
 }
 
 
@@ -222,10 +253,10 @@ def find(name: str, file: str, *, registry: Mapping[str, Dataset] = REGISTRY) ->
     return next((path for path in candidates if _has_hash(path, entry.sha256)), None)
 
 
-def listing(*, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[Row, ...]:
+def listing(*, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[DatasetFile, ...]:
     """Every registered file: data set, name, where it is found (or None), description."""
     return tuple(
-        Row(name, file, find(name, file, registry=registry), entry.description)
+        DatasetFile(name, file, find(name, file, registry=registry), entry.description)
         for name, dataset in registry.items()
         for file, entry in dataset.files.items()
     )

@@ -3,83 +3,26 @@
 from __future__ import annotations
 
 import difflib
-import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
+from swashplate.flights import storage
+from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import channel
+from swashplate.public import resolve
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that a log says happened.
-
-    Attributes:
-        time: [s], on the flight's clock.
-        kind: "message", "mode", "parameter", "sweep", "armed", "disarmed", "dropout".
-        text: in words.
-        details: its numbers (JSON types only).
-    """
-
-    time: float
-    kind: str
-    text: str
-    details: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a flight comes from.
-
-    Attributes:
-        source: file name, or the simulated vehicle's name.
-        sha256: hash of the file's bytes ("" for a simulation).
-        reader: the reader's or simulator's name.
-        reader_version: its version.
-        simulated: True where no aircraft flew.
-        vehicle: the vehicle as the log or the user names it.
-        notes: what a reader found wrong and what the user must know.
-        damage: what is broken in the file itself (cut off, lost bytes, clock resets); the rest of it was read.
-        parameters: an autopilot's settings as the log begins; changes in flight are events.
-        events: what the log says happened, in order of time.
-    """
-
-    source: str = ""
-    sha256: str = ""
-    reader: str = ""
-    reader_version: str = ""
-    simulated: bool = False
-    vehicle: str = ""
-    notes: tuple[str, ...] = ()
-    damage: tuple[str, ...] = ()
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    events: tuple[Event, ...] = ()
-
-    def parameter(self, name: str, *, at: float = math.inf) -> float | None:
-        """An autopilot's setting at a time [s], at the end of the log if none is given; None where it is not logged."""
-        value = self.parameters.get(name)
-        for event in self.events:
-            if event.kind == "parameter" and event.time <= at and event.details.get("name") == name:
-                value = float(event.details["value"])
-        return value
-
-
-@dataclass(frozen=True)
-class Step:
-    """One thing done to a flight: the operation and its numbers (JSON types only)."""
-
-    operation: str
-    details: Mapping[str, Any] = field(default_factory=dict)
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 
 def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[str, str] | None = None) -> xr.Dataset:
@@ -91,6 +34,8 @@ def stream(time: ArrayLike, channels: Mapping[str, ArrayLike], units: Mapping[st
         units: units of channels that the schema does not know; a unit that contradicts the schema is an error.
     """
     stamps = np.asarray(time, dtype=np.float64)
+    if np.any(np.abs(stamps) > LATEST):
+        raise FlightError(f"reaches {np.max(np.abs(stamps)):g} s: no clock does.", channel="time")
     if stamps.ndim != 1 or (stamps.size > 1 and not np.all(np.diff(stamps) > 0)):
         raise FlightError("time must be one strictly increasing row of numbers.", channel="time")
     variables = {}
@@ -130,7 +75,7 @@ class Flight:
 
     streams: Mapping[str, xr.Dataset]
     provenance: Provenance = field(default_factory=Provenance)
-    history: tuple[Step, ...] = ()
+    history: tuple[ProcessingStep, ...] = ()
     segments: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -189,6 +134,11 @@ class Flight:
         return np.stack([self.values(name) for name in wanted], axis=-1)
 
     @property
+    def epoch(self) -> float:
+        """Time zero on the log's own clock [s] (`Provenance.epoch`): `epoch + time` puts two logs on one clock."""
+        return self.provenance.epoch
+
+    @property
     def start(self) -> float:
         return min(float(data["time"].values[0]) for data in self.streams.values() if data.sizes["time"])
 
@@ -210,7 +160,7 @@ class Flight:
     # ---- making a changed copy ---------------------------------------------------------------------------------
     def done(self, operation: str, **details: Any) -> Flight:
         """A copy whose history says that `operation` was done, with its numbers."""
-        return replace(self, history=(*self.history, Step(operation, details)))
+        return replace(self, history=(*self.history, ProcessingStep(operation, details)))
 
     def with_streams(self, streams: Mapping[str, xr.Dataset]) -> Flight:
         """A copy with other streams; provenance, history and segments stay."""
@@ -237,29 +187,107 @@ class Flight:
             return (self,)
         return tuple(self.between(start, stop) for start, stop in self.segments)
 
+    # ---- other shapes -------------------------------------------------------------------------------------------
+    @staticmethod
+    def from_arrays(
+        time: ArrayLike,
+        channels: Mapping[str, ArrayLike],
+        *,
+        units: Mapping[str, str] | None = None,
+        source: str = "",
+    ) -> Flight:
+        """A flight of arrays that share one time base.
+
+        Args:
+            time: strictly increasing times [s], shape (n,); Unix time too.
+            channels: arrays of shape (n,) by channel name.
+            units: of channels that are not in the schema's unit (deg, deg/s, g, ...): they are converted.
+            source: what the flight is called.
+
+        Raises:
+            FlightError, UnitError: naming the channel.
+        """
+        flight: Flight = resolve("flight_from_arrays")(time, channels, units=units, source=source)
+        return flight
+
+    @staticmethod
+    def from_dataframe(frame: pd.DataFrame, *, units: Mapping[str, str] | None = None, source: str = "") -> Flight:
+        """A flight of a data frame: its index is the time [s], its columns are channels (see `from_arrays`)."""
+        flight: Flight = resolve("flight_from_dataframe")(frame, units=units, source=source)
+        return flight
+
+    def to_dataframe(self, *, stream: str | None = None) -> pd.DataFrame:
+        """The channels of one stream as a data frame over time [s], SI and radians; units in `frame.attrs["units"]`.
+
+        Raises:
+            FlightError: where there are several streams and none is named.
+        """
+        frame: pd.DataFrame = resolve("flight_to_dataframe")(self, stream=stream)
+        return frame
+
+    def plot(self, *, channels: Sequence[str] | None = None) -> Figure:
+        """Channels over time as a matplotlib figure: one panel each, or the usual groups where none are named."""
+        figure: Figure = resolve("plot_flight")(self, channels=channels)
+        return figure
+
+    def _repr_html_(self) -> str:
+        page: str = resolve("html_of_flight")(self)
+        return page
+
     # ---- files -------------------------------------------------------------------------------------------------
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the flight as a netCDF file without loss (`storage.save`); returns its path."""
-        from swashplate.flights import storage  # the file formats import this module
-
-        return storage.save(self, Path(path))
+        parts = storage.Parts(self.streams, self.provenance, self.history, self.segments)
+        return storage.save(parts, path)
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Flight:
-        """The flight in a netCDF file that `save` wrote (`storage.load`)."""
-        from swashplate.flights import storage
+        """The flight in a netCDF file that `save` wrote: equal in streams, attributes, history and segments.
 
-        return storage.load(Path(path))
+        Raises:
+            FlightError: where the file is missing, was not written by swashplate, is damaged, or is of a newer schema.
+        """
+        return Flight(*storage.load(path))
 
-    def condition(self, **options: Any) -> Flight:
-        """One uniform stream of clean channels, ready for identification: see `swashplate.flights.condition`.
+    def condition(
+        self,
+        *,
+        rate: float = 100.0,
+        cutoff: float = 0.0,
+        max_gap: float = 0.06,
+        outliers: bool = True,
+        trim_ground: bool = True,
+        derive: bool = True,
+        method: str = "linear",
+        check: bool = True,
+    ) -> Flight:
+        """One uniform stream of clean channels, ready for identification.
 
         Args:
-            options: rate [Hz], cutoff [Hz], max_gap [s], outliers, trim_ground, derive, method.
-        """
-        from swashplate.flights.condition import condition  # it needs this class, and SciPy's filters take time to load
+            rate: [Hz].
+            cutoff: corner of a zero-phase low-pass on all channels, inputs too [Hz]; 0 for none.
+            max_gap: longest gap that is bridged [s]; longer ones split the flight into segments.
+            outliers: remove outliers.
+            trim_ground: keep the flying part only.
+            derive: add angles, body velocities, rates and specific force where position and attitude are there.
+            method: between samples: "linear", "pchip" or "spline".
+            check: refuse a log whose channels contradict each other in unit, sign or axis.
 
-        return condition(self, **options)
+        Raises:
+            FlightError: see `flights.conditioning.condition.condition`, which does it.
+        """
+        conditioned: Flight = resolve("condition")(
+            self,
+            rate=rate,
+            cutoff=cutoff,
+            max_gap=max_gap,
+            outliers=outliers,
+            trim_ground=trim_ground,
+            derive=derive,
+            method=method,
+            check=check,
+        )
+        return conditioned
 
     def __repr__(self) -> str:
         name = self.provenance.source or "(unnamed)"

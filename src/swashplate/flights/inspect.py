@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
+from swashplate.arrays import Array
+from swashplate.flights.consistency import consistency
+from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.schema import QUATERNION, channel, is_known
-from swashplate.flights.sweeps import Sweep, sweeps
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-Array = NDArray[np.float64]
-
-_GAP = 3.0  # median steps; a step longer than this has lost at least two samples
+_LARGEST = 1e30  # in the channel's unit: no sensor reaches it, and its square is still a number
+_GAP = 3.0  # usual steps; a step longer than this has lost at least two samples
+_TURN = 31  # steps whose median is the usual one there: half as many slow ones in a row are another rate, no gaps
 _JITTER = 0.05  # of the median step; beyond it, equal steps cannot be assumed
 _OUTLIER = 12.0  # robust standard deviations of the sample-to-sample change
 _NEAR = 25  # changes on each side that are its neighbours
@@ -39,7 +43,8 @@ class StreamSummary:
     Attributes:
         rate: sample rate [Hz] from the median step; NaN for a single sample.
         jitter: scatter of the steps that are no gaps: 1.4826 times the median absolute deviation [s].
-        gaps: steps longer than three median steps; longest_gap: the longest of them [s] (0 where there is none).
+        gaps: steps longer than three usual ones there; longest_gap: the longest of them [s] (0 where there is none).
+        rates: the slowest and the fastest usual rate [Hz]: autopilots log some messages slowly outside tests.
     """
 
     name: str
@@ -50,6 +55,7 @@ class StreamSummary:
     jitter: float
     gaps: int
     longest_gap: float
+    rates: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -65,6 +71,7 @@ class ChannelSummary:
             for the four channels of a quaternion, those of the rotation between samples; for a command, which may step,
             only those that the next sample takes back.
         outside: samples of a command that lie outside its range (motors 0 to 1, servos -1 to 1).
+        impossible: samples beyond 1e30, which stand in no other figure.
     """
 
     name: str
@@ -77,6 +84,7 @@ class ChannelSummary:
     constant: bool
     outliers: int
     outside: int
+    impossible: int = 0
 
 
 @dataclass(frozen=True)
@@ -130,6 +138,7 @@ class Inspection:
         rows = []
         for c in self.channels:
             remarks = ["never moves"] * c.constant + [f"{c.missing} missing"] * bool(c.missing)
+            remarks += [f"{c.impossible} impossible"] * bool(c.impossible)
             remarks += ["not in the schema"] * (not is_known(c.name))
             numbers = (f"{c.low:.4g}", f"{c.median:.4g}", f"{c.high:.4g}", f"{c.outliers or '-'}")
             rows.append((c.name, c.unit, c.stream, *numbers, ", ".join(remarks)))
@@ -181,14 +190,25 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
     time = np.asarray(data["time"].values, dtype=np.float64)
     if time.size < 2:
         edge = float(time[0]) if time.size else float("nan")
-        return StreamSummary(name, time.size, edge, edge, float("nan"), float("nan"), 0, 0.0)
+        nothing = float("nan")
+        return StreamSummary(name, time.size, edge, edge, nothing, nothing, 0, 0.0, (nothing, nothing))
     steps = np.diff(time)
-    median = float(np.median(steps))
-    gaps = steps[steps > _GAP * median]
-    usual = steps[steps <= _GAP * median]
-    jitter = _MAD_TO_SIGMA * float(np.median(np.abs(usual - median)))
-    longest = float(gaps.max()) if gaps.size else 0.0
-    return StreamSummary(name, time.size, float(time[0]), float(time[-1]), 1.0 / median, jitter, gaps.size, longest)
+    median, usual = float(np.median(steps)), median_filter(steps, size=_TURN, mode="mirror")
+    rates = (1.0 / float(usual.max()), 1.0 / float(usual.min()))
+    if rates[1] <= _GAP * rates[0]:  # one rate
+        usual = np.full(steps.shape, median)
+    long = steps > _GAP * usual
+    return StreamSummary(
+        name,
+        time.size,
+        float(time[0]),
+        float(time[-1]),
+        rate=1.0 / median,
+        jitter=_MAD_TO_SIGMA * float(np.median(np.abs(steps - usual)[~long])),
+        gaps=int(long.sum()),
+        longest_gap=float(steps[long].max()) if long.any() else 0.0,
+        rates=rates,
+    )
 
 
 def _jumps(changes: Array) -> NDArray[np.bool_]:
@@ -234,7 +254,23 @@ def _attitude_jumps(flight: Flight) -> int:
     return int(np.sum(np.any([_jumps(component) for component in turned], axis=0)))
 
 
-def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
+def _without_impossible(flight: Flight) -> tuple[Flight, dict[str, int]]:
+    """The flight with NaN for numbers beyond what anything measures, and how many those are by channel."""
+    counts: dict[str, int] = {}
+    streams = {}
+    for stream_name, data in flight.streams.items():
+        changed = {}
+        for name, values in data.data_vars.items():
+            numbers = np.asarray(values.values, dtype=np.float64)
+            beyond = np.isfinite(numbers) & (np.abs(numbers) > _LARGEST)
+            if np.any(beyond):
+                counts[str(name)] = int(np.sum(beyond))
+                changed[name] = values.copy(data=np.where(beyond, np.nan, numbers))
+        streams[stream_name] = data.assign(changed) if changed else data
+    return (replace(flight, streams=streams) if counts else flight), counts
+
+
+def _summarise_channel(flight: Flight, name: str, home: str, impossible: int) -> ChannelSummary:
     values = flight.values(name)
     known = channel(name)
     inside = str(flight[name].attrs.get("units", ""))
@@ -257,10 +293,11 @@ def _summarise_channel(flight: Flight, name: str, home: str) -> ChannelSummary:
         low=float(low),
         median=float(median),
         high=float(high),
-        missing=int(values.size - finite.size),
+        missing=int(values.size - finite.size) - impossible,
         constant=bool(finite.size > 1 and low == high),
         outliers=outliers,
         outside=int(np.sum((finite < bounds[0]) | (finite > bounds[1]))),
+        impossible=impossible,
     )
 
 
@@ -278,10 +315,21 @@ def _stream_problems(stream: StreamSummary) -> list[str]:
     return problems
 
 
+def _stream_notes(stream: StreamSummary) -> list[str]:
+    slow, fast = stream.rates
+    if not fast > _GAP * slow:
+        return []
+    return [
+        f"{stream.name}: recorded at {slow:.3g} Hz and at {fast:.3g} Hz by turns; take a piece of one rate for a fit"
+    ]
+
+
 def _channel_problems(summary: ChannelSummary) -> list[str]:
     problems = []
     if summary.missing:
         problems.append(f"{summary.name}: {summary.missing} samples are not finite")
+    if summary.impossible:
+        problems.append(f"{summary.name}: {summary.impossible} samples beyond {_LARGEST:g}: nothing measures that")
     if summary.constant and not summary.name.startswith(_ORDINARY):
         problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
     if summary.outside:
@@ -301,17 +349,25 @@ def inspect(flight: Flight) -> Inspection:
     Nothing is repaired; conditioning does that.
     """
     streams = tuple(_summarise_stream(name, data) for name, data in flight.streams.items())
-    channels = tuple(_summarise_channel(flight, name, flight.stream_of(name)) for name in flight.channels)
+    flight, impossible = _without_impossible(flight)
+    channels = tuple(
+        _summarise_channel(flight, name, flight.stream_of(name), impossible.get(name, 0)) for name in flight.channels
+    )
     damage = flight.provenance.damage
     problems = [*damage, *(text for stream in streams for text in _stream_problems(stream))]
     problems += [text for summary in channels for text in _channel_problems(summary)]
+    problems += [str(finding) for finding in consistency(flight)]
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,
         duration=flight.duration if any(stream.n for stream in streams) else 0.0,
         streams=streams,
         channels=channels,
-        notes=flight.provenance.notes,
+        notes=(
+            *flight.provenance.notes,
+            *([note(flight.epoch)] if flight.epoch else ()),
+            *(text for stream in streams for text in _stream_notes(stream)),
+        ),
         problems=tuple(dict.fromkeys(problems)),  # the attitude's jumps stand at each of its four channels
         sweeps=sweeps(flight),
         damage=damage,

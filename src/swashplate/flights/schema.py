@@ -80,7 +80,11 @@ _CHANNELS = (
     Channel("mixer_roll", "1", "roll command into the mixer, -1 to 1, positive rolls right"),
     Channel("mixer_pitch", "1", "pitch command into the mixer, -1 to 1, positive pitches nose up"),
     Channel("mixer_yaw", "1", "yaw command into the mixer, -1 to 1, positive turns the nose right"),
-    Channel("mixer_collective", "1", "collective (or thrust) command into the mixer, 0 to 1, positive climbs"),
+    Channel(
+        "mixer_collective",
+        "1",
+        "collective (or thrust) command, 0 to 1 (Rotorflight -1 to 1), positive climbs",
+    ),
     Channel("omega_rotor", "rad/s", "main rotor speed"),
     Channel("airspeed", "m/s", "true airspeed"),
     Channel("voltage", "V", "battery voltage"),
@@ -99,7 +103,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 # Second opinions on a channel, as an autopilot logs them: the same quantity in the same unit.
-_VARIANTS = {
+VARIANTS = {
     "demand": "as demanded by the autopilot",
     "slow": "from the slower of two messages",
     "imu": "from the first inertial sensor",
@@ -118,18 +122,22 @@ _LOGGED = {
     )
 }
 _NUMBERED = re.compile(r"(rcin|rcout)_\d{1,2}")
+_ROTORS = {"motor": ("1", "motor command of a multirotor, 0 to 1"), "omega": ("rad/s", "rotor speed of a multirotor")}
+_ROTOR = re.compile(r"(motor|omega)_\d{1,2}")
 
 
 def _family(name: str) -> Channel | None:
-    """The entry of a name that stands for a family: `p_imu2`, `phi_demand`, `rcin_3`, `rcout_12`."""
+    """The entry of a name that stands for a family: `p_imu2`, `phi_demand`, `rcin_3`, `motor_4`."""
     if _NUMBERED.fullmatch(name):
         return Channel(name, "s", _PULSES[name.partition("_")[0]], "", "us")
+    if _ROTOR.fullmatch(name):
+        return Channel(name, *_ROTORS[name.partition("_")[0]])
     if name in _LOGGED:
         return _LOGGED[name]
     base, _, variant = name.partition("_")
-    if base in _VARIED and variant in _VARIANTS:
+    if base in _VARIED and variant in VARIANTS:
         plain = CHANNELS[base]
-        return replace(plain, name=name, description=f"{plain.description}, {_VARIANTS[variant]}")
+        return replace(plain, name=name, description=f"{plain.description}, {VARIANTS[variant]}")
     return None
 
 

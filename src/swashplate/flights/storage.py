@@ -6,26 +6,39 @@ in order, each with its group), `provenance`, `history`, `segments`; netCDF attr
 
 from __future__ import annotations
 
+import io
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
 import xarray as xr
 
-from swashplate.atomic import replaced_when_complete
+from swashplate import documents
+from swashplate.atomic import write_bytes
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Event, Flight, Provenance, Step
-from swashplate.flights.readers.source import refuse_oversized
+from swashplate.flights import hdf5
+from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import SCHEMA_VERSION
 
+Schema = TypeVar("Schema")
 _ENGINE: Final = "h5netcdf"
 
 
-def _plain(value: Any) -> Any:
+class Parts(NamedTuple):
+    """What a file holds of a flight: the arguments of `Flight`, in its order."""
+
+    streams: Mapping[str, xr.Dataset]
+    provenance: Provenance
+    history: tuple[ProcessingStep, ...]
+    segments: tuple[tuple[float, float], ...]
+
+
+def plain(value: Any) -> Any:
     """NumPy numbers in a history as JSON numbers."""
     if isinstance(value, np.generic):
         return value.item()
@@ -36,7 +49,7 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} is not a JSON type")
 
 
-def _attributes(flight: Flight) -> dict[str, Any]:
+def _attributes(flight: Parts) -> dict[str, Any]:
     groups = {name: f"stream_{index}" for index, name in enumerate(flight.streams)}
     texts = {
         "streams": list(groups.items()),
@@ -45,32 +58,27 @@ def _attributes(flight: Flight) -> dict[str, Any]:
         "segments": flight.segments,
     }
     return {"swashplate_schema": SCHEMA_VERSION} | {
-        name: json.dumps(value, default=_plain) for name, value in texts.items()
+        name: json.dumps(value, default=plain) for name, value in texts.items()
     }
 
 
-def save(flight: Flight, path: str | Path) -> Path:
+def save(flight: Parts, path: str | os.PathLike[str]) -> Path:
     """Writes a flight as a netCDF file, which appears by rename when it is complete; returns its path.
 
+    The file is made in memory: where the disk is full, the HDF5 library ends the whole process instead of saying so.
+
     Raises:
-        FlightError: where the folder is missing or cannot be written to.
+        WriteError: where the folder is missing or cannot be written to, or the disk is full.
     """
-    target = Path(path)
     attributes = _attributes(flight)
-    try:
-        with replaced_when_complete(target) as temporary:
-            xr.Dataset(attrs=attributes).to_netcdf(temporary, mode="w", engine=_ENGINE)
-            for name, group in json.loads(attributes["streams"]):
-                data = flight.streams[name]
-                # No fill value: a flight's numbers are what they are.
-                encoding: dict[Any, Any] = {variable: {"_FillValue": None} for variable in (*data.data_vars, "time")}
-                data.to_netcdf(temporary, mode="a", group=group, engine=_ENGINE, encoding=encoding)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise FlightError(
-            f"cannot be written: {reason}.", where=target, hint="Check that the folder exists and is yours."
-        ) from error
-    return target
+    file = io.BytesIO()
+    xr.Dataset(attrs=attributes).to_netcdf(file, mode="w", engine=_ENGINE)
+    for name, group in json.loads(attributes["streams"]):
+        data = flight.streams[name]
+        # No fill value: a flight's numbers are what they are.
+        encoding: dict[Any, Any] = {variable: {"_FillValue": None} for variable in (*data.data_vars, "time")}
+        data.to_netcdf(file, mode="a", group=group, engine=_ENGINE, encoding=encoding)
+    return write_bytes(path, file.getbuffer())
 
 
 def _text(value: Any) -> str:
@@ -78,17 +86,7 @@ def _text(value: Any) -> str:
 
 
 def _checked_attributes(path: Path) -> dict[str, str]:
-    """The root's attributes, after every size in the file has been held against the file's own.
-
-    HDF5 can claim a gigantic data set for which nothing was ever stored; reading it would fill the memory with zeros.
-    """
-    claimed = 0
-
-    def add(_: str, item: object) -> None:
-        nonlocal claimed
-        if isinstance(item, h5py.Dataset):
-            claimed += int(np.prod(item.shape or (), dtype=object)) * item.dtype.itemsize
-
+    """The root's attributes, after the file has been looked through."""
     with h5py.File(path, "r") as file:
         root = dict(file.attrs)
         if "swashplate_schema" not in root:
@@ -104,8 +102,7 @@ def _checked_attributes(path: Path) -> dict[str, str]:
                 where=path,
                 hint="Update swashplate.",
             )
-        file.visititems(add)
-    refuse_oversized(claimed, size=path.stat().st_size, where=str(path), what="its data sets together")
+        hdf5.check(path, file)
     return {name: _text(value) for name, value in root.items() if not name.startswith("_")}
 
 
@@ -116,10 +113,18 @@ def _load_stream(path: Path, group: str) -> xr.Dataset:
 
 def _check_stream(name: str, data: xr.Dataset, place: Path) -> None:
     """Refuses a stream that `save` cannot have written."""
-    kinds = {variable.dtype.kind for variable in data.variables.values()}
-    if set(data.dims) - {"time"} or "time" not in data.coords or kinds - set("fiub"):
-        raise FlightError(f"stream '{name}' is not numbers over one time base.", where=place, hint="Save it again.")
-    if not np.all(np.diff(data["time"].values) > 0):
+    if "time" not in data.coords:
+        raise FlightError("has no time.", where=place, channel=name, hint="Save it again.")
+    for variable, values in data.variables.items():
+        if values.dims != ("time",) or values.dtype.kind not in "fiub":
+            raise FlightError(
+                f"has the dimensions {values.dims} and the type {values.dtype}, expected numbers over time.",
+                where=place,
+                channel=f"{name}/{variable}",
+                hint="Save it again.",
+            )
+    time = data["time"].values
+    if time.dtype.kind != "f" or not np.all(np.abs(time) <= LATEST) or not np.all(np.diff(time) > 0):
         raise FlightError(
             "the times do not increase: the file is damaged.",
             where=place,
@@ -128,14 +133,14 @@ def _check_stream(name: str, data: xr.Dataset, place: Path) -> None:
         )
 
 
-def _provenance(entry: Mapping[str, Any]) -> Provenance:
-    known = {name: value for name, value in entry.items() if name in Provenance.__dataclass_fields__}
-    texts = {name: tuple(known.get(name, ())) for name in ("notes", "damage")}
-    return Provenance(**(known | texts | {"events": tuple(Event(**event) for event in known.get("events", ()))}))
+def _attribute(attributes: Mapping[str, str], name: str, schema: type[Schema], place: Path) -> Schema:
+    if name not in attributes:
+        raise FlightError("is missing.", where=place, channel=name, hint="It is damaged: copy or save it again.")
+    return documents.parse_logged(attributes[name], schema, where=place, at=name, error=FlightError)
 
 
-def load(path: str | Path) -> Flight:
-    """The flight in a netCDF file that `save` wrote: equal in streams, attributes, provenance, history and segments.
+def load(path: str | os.PathLike[str]) -> Parts:
+    """What is in a netCDF file that `save` wrote: equal in streams, attributes, provenance, history and segments.
 
     Raises:
         FlightError: where the file is missing, was not written by swashplate, is damaged, or is of a newer schema.
@@ -145,14 +150,15 @@ def load(path: str | Path) -> Flight:
         raise FlightError("there is no such file.", where=place, hint="Check the path.")
     try:
         attributes = _checked_attributes(place)
-        streams = {name: _load_stream(place, group) for name, group in json.loads(attributes["streams"])}
+        groups = _attribute(attributes, "streams", list[tuple[str, str]], place)
+        streams = {name: _load_stream(place, group) for name, group in groups}
         for name, data in streams.items():
             _check_stream(name, data, place)
-        return Flight(
+        return Parts(
             streams=streams,
-            provenance=_provenance(json.loads(attributes["provenance"])),
-            history=tuple(Step(step["operation"], step["details"]) for step in json.loads(attributes["history"])),
-            segments=tuple((float(start), float(stop)) for start, stop in json.loads(attributes["segments"])),
+            provenance=_attribute(attributes, "provenance", Provenance, place),
+            history=_attribute(attributes, "history", tuple[ProcessingStep, ...], place),
+            segments=_attribute(attributes, "segments", tuple[tuple[float, float], ...], place),
         )
     except FlightError:
         raise

@@ -13,7 +13,7 @@ _MISSING: Any = object()
 _HINT = "The how-to 'Fly a vehicle under ArduPilot or PX4' has a whole mapping."
 
 
-class Table:
+class MappingTable:
     """A table of a TOML document.
 
     Args:
@@ -26,7 +26,7 @@ class Table:
         self.where = where
         self._entries, self._path = entries, path
         self._asked: set[str] = set()
-        self._parts: list[Table] = []
+        self._parts: list[MappingTable] = []
 
     def error(self, key: str, problem: str) -> LinkError:
         """An error at one of its entries."""
@@ -40,12 +40,12 @@ class Table:
             raise self.error(key, "is missing.")
         return missing
 
-    def part(self, key: str, *, missing: Any = _MISSING) -> Table:
+    def part(self, key: str, *, missing: Any = _MISSING) -> MappingTable:
         """The table inside this one."""
         inner = self._get(key, missing)
         if not isinstance(inner, Mapping):
             raise self.error(key, f"is {inner!r}, expected a table.")
-        made = Table(inner, self.where, f"{self._path}{key}.")
+        made = MappingTable(inner, self.where, f"{self._path}{key}.")
         self._parts.append(made)
         return made
 
@@ -85,7 +85,7 @@ class Table:
             raise self.error(key, "has rows of different length.")
         return tuple(tuple(self._number(key, entry) for entry in row) for row in found)
 
-    def servo(self, channel: float, servos: Table) -> Servo:
+    def servo(self, channel: float, servos: MappingTable) -> Servo:
         """The output of this number, with the travel that `servos` has for it."""
         number = int(channel)
         if number != channel or not 1 <= number <= CHANNELS:

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
+from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
 from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
-from swashplate.simulation.stepping import Array, Motion, Stepping, motion
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.simulation.stepping import Motion, Stepping, motion
 
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
 _FASTEST = 500.0
@@ -36,6 +38,12 @@ class Surroundings:
     sag: float = 0.0
 
 
+def unflown(vehicle: Vehicle, *, record_rate: float) -> Flight:
+    """A link's flight before its first sample: true states, inputs, wind and voltage; what a `Recorder` begins with."""
+    states, rows = (np.zeros((0, n)) for n in (len(vehicle.state_names), len(vehicle.input_names) + len(SURROUNDINGS)))
+    return simulated_flight(vehicle, np.zeros(0), states, rows, details={"link": True, "rate": record_rate})
+
+
 class Plant:
     """A vehicle that stands on the ground at first.
 
@@ -43,7 +51,8 @@ class Plant:
         vehicle: from `standing`.
         mapping: from outputs to its inputs.
         around: wind, air and battery.
-        record_rate: samples per second that are kept for `flight` [Hz]; 0 keeps none.
+        recorder: keeps the flights; None keeps none.
+        record_rate: samples per second that it gets [Hz].
 
     Attributes:
         vehicle, mapping: as given.
@@ -54,7 +63,13 @@ class Plant:
     """
 
     def __init__(
-        self, vehicle: Vehicle, mapping: ServoMapping, around: Surroundings, *, record_rate: float = 0.0
+        self,
+        vehicle: Vehicle,
+        mapping: ServoMapping,
+        around: Surroundings,
+        *,
+        recorder: Recorder | None = None,
+        record_rate: float = 200.0,
     ) -> None:
         self.vehicle, self.mapping = vehicle, mapping
         self._around = around
@@ -62,7 +77,7 @@ class Plant:
         self.standing_depth = -float(self._rest[vehicle.index("z")])
         self.numbers = vehicle.card.values()
         self._stepping = Stepping(vehicle, self._rest, around.environment)
-        self._spacing = 1.0 / record_rate if record_rate > 0.0 else np.inf
+        self._recorder, self._spacing = recorder, 1.0 / record_rate
         self.restart()
 
     def prepare(self) -> None:
@@ -80,7 +95,7 @@ class Plant:
         return self._around.environment
 
     def restart(self) -> None:
-        """Back on the ground with the rotors stopped; what was recorded is dropped."""
+        """Back on the ground with the rotors stopped; what is recorded from here on is another flight."""
         self.time = 0.0
         self.broken = ""
         self.mapping.restart()
@@ -88,9 +103,8 @@ class Plant:
         self._stepping.surround(voltage=self.environment.voltage)
         self._held = self._resting(self._rest)
         self._next = 0.0
-        self._times: list[float] = []
-        self._states: list[Array] = []
-        self._rows: list[Array] = []
+        if self._recorder is not None:
+            self._recorder.restart()
 
     def advance(self, pulses: Sequence[float], duration: float) -> Motion:
         """Hold outputs [us] for `duration` [s]; a vehicle that broke stays where it is. Never anything but numbers."""
@@ -112,9 +126,8 @@ class Plant:
             self._stepping.surround(voltage=max(low, self.environment.voltage - self._around.sag * self.time))
         if self.time >= self._next - 1e-9:
             self._next += self._spacing
-            self._times.append(self.time)
-            self._states.append(self._held.states)
-            self._rows.append(np.concatenate([inputs, self._stepping.surroundings]))
+            if self._recorder is not None:
+                self._recorder.add(self.time, [*self._held.states, *inputs, *self._stepping.surroundings])
         return self._held
 
     def rotor_speeds(self, held: Motion) -> tuple[float, float]:
@@ -125,18 +138,6 @@ class Plant:
             return max(0.0, float(lower)), max(0.0, float(upper))
         main = max(0.0, float(held.states[names.index("omega")]))
         return main, main * self.numbers["tail_gear"]
-
-    def flight(self) -> Flight | None:
-        """What was recorded since the last restart: true states, inputs, wind and voltage; None for too little."""
-        if len(self._times) < 2:
-            return None
-        return simulated_flight(
-            self.vehicle,
-            np.array(self._times),
-            np.array(self._states),
-            np.array(self._rows),
-            details={"link": True, "rate": 1.0 / self._spacing},
-        )
 
     def _break(self, why: str, states: Array) -> None:
         self.broken = why

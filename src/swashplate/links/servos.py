@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate import documents
+from swashplate.arrays import Array
 from swashplate.errors import LinkError
 from swashplate.links import swashplates
-from swashplate.links.mapping_table import Table
+from swashplate.links.mapping_table import MappingTable
 from swashplate.links.servo import CENTRE, HALF
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
+from swashplate.models.vehicle import Vehicle
 
 
 class HelicopterMapping:
@@ -32,7 +30,7 @@ class HelicopterMapping:
         collective_pulse, collective_deg, cyclic_deg, tail_deg, full, spool: as the file has them [us], [deg], [1], [s].
     """
 
-    def __init__(self, table: Table, vehicle: Vehicle) -> None:
+    def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
         swash, tail, throttle = (table.part(name) for name in ("swashplate", "tail", "throttle"))
         servos = table.part("servos", missing={})
         numbers = swash.numbers("channels")
@@ -89,7 +87,7 @@ class HelicopterMapping:
 class CoaxialMapping:
     """Two motors and two servos of a coaxial helicopter. Attributes as `HelicopterMapping`, and its outputs."""
 
-    def __init__(self, table: Table, vehicle: Vehicle) -> None:
+    def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
         motors, cyclic = table.part("motors"), table.part("cyclic")
         servos = table.part("servos", missing={})
         self.motors = tuple(motors.servo(motors.number(name), servos) for name in ("lower", "upper"))
@@ -142,11 +140,8 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
         LinkError: naming the file and the entry that is missing, unknown, impossible or for another vehicle.
     """
     text, where = _read(name_or_file)
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise LinkError(f"is not TOML: {error}.", where=where) from None
-    table = Table(document, where)
+    document = documents.parse(text, form="toml", where=where, error=LinkError)
+    table = MappingTable(document, where)
     if document.get("kind") != "servo-mapping" or document.get("schema") != 1:
         raise table.error("kind", 'is no servo mapping: expected kind = "servo-mapping" and schema = 1.')
     table.text("kind"), table.number("schema")
@@ -168,7 +163,4 @@ def _read(name_or_file: str | Path) -> tuple[str, str]:
             where=path,
             hint=f"Names are {', '.join(packaged())}.",
         )
-    try:
-        return path.read_text(encoding="utf-8"), str(path)
-    except UnicodeDecodeError:
-        raise LinkError("is not a text file.", where=path) from None
+    return documents.read_text(path, form="toml", error=LinkError), str(path)

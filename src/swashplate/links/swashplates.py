@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import LinkError
-
-Array = NDArray[np.float64]
 
 _HALF = 2.0**-0.5
 _FIXED = {

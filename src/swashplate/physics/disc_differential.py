@@ -193,11 +193,19 @@ def inflow_change(
 ) -> Scalar:
     """Change of the momentum inflow when C_T = free - loss lam0 and the flow change (implicit function theorem)."""
     v, _, slope = mass_flow(lam0, mu_z, mu2, xp)
+    dv2 = flow_change(lam0, mu_z, mu2, (0.0, dmu_z, dmu2), xp)
+    return (free_change - lam0 * dv2 / v) / (2.0 * v + lam0 * slope / v + loss)
+
+
+def flow_change(lam0: Scalar, mu_z: Scalar, mu2: Scalar, change: tuple[Scalar, Scalar, Scalar], xp: Backend) -> Scalar:
+    """Change of `inflow.mass_flow`'s V^2 when (lam0, mu_z, mu^2) change."""
+    dlam0, dmu_z, dmu2 = change
+    _, _, slope = mass_flow(lam0, mu_z, mu2, xp)
     ring = xp.maximum(0.0, mu_z * (2.0 * lam0 - mu_z))
     dv2 = dmu2 - 2.0 * (lam0 - mu_z) * dmu_z
     if ring:
         dv2 += 4.0 * RING * ring * (lam0 - mu_z) / (lam0 * lam0) * dmu_z
-    return (free_change - lam0 * dv2 / v) / (2.0 * v + lam0 * slope / v + loss)
+    return dv2 + slope * dlam0
 
 
 def skew_change(

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.blade_element import FlapMoments
+from swashplate.physics.inflow import APPARENT_GRADIENT
 
 
 class Flapping(NamedTuple):
@@ -103,7 +104,7 @@ def plane_rates(
         shaft: its rates (p, q) over the rotor speed; count only with an offset.
         held: the hinge; S = 8 (lambda_b^2 - 1) / gamma.
         wake_distortion: K_R; the wake bends with the disc's turning and puts K_R (q cos + p sin) onto the inflow
-            (Keller 1996; Arnold, Keller, Curtiss and Reichert 1998).
+            (Keller 1996; Arnold, Keller, Curtiss and Reichert 1998), as far as it keeps up (`wake_follows`).
         phase_lag: (cos, sin) of the angle by which the air's moments come late (Mansur and Tischler 1998), or None.
         deficiency: matrix (cc, cs, ss) on the aerodynamic moments by a static inflow gradient, or None.
     """
@@ -143,6 +144,33 @@ def faded_wake_distortion(hover: Scalar, mu2: Scalar, fade: Scalar, xp: Backend)
     """
     rest = xp.maximum(0.0, 1.0 - mu2 / (fade * fade))
     return hover * rest * rest
+
+
+def wake_lateness(excess: Scalar, v2: Scalar) -> Scalar:
+    """k^2: how late the bending wake comes for a disc that springs and hinges turn, in radians of that turning.
+
+    The bent wake's gradient comes late by APPARENT_GRADIENT / V of the rotor's turning (Pitt and Peters 1981 in hover,
+    V the flow through the disc). Springs and hinges turn the disc at excess / 2 of the rotor speed. k is their product.
+
+    Args:
+        excess: lambda_b^2 - 1.
+        v2: V^2, dimensionless (`inflow.mass_flow`).
+    """
+    k = 0.5 * APPARENT_GRADIENT * excess
+    return k * k / v2
+
+
+def wake_follows(excess: Scalar, v2: Scalar, xp: Backend) -> Scalar:
+    """Share of K_R that is left where the wake is too slow for the disc: exactly 1 in flight, 0 without a wake.
+
+    1 / (1 + k^2) of a late gradient is in phase with the disc's rate. A card's K_R comes from flight, where k is about
+    0.1 and that share part of the number; so the fall begins at k = 1, and goes over into 1 / k^2.
+
+    Without it K_R above 1 is a negative damping that grows with the springs over the centrifugal force: a stopped rotor
+    would shake itself to pieces in still air.
+    """
+    late = xp.maximum(0.0, wake_lateness(excess, v2) - 1.0)
+    return 1.0 / xp.sqrt(1.0 + late * late)
 
 
 def precession_torque(disc: Flapping, p: Scalar, q: Scalar, *, inertia: Scalar, omega: Scalar) -> Scalar:

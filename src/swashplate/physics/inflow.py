@@ -15,6 +15,8 @@ RING = 0.125
 """Weight of the recirculation term: the least that leaves one induced velocity for every thrust and descent."""
 NEWTON_STEPS = 9
 _TINY = 1e-16
+APPARENT_GRADIENT = 16.0 / (45.0 * math.pi)
+"""Air that a gradient of the inflow moves along, in Pitt and Peters' theory."""
 
 
 class Inflow(NamedTuple):
@@ -144,9 +146,9 @@ def pitt_peters_rates(
     grad_c = -_COUPLING * c * e0 / det + across * ec + turned * c
     grad_s = -_COUPLING * s * e0 / det + across * es + turned * s
     load = 0.25 * lift_slope * solidity  # C_1c = (a sigma / 4) M_c
-    apparent, apparent_gradient = 128.0 / (75.0 * math.pi), 16.0 / (45.0 * math.pi)
+    apparent = 128.0 / (75.0 * math.pi)
     return Inflow(
         (CT - flows[0] * mean) / apparent,
-        (load * moments.cos - flows[1] * grad_c) / apparent_gradient,
-        (load * moments.sin - flows[1] * grad_s) / apparent_gradient,
+        (load * moments.cos - flows[1] * grad_c) / APPARENT_GRADIENT,
+        (load * moments.sin - flows[1] * grad_s) / APPARENT_GRADIENT,
     )

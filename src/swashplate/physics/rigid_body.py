@@ -37,6 +37,10 @@ class RigidBody(NamedTuple):
         return Vector(self.p, self.q, self.r)
 
 
+BODY_UNITS = ("m",) * 3 + ("m/s",) * 3 + ("rad",) * 3 + ("rad/s",) * 3
+"""Units of `RigidBody`'s states, in their order."""
+
+
 class Inertia(NamedTuple):
     """Mass [kg] and moments of inertia [kg m^2]; `xz` is None where the axes are principal ones."""
 

@@ -55,9 +55,12 @@ def lower_rotor_rates(
     *,
     tau_f_lower: Scalar,
     flap: FlapResponse,
+    turning: Scalar,
     xp: Backend,
 ) -> TipPathPlane:
     """Rates of the lower tip-path plane's tilt [rad/s] (Fankhauser et al., eqs 13 and 14).
+
+    `turning` is the share of the tilt that the rotor takes up: 1 in flight, 0 at rest.
 
     1/tau multiplies the whole bracket. Speed tilts the disc away from the motion (speed stability) and, through
     coning and inflow, across it; a body rate leaves the disc behind (rotor damping).
@@ -82,6 +85,6 @@ def lower_rotor_rates(
         + flap.a_beta_q_linear * q
     )
     return TipPathPlane(
-        (commanded.alpha - plane.alpha - away_alpha) / tau_f_lower,
-        (commanded.beta - plane.beta - away_beta) / tau_f_lower,
+        (turning * (commanded.alpha - away_alpha) - plane.alpha) / tau_f_lower,
+        (turning * (commanded.beta - away_beta) - plane.beta) / tau_f_lower,
     )

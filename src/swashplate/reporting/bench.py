@@ -8,8 +8,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from swashplate.identification.bench.evaluate import Bench
-from swashplate.identification.bench.result import BenchResult, Check, Curve
+from swashplate.bench.evaluate import Bench
+from swashplate.bench.result import BenchCheck, BenchResult, Curve
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words
@@ -37,18 +37,18 @@ def bench_report(bench: Bench, *, path: str | os.PathLike[str]) -> Path:
 
 def compose_bench(bench: Bench) -> Report:
     """The structure of a bench's report."""
-    files = list(dict.fromkeys(name for result in bench.results for name in result.records))
-    doubts = [(result, check) for result in bench.results for check in result.checks if not check.good]
-    apart = [check for check in bench.disagreements if not check.good]
+    files = list(dict.fromkeys(name for result in bench.details.results for name in result.records))
+    doubts = [(result, check) for result in bench.details.results for check in result.checks if not check.good]
+    apart = [check for check in bench.details.disagreements if not check.good]
     measured = (
         "No parameter of the card."
         if not bench.names
-        else f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.results), 'procedure')}."
+        else f"{counted(len(bench.names), 'parameter')} by {counted(len(bench.details.results), 'procedure')}."
     )
-    kept = f"Published, for want of a record: {listed(bench.kept, most=30)}." if bench.kept else "None."
+    kept = f"Published, for want of a record: {listed(bench.details.kept, most=30)}." if bench.details.kept else "None."
     card: tuple[Section, ...] = (_card(bench),) if bench.names else ()
-    keeping = (("Kept", kept, "caution" if bench.kept else "good"),) if bench.names else ()
-    agreement = " ".join(c.words for c in bench.disagreements) or "No parameter was measured in two ways."
+    keeping = (("Kept", kept, "caution" if bench.details.kept else "good"),) if bench.names else ()
+    agreement = " ".join(c.words for c in bench.details.disagreements) or "No parameter was measured in two ways."
     summary = (
         ("Records", f"{counted(len(files), 'file')}: {listed(files, most=5)}.", "plain"),
         ("Measured", measured, "plain"),
@@ -56,10 +56,10 @@ def compose_bench(bench: Bench) -> Report:
         ("Checks", _doubts(doubts), "caution" if doubts else "good"),
         ("Agreement", agreement, "caution" if apart else "plain"),
     )
-    sections = (*card, *(_procedure(result, bench) for result in bench.results), _made(bench))
-    picture = next((b for r in bench.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
+    sections = (*card, *(_procedure(result, bench) for result in bench.details.results), _made(bench))
+    picture = next((b for r in bench.details.results if r.procedure == "swashplate" for b in _figures(r, "key-")), None)
     return Report(
-        title=f"{bench.card.vehicle} on the test bench" if bench.names else "On the test bench",
+        title=f"{bench.model.card.vehicle} on the test bench" if bench.names else "On the test bench",
         banners=(),
         summary=summary,
         picture=picture,
@@ -68,7 +68,7 @@ def compose_bench(bench: Bench) -> Report:
     )
 
 
-def _doubts(doubts: Sequence[tuple[BenchResult, Check]]) -> str:
+def _doubts(doubts: Sequence[tuple[BenchResult, BenchCheck]]) -> str:
     if not doubts:
         return "Nothing was found that spoils a measurement."
     names = dict.fromkeys(result.title for result, _ in doubts)
@@ -77,8 +77,8 @@ def _doubts(doubts: Sequence[tuple[BenchResult, Check]]) -> str:
 
 def _card(bench: Bench) -> Section:
     rows = []
-    for name in (*bench.names, *bench.kept):
-        new, old = bench.card.parameters[name], bench.published.parameters[name]
+    for name in (*bench.names, *bench.details.kept):
+        new, old = bench.model.card.parameters[name], bench.start.card.parameters[name]
         measured = name in bench.names
         source = new.source if measured else "published value kept: no record"
         change = (new.value - old.value) / new.sigma if measured and new.sigma else None
@@ -105,8 +105,9 @@ def _card(bench: Bench) -> Section:
 def _procedure(result: BenchResult, bench: Bench) -> Section:
     blocks: list[Block] = [Text(f"Formula: {result.source}. Records: {', '.join(result.records)}.")]
     blocks += _figures(result)
+    units = {n: unit_words(bench.model.card.parameters[n].unit) for n in result.names}
     rows = [
-        (Cell(n), Cell(unit_words(bench.card.parameters[n].unit)), Cell(value_words(float(v), float(s)), number=True),
+        (Cell(n), Cell(units[n]), Cell(value_words(float(v), float(s)), number=True),
          Cell(sigma_words(float(s)), number=True))
         for n, v, s in zip(result.names, result.values, result.sigma, strict=True)
     ]  # fmt: skip
@@ -187,5 +188,6 @@ def _figure(identifier: str, curves: Sequence[Curve]) -> Figure:
 
 def _made(bench: Bench) -> Section:
     lines = [f"{name} {version}" for name, version in versions().items()]
-    lines += [f"published card SHA-256 {card_hash(bench.published)}", f"measured card SHA-256 {card_hash(bench.card)}"]
+    cards = {"published": bench.start.card, "measured": bench.model.card}
+    lines += [f"{name} card SHA-256 {card_hash(card)}" for name, card in cards.items()]
     return Section("made-with", "Made with", (Points(tuple(lines)),), folded=True)

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from swashplate.errors import SwashError
-from swashplate.identification.fit import Fit
+from swashplate.identification.core.result import Result
+from swashplate.identification.core.sources import sources_of
 from swashplate.reporting import sections_data, sections_fit, sections_prior, sections_sight, sections_validation
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
+from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.linearize import Mode, linearize
 from swashplate.validation.validation import Validation
+from swashplate.validation.verification import Verification
 
 
 def compose(
-    fit: Fit | None = None,
+    fit: Result[Any, Any] | None = None,
     validation: Validation | None = None,
+    verification: Verification | None = None,
     *,
     title: str | None = None,
     modes: Mapping[str, Sequence[Mode]] | None = None,
@@ -28,6 +33,7 @@ def compose(
 
     Args:
         fit, validation: one of them at least.
+        verification: of a vehicle that was flown along records.
         title: heading; made from the vehicle and the flights where None.
         modes: eigenvalues at hover by vehicle ("published", "identified"); computed where None.
 
@@ -44,9 +50,10 @@ def compose(
         sections_data.data(fit, validation),
         _with_warnings(fit) if fit else None,
         sections_prior.prior(fit) if fit else None,
-        sections_fit.comparison(fit) if fit and fit.comparisons else None,
+        sections_fit.comparison(fit) if fit and fit.in_time else None,
         sections_validation.prediction(validation) if validation else None,
-        sections_fit.residuals(fit) if fit and fit.comparisons else None,
+        verification_section(verification) if verification else None,
+        sections_fit.residuals(fit) if fit and fit.in_time else None,
         sections_sight.sight(fit) if fit else None,
         hover,
         sections_validation.innovations(validation) if validation and validation.innovations else None,
@@ -64,14 +71,13 @@ def compose(
     )
 
 
-def hover_modes(fit: Fit | None, validation: Validation | None) -> tuple[dict[str, Sequence[Mode]], list[str]]:
+def hover_modes(
+    fit: Result[Any, Any] | None, validation: Validation | None
+) -> tuple[dict[str, Sequence[Mode]], list[str]]:
     """Modes of the published and the identified vehicle at hover, and why one has none."""
-    source = fit or validation
-    if source is None:
-        return {}, []
     found: dict[str, Sequence[Mode]] = {}
     problems = []
-    for label, vehicle in (("published", source.published), ("identified", source.vehicle)):
+    for label, vehicle in sections_data.vehicles(fit, validation).items():
         try:
             found[label] = linearize(vehicle).modes()
         except SwashError as error:
@@ -79,25 +85,25 @@ def hover_modes(fit: Fit | None, validation: Validation | None) -> tuple[dict[st
     return found, problems
 
 
-def _with_warnings(fit: Fit) -> Section:
+def _with_warnings(fit: Result[Any, Any]) -> Section:
     section = sections_fit.parameters(fit)
     warned = sections_fit.warnings(fit)
     return replace(section, blocks=(warned, *section.blocks)) if warned else section
 
 
-def _picture(fit: Fit | None, validation: Validation | None) -> Figure | None:
+def _picture(fit: Result[Any, Any] | None, validation: Validation | None) -> Figure | None:
     """The key picture: the race of the predictors; without a validation, flight against model in roll and pitch."""
     if validation and validation.scores:
         return key_picture(validation)
-    if fit and fit.comparisons:
+    if fit and fit.in_time:
         figures = [b for b in sections_fit.comparison(fit).blocks if isinstance(b, Figure)]
         return replace(figures[0], identifier="key-picture") if figures else None
     return None
 
 
-def _title(fit: Fit | None, validation: Validation | None) -> str:
-    source = fit or validation
-    assert source is not None
-    names = list(dict.fromkeys(f.provenance.source for f in source.flights if f.provenance.source))
+def _title(fit: Result[Any, Any] | None, validation: Validation | None) -> str:
+    source = fit.data if fit else sources_of(validation.flights) if validation else ()
+    names = list(dict.fromkeys(f.name for f in source if f.name))
     verb = "identified from" if fit else "predicting"
-    return f"{source.vehicle.card.called} {verb} {', '.join(names[:2]) or 'a flight'}"
+    vehicle = sections_data.vehicles(fit, validation)["identified"]
+    return f"{vehicle.card.called} {verb} {', '.join(names[:2]) or 'a flight'}"

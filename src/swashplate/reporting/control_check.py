@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 
-from swashplate.control.check import ControlCheck
-from swashplate.control.requirements import (
+from swashplate.control.analysis.check import ControlCheck
+from swashplate.control.analysis.margins import AxisMargins
+from swashplate.control.analysis.requirements import (
     ATTITUDE_COUPLING,
     GAIN_MARGIN,
     PHASE_MARGIN,
@@ -20,27 +19,12 @@ from swashplate.control.requirements import (
 )
 from swashplate.flights.schema import channel
 from swashplate.reporting import figures_control as figures
-from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import card_hash, date, versions
 from swashplate.reporting.words import counted, listed, value_words
 
 _TONES = {1: "good", 2: "caution", 3: "bad"}
-
-
-def control_report(check: ControlCheck, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
-    """Write one self-contained HTML file about a controller's check.
-
-    Args:
-        check: from `check_controller`.
-        path: where to write; the folder is made where it is missing.
-        title: heading of the page.
-
-    Raises:
-        SwashError: a place that cannot be written to.
-    """
-    return write_page(path, compose_check(check, title=title))
 
 
 def compose_check(check: ControlCheck, *, title: str | None = None) -> Report:
@@ -80,27 +64,33 @@ def _decibel(factor: float) -> float:
     return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
-def margins_level(gain: float, gain_down: float, phase: float) -> int | None:
-    """Level of one loop's margins (factors, rad)."""
+def _axis_level(a: AxisMargins, check: ControlCheck) -> int | None:
+    """Level of one loop's margins."""
     levels = [
-        GAIN_MARGIN.level(min(_decibel(gain), -_decibel(gain_down), 1e3)),
-        PHASE_MARGIN.level(min(math.degrees(phase), 1e3)),
+        GAIN_MARGIN.level(min(_decibel(a.gain), -_decibel(a.gain_down), 1e3)),
+        PHASE_MARGIN.level(min(math.degrees(a.phase), 1e3)),
+        check.delay_boundary.level(min(1e3 * a.delay, 1e6)),
     ]
     known = [level for level in levels if level is not None]
     return max(known) if known else None
+
+
+def _delay(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms" if math.isfinite(seconds) else "any amount"
 
 
 def _margins_line(check: ControlCheck) -> tuple[str, str]:
     if check.margins is None:
         return "none: the loop does not stand.", "bad"
     t = check.margins.together
-    worst = max(check.margins.axes, key=lambda a: margins_level(a.gain, a.gain_down, a.phase) or 0)
-    level = margins_level(worst.gain, worst.gain_down, worst.phase)
+    levels = {a.name: _axis_level(a, check) or 0 for a in check.margins.axes}
+    worst = max(check.margins.axes, key=lambda a: levels[a.name])
+    short = check.margins.least_delay < 1e-3 * check.delay_boundary.level1
     return (
         f"all loops at once ±{_decibel(t.gain):.1f} dB or ±{math.degrees(t.phase):.0f}° (disc {t.alpha:.2f} at "
-        f"{t.frequency:.3g} rad/s, where that phase is {1e3 * t.phase / t.frequency:.2g} ms of delay); the weakest "
-        f"single loop is {worst.name}, {math.degrees(worst.phase):.0f}°.",
-        "good" if level == 1 else "caution",
+        f"{t.frequency:.3g} rad/s) or {_delay(check.margins.delay)} of further delay; the weakest single loop is "
+        f"{worst.name}, {math.degrees(worst.phase):.0f}° and {_delay(worst.delay)}.",
+        "bad" if short else "good" if levels[worst.name] == 1 else "caution",
     )
 
 
@@ -143,11 +133,13 @@ def _loops(check: ControlCheck) -> Section:
     if check.margins is not None:
         rows = []
         for a in check.margins.axes:
-            level = margins_level(a.gain, a.gain_down, a.phase)
-            told = ("meets 6 dB, 45°", "good") if level == 1 else ("below 6 dB or 45°", "caution")
+            least = f"6 dB, 45°, {check.delay_boundary.level1:.3g} ms"
+            good = _axis_level(a, check) == 1
+            told = (f"meets {least}", "good") if good else (f"below one of {least}", "caution")
             rows.append(
                 (Cell(a.name), _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
-                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), _number(a.disc.alpha, ".2f"),
+                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), _number(1e3 * a.delay, ".3g"),
+                 _number(a.disc.alpha, ".2f"),
                  _number(_decibel(a.sensitivity), ".1f"),
                  Cell(told[0], tone=told[1]))
             )  # fmt: skip
@@ -158,14 +150,16 @@ def _loops(check: ControlCheck) -> Section:
             "gain up [dB]",
             "phase [deg]",
             "crossover [rad/s]",
+            "delay [ms]",
             "disc",
             "max |S| [dB]",
             "",
         )
         note = (
             f"All loops at once: gain ±{_decibel(t.gain):.1f} dB, phase ±{math.degrees(t.phase):.0f}° (disc "
-            f"{t.alpha:.2f} at {t.frequency:.3g} rad/s), by the diagonally scaled upper bound of the structured "
-            "singular value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
+            f"{t.alpha:.2f} at {t.frequency:.3g} rad/s), {_delay(check.margins.delay)} of further delay; "
+            "the disc by the diagonally scaled upper bound of the structured singular "
+            "value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
         )
         blocks.append(Table("Margins at the inputs, one loop opened at a time", columns, tuple(rows), note=note))
     blocks += [Text(note, tone="caution") for note in check.notes]
@@ -270,7 +264,12 @@ def _gusts(check: ControlCheck) -> Section | None:
 
 
 def _boundaries(check: ControlCheck) -> Section:
-    used: list[Boundary] = [GAIN_MARGIN, PHASE_MARGIN, *(check.boundary(a.state) for a in check.attitudes)]
+    used: list[Boundary] = [
+        GAIN_MARGIN,
+        PHASE_MARGIN,
+        check.delay_boundary,
+        *(check.boundary(a.state) for a in check.attitudes),
+    ]
     used += [*(REJECTION[r.state] for r in check.rejections if r.state in REJECTION), REJECTION_PEAK, ATTITUDE_COUPLING]
     rows = []
     for b in used:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 
 MAX_POINTS = 2000
 """Points that one line of a page may have: more than a screen has columns."""

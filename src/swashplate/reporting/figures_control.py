@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.check import ControlCheck
+from swashplate.control.analysis.check import ControlCheck
 from swashplate.flights.schema import channel
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (

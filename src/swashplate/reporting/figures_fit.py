@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 from swashplate.flights.schema import channel
 from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.structure import Figure, Key

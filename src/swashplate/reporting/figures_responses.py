@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 from swashplate.flights.schema import channel
-from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse, decibel, unwrapped_degrees
-from swashplate.identification.mismatch import Mismatch, envelopes
-from swashplate.identification.spread import Answers
-from swashplate.identification.verification import Trace
+from swashplate.identification.frequency.reading_accuracy import Answers
+from swashplate.identification.frequency.unnoticeable_dynamics import Mismatch, envelopes
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse, decibel, unwrapped_degrees
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.structure import Figure, Key
 from swashplate.reporting.theme import (
@@ -35,6 +34,7 @@ from swashplate.reporting.theme import (
     stacked,
     unit_words,
 )
+from swashplate.validation.verification import Trace
 
 _ERROR = "rgba(0,0,0,0.15)"
 _BOUND = "rgba(0,114,178,0.18)"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 from swashplate.flights.schema import channel
 from swashplate.reporting.downsample import MAX_POINTS, joined, kept
 from swashplate.reporting.structure import Figure, Key

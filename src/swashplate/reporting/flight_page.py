@@ -9,13 +9,13 @@ from pathlib import Path
 
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
 from swashplate.reporting.theme import BLUE, line, stacked, unit_words
 from swashplate.reporting.versions import date, versions
-from swashplate.vehicles.vehicle import Vehicle
 
 _PANEL = 118
 """Height of one panel [px]."""
@@ -23,16 +23,24 @@ _RATES, _VELOCITY = ("p", "q", "r"), ("u", "v", "w")
 
 
 def flight_page(vehicle: Vehicle, flight: Flight, *, path: str | os.PathLike[str], remarks: Sequence[str] = ()) -> Path:
-    """Write one self-contained HTML page.
+    """Write one self-contained HTML page; arguments as of `compose_flight`.
+
+    Raises:
+        SwashError: where the place cannot be written to.
+    """
+    return write_page(path, compose_flight(vehicle, flight, remarks=remarks))
+
+
+def compose_flight(
+    vehicle: Vehicle, flight: Flight, *, remarks: Sequence[str] = (), title: str | None = None
+) -> Report:
+    """The page's structure.
 
     Args:
         vehicle: what flew.
         flight: its true states and inputs.
-        path: where to write.
         remarks: what may not be believed.
-
-    Raises:
-        SwashError: where the place cannot be written to.
+        title: heading.
     """
     inner = tuple(name for name in vehicle.state_names if name not in RigidBody._fields)
     groups = (
@@ -42,24 +50,23 @@ def flight_page(vehicle: Vehicle, flight: Flight, *, path: str | os.PathLike[str
         ("inner", "Inner states", inner, "Rotor, inflow, engine and actuators: what the vehicle's options bring."),
     )
     sections = [
-        Section(identifier, title, (_panels(flight, names, identifier=identifier, caption=caption),))
+        Section(identifier, title, (flight_panels(flight, names, identifier=identifier, caption=caption),))
         for identifier, title, names, caption in groups
         if names
     ]
     if remarks:
         sections.append(Section("doubts", "What may not be believed", (Points(tuple(remarks)),)))
-    report = Report(
-        title=f"Simulated flight of {flight.duration:.1f} s: {vehicle.card.title}",
+    return Report(
+        title=title or f"Simulated flight of {flight.duration:.1f} s: {vehicle.card.title}",
         banners=(("caution", "No aircraft flew this flight. What is drawn is the truth, before any sensor."),),
         summary=(("Where to trust it", vehicle.card.trust or "the card does not say", "plain"),),
         picture=None,
         sections=tuple(sections),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
-    return write_page(path, report)
 
 
-def _panels(flight: Flight, names: Sequence[str], *, identifier: str, caption: str) -> Figure:
+def flight_panels(flight: Flight, names: Sequence[str], *, identifier: str, caption: str) -> Figure:
     """One panel for each channel; all zoom in time together."""
     scales = [_shown(name, str(flight[name].attrs["units"])) for name in names]
     layout = stacked([f"{name} [{unit}]" if unit else name for name, (_, unit) in zip(names, scales, strict=True)],

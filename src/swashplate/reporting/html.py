@@ -12,8 +12,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from swashplate.atomic import write_text
-from swashplate.errors import SwashError
+from swashplate.atomic import make_folder, write_text
 from swashplate.reporting.structure import Figure, Report
 
 
@@ -33,16 +32,10 @@ def write_page(path: str | os.PathLike[str], report: Report) -> Path:
     """Write a report as a page; missing folders above it are made.
 
     Raises:
-        SwashError: where the place cannot be written to.
+        WriteError: where the place cannot be written to.
     """
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        return write_text(target, render(report))
-    except OSError as error:
-        raise SwashError(
-            f"the report cannot be written: {error.strerror or error}.", where=target, hint="Choose another place."
-        ) from None
+    make_folder(Path(path).parent)
+    return write_text(path, render(report))
 
 
 @cache

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swashplate.control.linear_decoupling import Decoupling, coupling
+from swashplate.control.laws.linear_decoupling import Decoupling, coupling
 from swashplate.reporting.figures_control import over_frequency, style
-from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
 from swashplate.reporting.theme import line, stacked
 from swashplate.reporting.versions import date, versions
@@ -23,7 +20,7 @@ _STEP = 2.0
 """Seconds of the step's answers."""
 
 
-def decoupling_report(
+def compose_linear_decoupling(
     model: Any,
     made: Mapping[str, Decoupling | None],
     *,
@@ -32,9 +29,9 @@ def decoupling_report(
     outputs: Sequence[str],
     frequency: float,
     problem: str | None,
-    path: str | os.PathLike[str],
-) -> Path:
-    """Write one self-contained HTML file.
+    title: str | None = None,
+) -> Report:
+    """The report's structure.
 
     Args:
         model: `control.StateSpace` that it is judged on.
@@ -43,10 +40,7 @@ def decoupling_report(
         inputs, outputs: paired in order.
         frequency: where the matrix was made [rad/s].
         problem: why there is no filter.
-        path: where to write; the folder is made where it is missing.
-
-    Raises:
-        SwashError: a place that cannot be written to.
+        title: heading.
     """
     axes = {"inputs": list(inputs), "outputs": list(outputs)}
     w = np.geomspace(_LOW, _HIGH, _POINTS)
@@ -55,8 +49,8 @@ def decoupling_report(
     near = int(np.argmin(np.abs(w - frequency)))
     worst = {words: max(float(found[i, k, near]) for i, k in pairs) for words, found in ratios.items()}
     told = "; ".join(f"{_WORDS[words]} {100.0 * value:.3g} %" for words, value in worst.items())
-    report = Report(
-        title=f"{name}: decoupling of {', '.join(outputs)}",
+    return Report(
+        title=title or f"{name}: decoupling of {', '.join(outputs)}",
         banners=(("caution", f"No filter: {problem}"),) if problem else (),
         summary=(
             ("Axes", ", ".join(f"{i} moves {o}" for i, o in zip(inputs, outputs, strict=True)), "plain"),
@@ -68,7 +62,6 @@ def decoupling_report(
         sections=(_steps(model, made, axes), _numbers(made, axes, frequency)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )  # fmt: skip
-    return write_page(path, report)
 
 
 def _keys(made: Sequence[str]) -> tuple[Key, ...]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swashplate.atomic import replaced_when_complete
+from swashplate.atomic import make_folder, write_bytes
 from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
-from swashplate.identification.kinematics import PREDICTED
+from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.reporting.figures_time import flight_name
 from swashplate.reporting.figures_validation import JUDGED, middle_horizon
 from swashplate.reporting.sections_validation import apart
@@ -39,7 +40,7 @@ def prediction_picture(
     mine = [i for i, record in enumerate(validation.records) if flight_name(record.name) == source]
     names = {validation.records[i].name for i in mine}
     examples = apart([e for e in validation.examples if e.record in names])
-    figure = _figure(8.6, 1.35 * len(channels) + 0.7)
+    figure = blank_figure(8.6, 1.35 * len(channels) + 0.7)
     panels: Any = figure.subplots(len(channels), 1, sharex=True)
     for panel, name in zip(np.atleast_1d(panels), channels, strict=True):
         j, factor = PREDICTED.index(name), channel(name).shown_factor
@@ -56,7 +57,7 @@ def prediction_picture(
             panel.plot(e.time[:1], middle[:1], "o", color=MODEL, ms=4)
         panel.set_ylabel(axis_title(name))
         panel.margins(x=0.01)
-        _tidy(panel)
+        tidy(panel)
     np.atleast_1d(panels)[0].legend(loc="upper right", ncols=2, frameon=False, fontsize=9)
     np.atleast_1d(panels)[-1].set_xlabel("time [s]")
     figure.suptitle(title or f"Prediction of {source}", fontsize=11, x=0.02, ha="left")
@@ -64,13 +65,18 @@ def prediction_picture(
 
 
 def score_picture(validation: Validation, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
-    """Fit % of every predictor on every channel, one second ahead."""
+    """Fit % of every predictor on every channel, one second ahead, as a file."""
+    return _save(score_figure(validation, title=title), path)
+
+
+def score_figure(validation: Validation, *, title: str | None = None) -> Figure:
+    """Fit % of every predictor on every channel, at the middle horizon."""
     if not validation.scores:
         raise SwashError("the validation has no scores to draw.")
     horizon = middle_horizon(validation)
     scores = {(s.channel, s.predictor): s.fit for s in validation.scores if s.horizon == horizon}
     names = [name for name in JUDGED if (name, "model") in scores]
-    figure = _figure(7.2, 0.32 * len(names) + 1.4)
+    figure = blank_figure(7.2, 0.32 * len(names) + 1.4)
     panel: Any = figure.subplots()
     for predictor in reversed([p for p in PREDICTORS if p != "hold"]):
         rows = [(i, scores[name, predictor]) for i, name in enumerate(names) if (name, predictor) in scores]
@@ -87,21 +93,22 @@ def score_picture(validation: Validation, *, path: str | os.PathLike[str], title
     panel.axvline(0.0, color="#333", lw=1.2, label="hold the last value")
     panel.set(yticks=range(len(names)), yticklabels=names, xlim=(_FLOOR, 102.0), xlabel=f"fit {horizon:g} s ahead [%]")
     panel.invert_yaxis()
-    _tidy(panel)
+    tidy(panel)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     if title:
         panel.set_title(title, fontsize=11, loc="left")
-    return _save(figure, path)
+    return figure
 
 
-def _figure(width: float, height: float) -> Figure:
+def blank_figure(width: float, height: float) -> Figure:
     """A figure without a window system: nothing of pyplot's global state is touched."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
-def _tidy(panel: Any) -> None:
+def tidy(panel: Any) -> None:
+    """A light grid, and no frame above and to the right."""
     panel.grid(color="#e4e4e4", lw=0.7)
     panel.set_axisbelow(True)
     for side in ("top", "right"):
@@ -115,8 +122,9 @@ def _save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix not in (".png", ".svg"):
         raise SwashError(f"suffix is '{target.suffix}', expected .png or .svg.", where=target)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(target.parent)
     stamp: dict[str, Any] = {"Date": None} if target.suffix == ".svg" else {"Software": None}
-    with mpl.rc_context({"svg.hashsalt": "swashplate"}), replaced_when_complete(target) as temporary:
-        figure.savefig(temporary, dpi=160, metadata=stamp)
-    return target
+    drawn = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "swashplate"}):
+        figure.savefig(drawn, format=target.suffix[1:], dpi=160, metadata=stamp)
+    return write_bytes(target, drawn.getbuffer())

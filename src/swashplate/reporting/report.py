@@ -1,41 +1,108 @@
-"""The public verb: a fit and a validation become a page."""
+"""The public verb: results become a page."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
-from swashplate.identification.fit import Fit
+from swashplate.bench.evaluate import BenchDetails
+from swashplate.errors import SwashError
+from swashplate.identification.core.result import Result
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.bench import compose_bench
 from swashplate.reporting.compose import compose
 from swashplate.reporting.html import write_page
+from swashplate.reporting.response_report import compose_responses
+from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.structure import Report
 from swashplate.simulation.linearize import Mode
 from swashplate.validation.validation import Validation
+from swashplate.validation.verification import Verification
+
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
+
+
+@runtime_checkable
+class HasPage(Protocol):
+    """A result that knows its own page: a check, a design, many flights."""
+
+    def page(self, *, title: str | None = None) -> Report:
+        """The page's structure under a heading, its own where None."""
+        ...
 
 
 def report(
-    fit: Fit | None = None,
-    validation: Validation | None = None,
-    *,
+    *results: Reportable | HasPage | None,
     path: str | os.PathLike[str],
     title: str | None = None,
     modes: Mapping[str, Sequence[Mode]] | None = None,
 ) -> Path:
-    """Write one self-contained HTML file about a fit, a validation, or both.
+    """Write one self-contained HTML file about what was found.
 
     The file needs no network: plotly.js and all data are in it. It appears by rename when it is complete.
 
     Args:
-        fit: result of `swashplate.identify`.
-        validation: result of `swashplate.validate`.
+        results: of any identification, a validation or a verification of it, measured responses; None is left out. A
+            page is about one vehicle's fit and validation, or about linear models, their responses and verification.
+            One that knows its own page (`check_controller`, `decouple`, `monte_carlo` ...) goes alone.
         path: where to write; the folder is made where it is missing.
-        title: heading; made from the vehicle and the flights where None.
+        title: heading; made from the models and the flights where None.
         modes: eigenvalues at hover by vehicle ("published", "identified"); computed where None.
 
     Returns:
         The file's path.
 
     Raises:
-        SwashError: nothing to report, or a place that cannot be written to.
+        SwashError: nothing to report, results that share no page, or a place that cannot be written to.
     """
-    return write_page(path, compose(fit, validation, title=title, modes=modes))
+    asked = [one for one in results if one is not None]
+    if not asked:
+        raise SwashError("there is nothing to report: neither a result nor a validation was given.")
+    given: list[Reportable] = []
+    for one in asked:
+        if not isinstance(one, HasPage):
+            given.append(one)
+        elif len(asked) > 1 or modes is not None:
+            raise SwashError("has a page of its own.", channel=type(one).__name__, hint="Write a report of each.")
+        else:
+            return write_page(path, one.page(title=title))
+    of_vehicles = [one for one in given if isinstance(one, Validation) or _is_of(one, Vehicle)]
+    if not of_vehicles:
+        return write_page(path, _of_linear_models(given, title))
+    checks = [one for one in given if isinstance(one, Verification) and isinstance(one.model, Vehicle)]
+    if len(of_vehicles) + len(checks) < len(given):
+        raise SwashError("a vehicle's fit and a linear model share no page.", hint="Write a report of each.")
+    fit = _only([one for one in given if isinstance(one, Result)], "fit")
+    if fit is not None and isinstance(fit.details, BenchDetails):
+        if len(given) > 1:
+            raise SwashError("the bench has a page of its own.", hint="Write a report of each.")
+        return write_page(path, compose_bench(fit))
+    validation = _only([one for one in given if isinstance(one, Validation)], "validation")
+    verification = _only(checks, "verification")
+    return write_page(path, compose(fit, validation, verification, title=title, modes=modes))
+
+
+def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:
+    models = [one for one in given if isinstance(one, Result) and isinstance(one.model, StateSpaceModel)]
+    material = ResponseMaterial(
+        responses=_only([one for one in given if isinstance(one, FrequencyResponse)], "frequency response"),
+        transfer_functions=tuple(one for one in given if _is_of(one, tuple)),  # type: ignore[misc]
+        fit=_only([one for one in models if one.targets], "fit to responses"),
+        verification=_only([one for one in given if isinstance(one, Verification)], "verification"),
+        time_fit=_only([one for one in models if not one.targets], "fit in time"),
+    )
+    return compose_responses(material, title=title)
+
+
+def _is_of(one: object, kind: type) -> bool:
+    return isinstance(one, Result) and isinstance(one.model, kind)
+
+
+def _only(found: Sequence[Any], what: str) -> Any:
+    if len(found) > 1:
+        raise SwashError(f"{len(found)} results of the kind '{what}' were given, a page is about one.")
+    return found[0] if found else None

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from swashplate.errors import SwashError
-from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
+from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
@@ -88,7 +88,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         rows.append(("Responses", f"{words}, from {listed(r.sources, most=4)}.", "plain"))
     if m.transfer_functions:
         words = "; ".join(
-            f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.models, f.costs, strict=True)
+            f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.model, f.costs, strict=True)
         )
         rows.append(("Model", words, sections_responses.tone(max(c for f in m.transfer_functions for c in f.costs))))
     if m.fit:
@@ -100,7 +100,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
                 sections_responses.tone(f.cost),
             )
         )
-        weak = [p for p in f.parameters if not p.fixed and not p.tie and sections_responses.weak(p)]
+        weak = [p for p in f.estimates if not p.fixed and not p.tie and sections_responses.weak(p)]
         text = "all within their targets" if not weak else f"outside: {listed([p.name for p in weak])}"
         rows.append(
             (
@@ -115,7 +115,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         rows.append(
             (
                 "In time",
-                f"J_rms {v.cost:.2f}{inside} on {listed([t.source for t in v.traces], most=3)}.",
+                f"{v.verdict}; J_rms {v.cost:.2f}{inside} on {listed([t.source for t in v.traces], most=3)}.",
                 "good" if v.good else "caution",
             )
         )

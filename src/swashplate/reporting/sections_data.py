@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
-from swashplate.flights.flight import Flight
-from swashplate.identification.fit import Fit
+from swashplate.identification.core.result import Result
+from swashplate.identification.core.sources import Source, sources_of
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.versions import card_hash, date, result_hash, versions
 from swashplate.reporting.words import counted, listed, noise_told, plain_words, span_words, step_words
 from swashplate.validation.validation import Validation
-from swashplate.vehicles.vehicle import Vehicle
 
 
-def asked(fit: Fit | None, validation: Validation | None) -> Section:
+def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
     """What was asked: vehicle, method, flights and settings."""
     blocks: list[Block] = []
-    vehicle = fit.vehicle if fit else validation.vehicle if validation else None
+    vehicle = fit.model if fit else validation.vehicle if validation else None
     if fit:
         blocks.append(
             Text(
-                f"Identify {counted(len(fit.names), 'parameter')} of the vehicle '{fit.vehicle.card.called}' "
-                f"(choice: {fit.choice}) from {listed(_sources(fit.flights))} by {method_words(fit.method)}."
+                f"Identify {counted(len(fit.names), 'parameter')} of the vehicle '{fit.model.card.called}' "
+                f"(choice: {fit.settings.get('choice', 'given')}) "
+                f"from {listed(_sources(fit.data))} by {method_words(fit.method)}."
             )
         )
     if validation:
         blocks.append(
             Text(
-                f"Predict {listed(_sources(validation.flights))} with the model "
+                f"Predict {listed(_sources(sources_of(validation.flights)))} with the model "
                 f"{', '.join(f'{h:g}' for h in sorted({s.horizon for s in validation.scores}))} s ahead from "
                 "many start points, and compare with the published card (same observer, trims from the same seconds), "
                 "with holding the last value and with constant rates."
@@ -61,46 +63,40 @@ def method_words(method: str) -> str:
     }.get(method, method)
 
 
-def _sources(flights: Iterable[Flight]) -> list[str]:
-    return [flight.provenance.source or "an unnamed flight" for flight in flights]
+def _sources(flights: Iterable[Source]) -> list[str]:
+    return [flight.name or "an unnamed flight" for flight in flights]
 
 
-def same_flight(one: Flight, other: Flight) -> bool:
-    """True for two parts of one log: equal hashes, or the very same object where there is no file."""
-    hashes = one.provenance.sha256, other.provenance.sha256
-    return one is other or (hashes[0] == hashes[1] != "")
-
-
-def used_twice(fit: Fit | None, validation: Validation | None) -> list[Flight]:
+def used_twice(fit: Result[Any, Any] | None, validation: Validation | None) -> list[Source]:
     """Flights of the validation that come from a log which the fit used: predicting them proves less."""
     if fit is None or validation is None:
         return []
-    return [flight for flight in validation.flights if any(same_flight(flight, other) for other in fit.flights)]
+    return [one for one in sources_of(validation.flights) if any(one.same_log(other) for other in fit.data)]
 
 
-def data(fit: Fit | None, validation: Validation | None) -> Section:
+def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
     """The flights: where they come from, what was done to them, what their readers found."""
-    fitted, tested = fit.flights if fit else (), validation.flights if validation else ()
+    fitted, tested = fit.data if fit else (), sources_of(validation.flights) if validation else ()
     twice = used_twice(fit, validation)
     roles = [("used for the fit", f) for f in fitted]
     for flight in tested:
-        seen = any(flight is other for other in twice)
-        if not any(flight is other for other in fitted):
+        seen = flight in twice
+        if flight not in fitted:
             role = (
                 "predicted; a log that the fit used" if seen else "kept from the fit, predicted" if fit else "predicted"
             )
             roles.append((role, flight))
     rows = tuple(
         (
-            Cell(flight.provenance.source or "unnamed"),
+            Cell(flight.name or "unnamed"),
             Cell(role),
             Cell(
-                "simulated" if flight.provenance.simulated else "flown",
-                tone="caution" if flight.provenance.simulated else "plain",
+                "simulated" if flight.simulated else "flown",
+                tone="caution" if flight.simulated else "plain",
             ),
             Cell(span_words(flight)),
-            Cell(f"{flight.provenance.reader} {flight.provenance.reader_version}".strip() or "–"),
-            Cell(flight.provenance.sha256[:12] or "–"),
+            Cell(f"{flight.reader} {flight.reader_version}".strip() or "–"),
+            Cell(flight.sha256[:12] or "–"),
         )
         for role, flight in roles
     )
@@ -113,7 +109,7 @@ def data(fit: Fit | None, validation: Validation | None) -> Section:
         )
     ]
     for _, flight in roles:
-        name = flight.provenance.source or "unnamed"
+        name = flight.name or "unnamed"
         if flight.history:
             blocks.append(
                 Points(
@@ -125,24 +121,24 @@ def data(fit: Fit | None, validation: Validation | None) -> Section:
         if len(flight.segments) > 1:
             pieces = ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in flight.segments)
             blocks.append(Text(f"Unbroken segments of {name}: {pieces}."))
-        if flight.provenance.notes:
-            blocks.append(Points(flight.provenance.notes, title=f"What to know about {name}"))
+        if flight.notes:
+            blocks.append(Points(flight.notes, title=f"What to know about {name}"))
     return Section("data", "The data and what was done to it", tuple(blocks))
 
 
-def made_with(fit: Fit | None, validation: Validation | None) -> Section:
+def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
     """Versions and hashes: enough to know whether two reports say the same about the same data."""
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
     seen: set[str] = set()
-    for flight in (*(fit.flights if fit else ()), *(validation.flights if validation else ())):
-        name = flight.provenance.source or "unnamed"
+    for flight in (*(fit.data if fit else ()), *(sources_of(validation.flights) if validation else ())):
+        name = flight.name or "unnamed"
         if name not in seen:
-            hashes.append((f"flight {name}", flight.provenance.sha256 or "none: simulated or made in memory"))
+            hashes.append((f"flight {name}", flight.sha256 or "none: simulated or made in memory"))
             seen.add(name)
-    vehicles: Mapping[str, Vehicle] = _vehicles(fit, validation)
-    hashes += [(f"{label} card", card_hash(vehicle.card)) for label, vehicle in vehicles.items()]
-    results: list[tuple[str, dict[str, Any]]] = [("fit", fit.as_dict())] if fit else []
+    cards = {label: vehicle.card for label, vehicle in vehicles(fit, validation).items()}
+    hashes += [(f"{label} card", card_hash(card)) for label, card in cards.items()]
+    results: list[tuple[str, dict[str, Any]]] = [("fit", _numbers(fit))] if fit else []
     results += [("validation", validation.as_dict())] if validation else []
     hashes += [(f"numbers of the {label}", result_hash(result)) for label, result in results]
     return Section(
@@ -163,6 +159,13 @@ def made_with(fit: Fit | None, validation: Validation | None) -> Section:
     )
 
 
-def _vehicles(fit: Fit | None, validation: Validation | None) -> dict[str, Vehicle]:
-    found = fit or validation
-    return {"published": found.published, "identified": found.vehicle} if found else {}
+def _numbers(fit: Result[Any, Any]) -> dict[str, Any]:
+    """A result's numbers and words; the conditioned signals' last bits, and so their hash, depend on the machine."""
+    return replace(fit, data=tuple(replace(one, signals="") for one in fit.data)).to_document(comparisons=False)
+
+
+def vehicles(fit: Result[Any, Any] | None, validation: Validation | None) -> dict[str, Vehicle]:
+    """Before and after: by "published" and "identified"."""
+    if fit:
+        return {"published": fit.start, "identified": fit.model}
+    return {"published": validation.published, "identified": validation.vehicle} if validation else {}

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from swashplate.flights.flight import Array
-from swashplate.identification.fit import Comparison, Estimate, Fit
-from swashplate.identification.kinematics import PREDICTED, measured_states
-from swashplate.identification.stochastic import Nuisance
+from swashplate.arrays import Array
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.reporting.figures_fit import (
     cost_history,
     residual_correlation,
@@ -26,9 +28,9 @@ PRIOR_HEAVY = 0.5
 """Share of prior information above which a value says more about the prior than about the flight."""
 
 
-def parameters(fit: Fit) -> Section:
+def parameters(fit: Result[Any, Any]) -> Section:
     """Every estimated number, with where it comes from."""
-    rows = tuple(_row(fit, estimate) for estimate in fit.parameters)
+    rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
     blocks.append(
         Table(
@@ -51,7 +53,7 @@ def parameters(fit: Fit) -> Section:
             "nothing. A name leads to its meaning and source.",
         )
     )
-    if fit.record_estimates:
+    if fit.constants:
         blocks.append(
             Table(
                 "What belongs to the flights and not to the vehicle",
@@ -64,7 +66,7 @@ def parameters(fit: Fit) -> Section:
                         Cell(value_words(e.value, e.sigma), number=True),
                         Cell(sigma_words(e.sigma), number=True),
                     )
-                    for e in fit.record_estimates
+                    for e in fit.constants
                 ),
             )
         )
@@ -73,7 +75,7 @@ def parameters(fit: Fit) -> Section:
     return Section("parameters", "Parameters", tuple(blocks))
 
 
-def noise(fit: Fit) -> Section | None:
+def noise(fit: Result[Any, Any]) -> Section | None:
     """The noise model, None where the method has none."""
     if fit.noise is None:
         return None
@@ -89,14 +91,14 @@ def noise(fit: Fit) -> Section | None:
     return Section("noise", "Noise model", (table,), folded=True)
 
 
-def _row(fit: Fit, e: Estimate) -> tuple[Cell, ...]:
-    change = e.value - e.published
-    relative = _relative(change, e.published)
+def _row(fit: Result[Any, Any], e: Estimate) -> tuple[Cell, ...]:
+    change = e.value - e.start
+    relative = _relative(change, e.start)
     sigmas = f"{change / e.sigma_corrected:+.1f}" if e.sigma_corrected > 0.0 else "–"
     return (
         Cell(e.name, link=f"meaning-{e.name}"),
         Cell(unit_words(e.unit)),
-        Cell(value_words(e.published), number=True),
+        Cell(value_words(e.start), number=True),
         Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
         Cell(sigma_words(e.sigma), number=True),
         Cell(sigma_words(e.sigma_corrected), number=True),
@@ -114,10 +116,10 @@ def _relative(change: float, published: float) -> str:
     return f"{share:+.0f} %" if abs(share) < 1000.0 else ("new" if not published else "> 999 %")
 
 
-def _remarks(fit: Fit, e: Estimate) -> tuple[str, bool, str]:
+def _remarks(fit: Result[Any, Any], e: Estimate) -> tuple[str, bool, str]:
     words = []
     if e.at_bound:
-        entry = fit.published.card.parameters.get(e.name)
+        entry = fit.start.card.parameters.get(e.name)
         bounds = f" [{value_words(entry.lower)}, {value_words(entry.upper)}]" if entry else ""
         words.append(f"at its physical bound{bounds}")
     if e.tie:
@@ -127,7 +129,7 @@ def _remarks(fit: Fit, e: Estimate) -> tuple[str, bool, str]:
     return "; ".join(words), False, "bad" if e.at_bound else "plain"
 
 
-def comparison(fit: Fit) -> Section:
+def comparison(fit: Result[Any, Any]) -> Section:
     """Flight against model for every channel, one pair of figures per flight."""
     one_step = fit.method == "prediction-error"
     words = "one-step prediction" if one_step else "simulation on the recorded inputs"
@@ -144,13 +146,13 @@ def comparison(fit: Fit) -> Section:
         Text(f"{intro} Where the cost did not count a sample (settling, outliers), no model is drawn.")
     ]
     by_flight: dict[str, list[Comparison]] = {}
-    for piece in fit.comparisons:
+    for piece in fit.in_time:
         by_flight.setdefault(flight_name(piece.record.name), []).append(piece)
     for i, (source, pieces) in enumerate(by_flight.items()):
         blocks += time_figures(
             _series(fit, pieces),
             [(piece.record.time, piece.record.inputs) for piece in pieces],
-            fit.vehicle.input_names,
+            fit.model.input_names,
             identifier=f"fit-{i + 1}",
             source=source,
             model_words=words,
@@ -158,7 +160,7 @@ def comparison(fit: Fit) -> Section:
     return Section("comparison", "Flight against model", tuple(blocks))
 
 
-def _series(fit: Fit, pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
+def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
     found: dict[str, list[Series]] = {}
     for piece in pieces:
         record = piece.record
@@ -184,26 +186,26 @@ def _series(fit: Fit, pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
     return found
 
 
-def _nuisance(fit: Fit, log: str) -> Nuisance:
+def _nuisance(fit: Result[Any, Any], log: str) -> Nuisance:
     """The log's own delays, trims, lever and level, the mean ones where it has none."""
-    own = {e.name: e.value for e in fit.record_estimates if e.record == log and e.name in Nuisance._fields}
-    return fit.nuisance._replace(**own)
+    own = {e.name: e.value for e in fit.constants if e.record == log and e.name in Nuisance._fields}
+    return (fit.nuisance or Nuisance())._replace(**own)
 
 
-def residuals(fit: Fit) -> Section:
+def residuals(fit: Result[Any, Any]) -> Section:
     """What the model left over: over time, its autocorrelation, its distribution."""
-    names = fit.comparisons[0].record.output_names
+    names = fit.in_time[0].record.output_names
     timed: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
     plain: dict[str, list[Array]] = {name: [] for name in names}
-    for piece in fit.comparisons:
+    for piece in fit.in_time:
         counted = np.asarray(piece.counted) > 0
         for j, name in enumerate(names):
             rows = piece.residuals[:, j]
             timed[name].append((piece.record.time, np.where(counted, rows, np.nan)))
             plain[name].append(rows[counted])
-    sigma = {name: float(np.mean([c.sigma[j] for c in fit.comparisons])) for j, name in enumerate(names)}
+    sigma = {name: float(np.mean([c.sigma[j] for c in fit.in_time])) for j, name in enumerate(names)}
     plain = {name: [rows for rows in pieces if rows.size > 1] for name, pieces in plain.items()}
-    dt = fit.comparisons[0].record.dt
+    dt = fit.in_time[0].record.dt
     return Section(
         "residuals",
         "Residuals",
@@ -211,11 +213,11 @@ def residuals(fit: Fit) -> Section:
     )
 
 
-def meanings(fit: Fit, words: Mapping[str, str]) -> Section:
+def meanings(fit: Result[Any, Any], words: Mapping[str, str]) -> Section:
     """What each number means and where its first value comes from."""
-    published = fit.published.card.parameters
-    identified = fit.vehicle.card.parameters
-    names = [e.name for e in fit.parameters]
+    published = fit.start.card.parameters
+    identified = fit.model.card.parameters
+    names = [e.name for e in fit.estimates]
     rows = [
         (
             Cell(name, anchor=f"meaning-{name}"),
@@ -228,8 +230,8 @@ def meanings(fit: Fit, words: Mapping[str, str]) -> Section:
         for name in names
         if name in published
     ]
-    of_records = list(dict.fromkeys(e.name for e in fit.record_estimates))
-    units = {e.name: e.unit for e in fit.record_estimates}
+    of_records = list(dict.fromkeys(e.name for e in fit.constants))
+    units = {e.name: e.unit for e in fit.constants}
     rows += [
         (
             Cell(name, anchor=f"meaning-{name}"),
@@ -266,10 +268,10 @@ def _limit(value: float | None) -> str:
     return "–" if value is None else value_words(value)
 
 
-def warnings(fit: Fit) -> Points | None:
+def warnings(fit: Result[Any, Any]) -> Points | None:
     """What a reader must know before using the numbers, None where there is nothing."""
-    words = [f"{e.name} ended at its physical bound." for e in fit.parameters if e.at_bound]
-    heavy = [e.name for e in fit.parameters if e.prior_share > PRIOR_HEAVY and not e.tie]
+    words = [f"{e.name} ended at its physical bound." for e in fit.estimates if e.at_bound]
+    heavy = [e.name for e in fit.estimates if e.prior_share > PRIOR_HEAVY and not e.tie]
     if heavy:
         words.append(f"The prior, not the flight, decided {', '.join(heavy)}.")
     return Points(tuple(words), title="Before you use the numbers") if words else None

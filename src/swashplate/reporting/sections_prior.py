@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from swashplate.identification.fit import APART, Estimate, Fit
-from swashplate.identification.parameters import FROM_CARD
+from swashplate.identification.core.parameters import FROM_CARD
+from swashplate.identification.core.result import APART, Estimate, Result
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import listed, percent, sigma_words, value_words
 
 
-def prior(fit: Fit) -> Section | None:
+def prior(fit: Result[Any, Any]) -> Section | None:
     """Prior and flight side by side, None where no prior came from a card."""
-    estimates = [e for e in fit.parameters if e.prior_source.startswith(FROM_CARD)]
-    held = [name for name in fit.settings.get("held at the prior card", ()) if name in fit.vehicle.card.parameters]
+    estimates = [e for e in fit.estimates if e.prior_source.startswith(FROM_CARD)]
+    held = [name for name in fit.settings.get("held at the prior card", ()) if name in fit.model.card.parameters]
     if not estimates and not held:
         return None
     apart = [e for e in estimates if math.isfinite(e.disagreement) and abs(e.disagreement) > APART]
@@ -51,12 +52,12 @@ def prior(fit: Fit) -> Section | None:
             )
         )
     if held:
-        card = fit.vehicle.card.parameters
+        card = fit.model.card.parameters
         rows = tuple(
             (
                 Cell(name),
                 Cell(unit_words(card[name].unit)),
-                Cell(value_words(fit.published.card.parameters[name].value), number=True),
+                Cell(value_words(fit.start.card.parameters[name].value), number=True),
                 Cell(value_words(card[name].value, card[name].sigma), number=True),
                 Cell(sigma_words(card[name].sigma), number=True),
                 Cell(card[name].source),

@@ -7,20 +7,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from swashplate.control.ardupilot_gains import PEAK, Suggestion
-from swashplate.identification.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.identification.handling import Handling
-from swashplate.identification.linear_time_fit import LinearTimeFit
-from swashplate.identification.mismatch import mismatch
-from swashplate.identification.mode_accuracy import ModeAccuracy
-from swashplate.identification.readings import handling_lines
-from swashplate.identification.response_cost import ACCEPTABLE, INDISTINGUISHABLE, ParameterAccuracy, Target
-from swashplate.identification.spectra import Complex
-from swashplate.identification.spread import Fitted, answers, has_pair
-from swashplate.identification.state_space_result import StateSpaceFit
-from swashplate.identification.state_space_words import CR_TARGET, I_TARGET
-from swashplate.identification.transfer_function_fit import TransferFunctionFit, Trial
-from swashplate.identification.verification import Verification
+from swashplate.arrays import Complex
+from swashplate.control.analysis.ardupilot_gains import PEAK, Suggestion
+from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.core.time_fit import TimeDetails
+from swashplate.identification.frequency.handling import Handling
+from swashplate.identification.frequency.handling_readings import handling_lines
+from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
+from swashplate.identification.frequency.reading_accuracy import Fitted, answers, has_pair
+from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
+from swashplate.identification.frequency.state_space_result import StateSpaceFit
+from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, Trial
+from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
 from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
@@ -28,6 +29,7 @@ from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
 from swashplate.simulation.linearize import Mode
+from swashplate.validation.verification import Verification
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class ResponseMaterial:
     fit: StateSpaceFit | None = None
     verification: Verification | None = None
     rival: Verification | None = None
-    time_fit: LinearTimeFit | None = None
+    time_fit: Result[StateSpaceModel, TimeDetails] | None = None
     gains: tuple[Suggestion, ...] = field(default=())
 
     @property
@@ -61,9 +63,9 @@ def tone(cost: float) -> str:
     return "good" if cost <= INDISTINGUISHABLE else "caution" if cost <= ACCEPTABLE else "bad"
 
 
-def weak(p: ParameterAccuracy) -> bool:
+def weak(p: Estimate) -> bool:
     """Whether a parameter misses its target for the Cramér-Rao bound or the insensitivity."""
-    return p.cramer_rao_percent > CR_TARGET or p.insensitivity_percent > I_TARGET
+    return p.sigma_percent > CR_TARGET or p.insensitivity_percent > I_TARGET
 
 
 def _percent(value: float, limit: float) -> Cell:
@@ -71,7 +73,7 @@ def _percent(value: float, limit: float) -> Cell:
     return Cell(words, number=True, tone="good" if value <= limit else "caution" if value <= 2 * limit else "bad")
 
 
-def parameter_table(parameters: Sequence[ParameterAccuracy]) -> Table:
+def parameter_table(parameters: Sequence[Estimate]) -> Table:
     """Every number with its Cramér-Rao bound and insensitivity, coloured by the targets."""
     rows = []
     for p in parameters:
@@ -82,8 +84,8 @@ def parameter_table(parameters: Sequence[ParameterAccuracy]) -> Table:
                 Cell(p.name),
                 Cell(unit_words(p.unit)),
                 Cell(value_words(p.start), number=True),
-                Cell(value_words(p.value, p.cramer_rao if moving else None), number=True, strong=True),
-                _percent(p.cramer_rao_percent, CR_TARGET) if moving else Cell("", number=True),
+                Cell(value_words(p.value, p.sigma if moving else None), number=True, strong=True),
+                _percent(p.sigma_percent, CR_TARGET) if moving else Cell("", number=True),
                 _percent(p.insensitivity_percent, I_TARGET) if moving else Cell("", number=True),
                 Cell(remark, tone="bad" if p.at_bound else "plain"),
             )
@@ -103,14 +105,14 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
     blocks: list[Block] = [Text(text, tone="bad") for text in fit.problems]
     if fit.warnings:
         blocks.append(Points(fit.warnings, title="What to beware of"))
-    blocks.append(parameter_table(fit.parameters))
-    if fit.nothing_to_drop:
+    blocks.append(parameter_table(fit.estimates))
+    if fit.details.nothing_to_drop:
         blocks.append(Text("Structure reduction: nothing to take out, every parameter is within its targets."))
-    if fit.reduction:
+    if fit.details.reduction:
         blocks.append(
             Table(
                 "Structure reduction",
-                ("parameter", "why", "J_ave before", "J_ave after", "verdict"),
+                ("parameter", "why", "J_ave before", "J_ave after", "verdict", "why not", "modes"),
                 tuple(
                     (
                         Cell(s.dropped),
@@ -118,15 +120,17 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
                         Cell(f"{s.before:.1f}", number=True),
                         Cell(f"{s.after:.1f}", number=True),
                         Cell("dropped" if s.kept else "put back", tone="plain" if s.kept else "quiet"),
+                        Cell(s.veto or ("" if s.kept else "J_ave grows too much")),
+                        Cell(s.modes.removeprefix("modes: ")),
                     )
-                    for s in fit.reduction
+                    for s in fit.details.reduction
                 ),
             )
         )
     modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
-    blocks += [_mode_table(fit.modes), eigenvalues(modes)] if fit.modes else [eigenvalues(modes)]
-    if len(fit.free) > 1:
-        blocks.append(correlation_matrix(fit.free, fit.correlation))
+    blocks += [_mode_table(fit.details.modes), eigenvalues(modes)] if fit.details.modes else [eigenvalues(modes)]
+    if len(fit.names) > 1:
+        blocks.append(correlation_matrix(fit.names, fit.correlation))
     if len(fit.history) > 1:
         words = "Half the sum of J over all responses, after each iteration."
         blocks.append(replace(cost_history(fit.history), caption=words))
@@ -152,18 +156,18 @@ def _mode_table(modes: Sequence[ModeAccuracy]) -> Table:
     )
 
 
-def time_fit_section(fit: LinearTimeFit) -> Section:
+def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
     """Parameters with their standard deviations, and the modes."""
     rows = tuple(
         (
             Cell(p.name),
             Cell(unit_words(p.unit)),
             Cell(value_words(p.start), number=True),
-            Cell(value_words(p.value, p.cramer_rao), number=True, strong=True),
-            _percent(p.cramer_rao_percent, CR_TARGET),
+            Cell(value_words(p.value, p.sigma), number=True, strong=True),
+            _percent(p.sigma_percent, CR_TARGET),
             Cell("at its bound" if p.at_bound else "", tone="bad" if p.at_bound else "plain"),
         )
-        for p in fit.parameters
+        for p in fit.estimates
     )
     blocks: list[Block] = [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
     blocks.append(
@@ -172,7 +176,7 @@ def time_fit_section(fit: LinearTimeFit) -> Section:
             ("parameter", "unit", "start", "identified", "standard deviation", "remarks"),
             rows,
             note=f"By {fit.method}; standard deviations from the Fisher information, for white errors: with coloured "
-            "ones the true scatter is larger.",
+            "ones the true scatter is larger, as the corrected ones say.",
         )
     )
     blocks.append(eigenvalues({"identified": _modes(fit.model.eigenvalues())}))
@@ -209,8 +213,8 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     answers = [fit.model.response(omega)[:, o, i] for o, i, omega in pairs]
     found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
     blocks: list[Block] = [_cost_table(fit.targets, fit.costs), mismatch_figure(found)]
-    if fit.left_out:
-        blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.left_out)}."))
+    if fit.details.left_out:
+        blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "Responses, flight against model", tuple(blocks))
 
 
@@ -218,13 +222,13 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
     """Transfer functions with their costs and parameters, and what the usual structures would cost."""
     blocks: list[Block] = []
     for fit in m.transfer_functions:
-        blocks += [Text(f"{model!r}") for model in fit.models]
-        blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.parameters)]
+        blocks += [Text(f"{model!r}") for model in fit.model]
+        blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
-        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.models, fit.targets, strict=True)]
+        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.model, fit.targets, strict=True)]
         blocks.append(mismatch_figure(found))
     if m.trials:
-        chosen = m.transfer_functions[0].form if m.transfer_functions else None
+        chosen = m.transfer_functions[0].details.form if m.transfer_functions else None
         blocks.append(
             Table(
                 "Structures tried",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from swashplate.identification.fit import AxisExcitation, Fit
+from swashplate.identification.core.result import Result
+from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.words import value_words
@@ -14,9 +16,9 @@ from swashplate.simulation.linearize import Mode
 _SLOW = 1e-6
 
 
-def sight(fit: Fit) -> Section:
+def sight(fit: Result[Any, Any]) -> Section:
     """What the data can and cannot tell."""
-    blocks: list[Block] = [_excitation(fit.excitation)] if fit.excitation else []
+    blocks: list[Block] = [_excitation(axes)] if (axes := getattr(fit.details, "excitation", ())) else []
     if fit.directions:
         blocks.append(
             Points(

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from swashplate.filtering.disturbed_model import Nuisance
 from swashplate.flights.schema import channel
-from swashplate.identification.estimates import RECORD_UNITS
-from swashplate.identification.kinematics import PREDICTED
-from swashplate.identification.stochastic import Nuisance
+from swashplate.identification.time.estimates import RECORD_UNITS
+from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.reporting.figures_time import Prediction, Series, flight_name, time_figures
 from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
 from swashplate.reporting.glossary import meaning

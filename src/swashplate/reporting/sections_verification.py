@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.flights.schema import channel
-from swashplate.identification.verification import GOOD_J, GOOD_TIC, Verification
 from swashplate.reporting.figures_responses import verification_figure
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import shown, unit_words
 from swashplate.reporting.words import value_words
+from swashplate.validation.refutation import REFUTED
+from swashplate.validation.verification import GOOD_TIC, Verification
 
 _TRACES = 4
 """Stretches that are drawn."""
@@ -26,13 +27,9 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
         )
         for o in v.outputs
     )
-    blocks: list[Block] = [Text(text, tone="caution") for text in v.warnings]
-    blocks.append(
-        Text(
-            f"J_rms = {v.cost:.2f} (1 deg, 1 deg/s, 1 ft/s and 1 ft/s² alike); up to {GOOD_J:g} is good.",
-            tone="good" if v.good else "caution",
-        )
-    )
+    tone = "bad" if v.verdict == REFUTED else "good" if v.good else "caution"
+    blocks: list[Block] = [Text(text, tone=tone) for text in v.headline]
+    blocks += [Text(text, tone="caution") for text in v.warnings]
     if v.inside is not None:
         low, high = v.inside.settings["band_hz"]
         theil = ", ".join(f"{o.output} {o.theil:.2f}" for o in v.inside.outputs)
@@ -58,6 +55,8 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))
             for o in rival.outputs
         )
+        told = f"{rival.model.name}: {rival.verdict}; J_rms = {rival.cost:.2f}, {rival.constants} constants."
+        blocks.append(Text(told))
         blocks.append(Table(f"{rival.model.name} on the same records", ("output", "Theil", "fit %"), theirs))
         if not {t.source for t in rival.traces} & {t.source for t in v.traces}:
             blocks.append(Text(f"{rival.model.name} is not drawn: it was flown in other stretches.", tone="quiet"))
@@ -65,5 +64,5 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
     for k, trace in enumerate(v.traces[:_TRACES]):
         twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
         other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
-        blocks.append(verification_figure(trace, outputs, v.model.inputs, number=k, rival=other))
+        blocks.append(verification_figure(trace, outputs, v.inputs, number=k, rival=other))
     return Section("verification", "Verification in time", tuple(blocks))

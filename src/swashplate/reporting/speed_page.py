@@ -9,6 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.errors import SwashError
+from swashplate.models.conventional.derivative_table import (
+    COLUMNS,
+    ROWS,
+    DerivativeTable,
+    factor_to_feet,
+    split_name,
+    unit,
+)
+from swashplate.models.doubts import shaft_power
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Figure, Key, Points, Report, Section
 from swashplate.reporting.theme import (
@@ -28,9 +38,6 @@ from swashplate.reporting.theme import (
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.linearize import Mode, linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.derivatives import COLUMNS, ROWS, DerivativeTable, factor_to_feet, split_name, unit
-from swashplate.vehicles.helicopter_limits import shaft_power
-from swashplate.vehicles.vehicle import Vehicle
 
 _PART_COLORS = {
     "main_rotor": BLUE,

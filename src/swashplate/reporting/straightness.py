@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swashplate.control.straightness import StepRun
+from swashplate.control.analysis.straightness import StepRun
 from swashplate.flights.schema import channel
-from swashplate.reporting.html import write_page
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
 from swashplate.reporting.versions import card_hash, date, versions
-from swashplate.vehicles.vehicle import Vehicle
 
 _STYLES = ((PUBLISHED, "dash"), (MODEL, "solid"))
 _FAINT = ("rgba(213,94,0,0.22)", "rgba(0,114,178,0.22)")
@@ -26,31 +23,6 @@ _STRAIGHT = 0.15
 """m at the end of the step; what the law promises with the constant lag that absorbs the bar's misalignment too."""
 
 
-def straightness_report(
-    vehicle: Vehicle,
-    runs: Mapping[str, StepRun],
-    *,
-    command: float,
-    lag: float,
-    path: str | os.PathLike[str],
-    sources: Sequence[tuple[str, float]] = (),
-) -> Path:
-    """Write one self-contained HTML file that compares the step's paths.
-
-    Args:
-        vehicle: what flew.
-        runs: "without" and "with" the decoupling, from `step_run`.
-        command: the step of the pitch command.
-        lag: that the law takes out at hover [deg].
-        path: where to write; the folder is made where it is missing.
-        sources: of the drawn models' drift, from `drift_sources`.
-
-    Raises:
-        SwashError: a place that cannot be written to.
-    """
-    return write_page(path, compose_straightness(vehicle, runs, command=command, lag=lag, sources=sources))
-
-
 def compose_straightness(
     vehicle: Vehicle,
     runs: Mapping[str, StepRun],
@@ -58,8 +30,18 @@ def compose_straightness(
     command: float,
     lag: float,
     sources: Sequence[tuple[str, float]] = (),
+    title: str | None = None,
 ) -> Report:
-    """The report's structure."""
+    """The report's structure.
+
+    Args:
+        vehicle: what flew.
+        runs: "without" and "with" the decoupling, from `step_run`.
+        command: the step of the pitch command.
+        lag: that the law takes out at hover [deg].
+        sources: of the drawn models' drift, from `drift_sources`.
+        title: heading.
+    """
     bare, law = runs["without"], runs["with"]
     drift = [float(run.path.drift[0]) for run in (bare, law)]
     speeds = [float(run.path.speed[0]) for run in (bare, law)]
@@ -77,7 +59,7 @@ def compose_straightness(
         ("Models", *_models(runs)),
     ]  # fmt: skip
     return Report(
-        title=f"{vehicle.name}: the path on a step of the pitch command",
+        title=title or f"{vehicle.name}: the path on a step of the pitch command",
         banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
         summary=tuple(summary),
         picture=_path_figure(runs),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
-from swashplate.flights.flight import Flight
-from swashplate.identification.fit import Fit
+from swashplate.identification.core.result import Result
+from swashplate.identification.core.sources import Source, sources_of
 from swashplate.reporting.figures_validation import middle_horizon
 from swashplate.reporting.sections_data import method_words, used_twice
 from swashplate.reporting.sections_fit import PRIOR_HEAVY
@@ -18,18 +19,18 @@ _LEVELS = ("good", "usable", "poor", "cannot be judged")
 _TONES = {"good": "good", "usable": "caution", "poor": "bad"}
 
 
-def banners(fit: Fit | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
+def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
     """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
     found: list[tuple[str, str]] = []
-    flights = (*(fit.flights if fit else ()), *(validation.flights if validation else ()))
-    simulated = [f for f in flights if f.provenance.simulated]
+    flights = (*(fit.data if fit else ()), *(sources_of(validation.flights) if validation else ()))
+    simulated = [f for f in flights if f.simulated]
     if simulated:
-        names = list(dict.fromkeys(f.provenance.source or "unnamed" for f in simulated))
+        names = list(dict.fromkeys(f.name or "unnamed" for f in simulated))
         part = "" if len(simulated) == len(flights) else f" ({listed(names)})"
         found.append(("caution", f"SIMULATED FLIGHT{part}: no aircraft flew for these numbers."))
     twice = used_twice(fit, validation)
     if twice:
-        names = list(dict.fromkeys(f.provenance.source or "an unnamed flight" for f in twice))
+        names = list(dict.fromkeys(f.name or "an unnamed flight" for f in twice))
         found.append(("caution", f"NOT A HOLD-OUT: {listed(names)} was used for the fit too."))
     if fit and fit.failed:
         reasons = " ".join(fit.problems) or "See the parameters."
@@ -39,7 +40,7 @@ def banners(fit: Fit | None, validation: Validation | None) -> tuple[tuple[str, 
     return tuple(found)
 
 
-def summary(fit: Fit | None, validation: Validation | None) -> tuple[Line, ...]:
+def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Line, ...]:
     """Five lines (label, words, tone): what was done, how it ended, how it predicts, the verdict, what to beware of."""
     rows = [_what(fit, validation)]
     if fit:
@@ -55,32 +56,33 @@ def summary(fit: Fit | None, validation: Validation | None) -> tuple[Line, ...]:
     return tuple(rows)
 
 
-def _names(flights: Sequence[Flight]) -> str:
-    return listed([f"{f.provenance.source or 'an unnamed flight'} ({span_words(f)})" for f in flights], most=3)
+def _names(flights: Sequence[Source]) -> str:
+    return listed([f"{f.name or 'an unnamed flight'} ({span_words(f)})" for f in flights], most=3)
 
 
-def _what(fit: Fit | None, validation: Validation | None) -> Line:
+def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
     words = []
     if fit:
-        used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.comparisons)
-        source = f"{used:.1f} s of {_names(fit.flights)}" if used else _names(fit.flights)
-        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.vehicle.card.called}' identified from {source}")
+        used = sum(float(c.record.time[-1] - c.record.time[0]) for c in fit.in_time)
+        source = f"{used:.1f} s of {_names(fit.data)}" if used else _names(fit.data)
+        words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.model.card.called}' identified from {source}")
     if validation:
         words.append(
-            f"tested on {_names(validation.flights)}"
+            f"tested on {_names(sources_of(validation.flights))}"
             + (", which the fit never saw" if fit and not used_twice(fit, validation) else "")
         )
     return "What", ", ".join(words) + ".", "plain"
 
 
-def _fit(fit: Fit) -> Line:
+def _fit(fit: Result[Any, Any]) -> Line:
     steps = f" in {counted(len(fit.history) - 1, 'iteration')}" if len(fit.history) > 1 else ""
     state = "failed" if fit.failed else ("converged" if fit.converged else "did not converge")
-    bounds = [e.name for e in fit.parameters if e.at_bound]
+    bounds = [e.name for e in fit.estimates if e.at_bound]
     physics = f"{listed(bounds)} ended at a physical bound" if bounds else "every value lies within its physical bounds"
     tone = "bad" if fit.failed else ("good" if fit.converged and not bounds else "caution")
+    took = f" ({fit.seconds:.0f} s)" if fit.seconds else ""  # a saved result does not know
     method = method_words(fit.method).split(" (")[0]
-    return "Fit", f"{method.capitalize()} {state}{steps} ({fit.seconds:.0f} s); {physics}.", tone
+    return "Fit", f"{method.capitalize()} {state}{steps}{took}; {physics}.", tone
 
 
 def _prediction(validation: Validation) -> Line:
@@ -115,27 +117,27 @@ def _verdict(validation: Validation) -> Line:
     return "Verdict", ("; ".join(words) or "no axis was judged") + ".", _TONES.get(worst, "plain")
 
 
-def _changes(fit: Fit) -> Line:
+def _changes(fit: Result[Any, Any]) -> Line:
     moved = sorted(
-        (e for e in fit.parameters if not e.tie and e.sigma_corrected > 0.0),
-        key=lambda e: -abs(e.value - e.published) / e.sigma_corrected,
+        (e for e in fit.estimates if not e.tie and e.best_sigma > 0.0),
+        key=lambda e: -abs(e.value - e.start) / e.best_sigma,
     )[:3]
-    words = [f"{e.name} {value_words(e.published)} → {value_words(e.value, e.sigma_corrected)}" for e in moved]
+    words = [f"{e.name} {value_words(e.start)} → {value_words(e.value, e.best_sigma)}" for e in moved]
     return "Change", f"Moved most for its uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
 
 
-def _beware(fit: Fit | None, validation: Validation | None) -> Line:
+def _beware(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
     words = []
     if fit:
-        blind = list(dict.fromkeys(a.axis for a in fit.excitation if not a.identifiable))
+        blind = list(dict.fromkeys(a.axis for a in getattr(fit.details, "excitation", ()) if not a.identifiable))
         if blind:
             words.append(f"no independent excitation in {listed(blind)}")
-        heavy = [e.name for e in fit.parameters if e.prior_share > PRIOR_HEAVY and not e.tie]
+        heavy = [e.name for e in fit.estimates if e.prior_share > PRIOR_HEAVY and not e.tie]
         if heavy:
             words.append(f"the prior, not the flight, decided {listed(heavy, most=5)}")
         if fit.directions:
             words.append(f"{counted(len(fit.directions), 'combination')} of parameters hardly seen")
-        if any(not c.record.voltage_known for c in fit.comparisons):
+        if any(not c.record.voltage_known for c in fit.in_time):
             words.append("battery voltage not logged")
     elif validation and any(not r.voltage_known for r in validation.records):
         words.append("battery voltage not logged")

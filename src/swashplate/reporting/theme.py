@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 from swashplate.flights.schema import channel
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from typing import Any
 
-from swashplate.vehicles.card import Card
+from swashplate.models.card import Card
 
 _PACKAGES = ("swashplate", "jax", "jaxlib", "numpy", "scipy", "xarray", "plotly")
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from swashplate.flights.flight import Flight, Step
+from swashplate.flights.provenance import ProcessingStep
+from swashplate.identification.core.sources import Source
 
 
 def value_words(value: float | None, sigma: float | None = None) -> str:
@@ -120,7 +121,7 @@ _STEPS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
 }
 
 
-def step_words(step: Step) -> str:
+def step_words(step: ProcessingStep) -> str:
     """One step of a flight's history in words; a step that is not known is given with its numbers."""
     try:
         return _STEPS[step.operation](step.details)
@@ -150,9 +151,9 @@ def plain_words(value: Any) -> str:
     return text.replace("\\", "/").rsplit("/", 1)[-1] if text.startswith(("/", "~")) or text[1:3] == ":\\" else text
 
 
-def span_words(flight: Flight) -> str:
+def span_words(flight: Source) -> str:
     """Duration, pieces and rate of a flight."""
-    pieces = flight.segments or ((flight.start, flight.stop),)
-    flown = sum(stop - start for start, stop in pieces)
-    first = flight.channels[0]
-    return f"{flown:.1f} s in {counted(len(pieces), 'segment')} at {flight.rate(first):.0f} Hz"
+    if not flight.segments:
+        return "–"
+    flown = sum(stop - start for start, stop in flight.segments)
+    return f"{flown:.1f} s in {counted(len(flight.segments), 'segment')} at {flight.rate:.0f} Hz"

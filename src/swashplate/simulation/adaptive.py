@@ -11,12 +11,12 @@ import numpy as np
 
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision, equations_of, parameter_row, row_rates
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.trim import Trim, start_row
-from swashplate.vehicles.vehicle import Vehicle
 
 
 def simulate_adaptive(

@@ -10,10 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
-from swashplate.flights.maneuvers import Maneuver
-from swashplate.flights.maneuvers import parse as parse_maneuver
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.flights.maneuvers.series import parse as parse_maneuver
+from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
@@ -22,15 +25,13 @@ from swashplate.simulation.dynamics import (
     enable_double_precision,
     equations_of,
     parameter_row,
-    rk4_step_looped,
     row_force,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import Trim, start_row, trim
-from swashplate.vehicles.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
 REFERENCES = ("x", "y", "z", "psi", "ahead", "right", "roll", "pitch")
@@ -49,6 +50,9 @@ class Controller(Protocol):
             vehicle's state row and the battery voltage, `reference` the row of `REFERENCES`. JAX traces it. A step with
             an attribute `feels` that is true is given the specific force at the centre of gravity between the two; one
             with `stacks` that is true takes and gives columns of many vehicles too, shape (rows, vehicles).
+
+    One that was designed for late commands may tell them as `delays`, seconds by input. One that only keeps an aircraft
+    in the room for an experiment may say `at_once`: unless delays are given, none are flown under it.
     """
 
     @property
@@ -61,6 +65,25 @@ class Controller(Protocol):
     def step(self) -> Step: ...
 
 
+def flown_delays(
+    vehicle: Vehicle, controller: Controller, *, delays: Mapping[str, float] | float | None = None
+) -> Array:
+    """By how much commands are late in flight, by input [s], shape (inputs,).
+
+    What is given counts first, then what the vehicle's card knows, then what the controller was designed for.
+    """
+    if delays is None and getattr(controller, "at_once", False):
+        delays = 0.0
+    if delays is None:
+        delays = input_delays(vehicle) or getattr(controller, "delays", {})
+    return np.array(list(complete_delays(vehicle, delays).values()))
+
+
+def steps_late(delays: Array, rate: float) -> NDArray[np.int_]:
+    """Delays [s] in steps of a simulation at `rate` [Hz], rounded up: no command acts before it can."""
+    return np.asarray(np.ceil(np.asarray(delays) * rate - 1e-6), dtype=np.int_)
+
+
 def simulate_closed_loop(
     vehicle: Vehicle,
     controller: Controller,
@@ -70,6 +93,7 @@ def simulate_closed_loop(
     excitation: Mapping[str, ArrayLike] | None = None,
     voltage: ArrayLike | None = None,
     wind: Mapping[str, ArrayLike] | None = None,
+    delays: Mapping[str, float] | float | None = None,
     start: Trim | Mapping[str, float] | None = None,
     rate: float = 100.0,
     environment: Environment | None = None,
@@ -85,9 +109,11 @@ def simulate_closed_loop(
         excitation: series (n,) by input name, added to the commands before the limits.
         voltage: battery voltage [V], a number or series (n,).
         wind: "wind_north", "wind_east", "wind_down" [m/s], numbers or series (n,).
+        delays: from command to actuator [s], one for all or by input, rounded up to the simulation's steps; where not
+            given those of `flown_delays`. Until the first command arrives the actuators get those of the start.
 
     Returns:
-        The true flight; its inputs are what the actuators got: command and excitation, limited.
+        The true flight; its inputs are what the actuators got: command and excitation, limited, late.
 
     Raises:
         DivergenceError: with the time, the state that went first and the flight up to there.
@@ -111,16 +137,22 @@ def simulate_closed_loop(
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
     fly = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly
+    late = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
+    waiting = int(late.max())
+    first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
     states, inputs = fly(
         equations_of(vehicle),
         controller.step,
         round(every),
+        waiting,
         x0,
         jnp.asarray(controller.memory),
         jnp.asarray(controller.gains),
         (around, wanted, added),
         parameter_row(vehicle, surroundings),
         np.array(vehicle.input_limits).T,
+        late,
+        first,
         1.0 / rate,
     )
     time, rows = np.arange(n) / rate, np.concatenate([np.asarray(inputs), around], axis=1)
@@ -131,25 +163,34 @@ def simulate_closed_loop(
     return flight
 
 
+def _inputs_before(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, around: Environment) -> Array:
+    """What the actuators get before the first command arrives: the trim's."""
+    return np.asarray((start if isinstance(start, Trim) else trim(vehicle, environment=around)).inputs)
+
+
 def _flying(
     equations: Equations,
     control: Step,
     every: int,
+    waiting: int,
     x0: Any,
     memory: Any,
     gains: Any,
     tables: Any,
     p: Any,
     limits: Any,
+    late: Any,
+    first: Any,
     dt: Any,
 ) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=True)
     around, wanted, added = tables
 
-    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        x, memory, command, k = carry
+    def sample(carry: tuple[Any, Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+        x, memory, command, sent, k = carry
         surroundings, reference, excitation = now
-        measured = told(control, equations, x, jnp.clip(command, limits[0], limits[1]), surroundings, p)
+        acting = _arrived(sent, late) if waiting else jnp.clip(command, limits[0], limits[1])  # until now
+        measured = told(control, equations, x, acting, surroundings, p)
         due = k % every == 0
 
         def decided() -> tuple[Any, Any]:
@@ -161,18 +202,27 @@ def _flying(
             fresh_memory, fresh = decided()
             memory, command = jnp.where(due, fresh_memory, memory), jnp.where(due, fresh, command)
         inputs = jnp.clip(command + excitation, limits[0], limits[1])
+        if waiting:
+            sent = jnp.concatenate([inputs[None], sent[:-1]])
+            inputs = _arrived(sent, late)
         w = jnp.concatenate([inputs, surroundings])
-        after = rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, dt)
-        return (after, memory, command, k + 1), (x, inputs)
+        after = rk4_step(lambda x, w: rates(x, w, p), x, lambda _: w, dt, looped=True)
+        return (after, memory, command, sent, k + 1), (x, inputs)
 
     nothing = jnp.zeros(added.shape[1])
-    _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, 0), (around, wanted, added))
+    sent = jnp.broadcast_to(jnp.asarray(first), (waiting + 1, added.shape[1]))
+    _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, sent, 0), (around, wanted, added))
     return record  # type: ignore[no-any-return]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2))
+def _arrived(sent: Any, late: Any) -> Any:
+    """Of each input the command of so many steps ago; `sent` has the newest first."""
+    return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
+
+
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3))
 # An observer's derivatives take minutes to compile as XLA usually does it.
-_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
 
 
 def told(control: Step, equations: Equations, x: Any, inputs: Any, surroundings: Any, p: Any) -> Any:
@@ -213,7 +263,7 @@ def simulate_maneuver(
     Args:
         vehicle: what flies.
         maneuver: a `Maneuver` or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
-        controller: makes the controller for the vehicle and its trim, e.g. `swashplate.control.hold.hover_hold`.
+        controller: makes the controller for the vehicle and its trim, e.g. `swashplate.control.laws.hold.hover_hold`.
         lead, tail: hover before and after [s].
         pilot: True sends roll and pitch to the controller as a pilot's commands; otherwise every axis is added to what
             the controller commands.

@@ -12,10 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch
-from swashplate.simulation.closed_loop import REFERENCES, Controller, Step
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays, steps_late
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -23,16 +25,13 @@ from swashplate.simulation.dynamics import (
     enable_double_precision,
     equations_of,
     parameter_row,
-    rk4_step,
     row_force,
     row_rates,
 )
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 BLOCK = 256
 """Vehicles per block, where the controller's step does not say how many (`block`); a block keeps one core busy."""
@@ -51,6 +50,7 @@ def simulate_closed_loops(
     voltage: ArrayLike | None = None,
     noise: Mapping[str, float] | None = None,
     delay: ArrayLike = 0.0,
+    delays: Mapping[str, float] | float | None = None,
     seed: int = 0,
     start: Trim | None = None,
     rate: float = 500.0,
@@ -69,8 +69,10 @@ def simulate_closed_loops(
         excitation: series (n,) by input name at the controller's rate, added to every vehicle's commands.
         wind, voltage: numbers, series (n,) or (n, size) at the controller's rate, held between samples.
         noise: standard deviation of the white noise on a measured state, by its name [its unit].
-        delay: of each vehicle's commands on their way to the actuators [s], a number or shape (size,); to the nearest
-            step of the physics. Before the first command arrives the actuators get those of the start.
+        delay: by how much more the commands of each vehicle are late [s], a number or shape (size,).
+        delays: from command to actuator [s], one for all or by input; where not given those of `flown_delays`. The sum
+            is rounded up to the steps of the physics. Before the first command arrives the actuators get those of the
+            start.
         seed: of that noise.
         start: where all start; the hover of `vehicle` where it is not given.
         rate: of the physics [Hz], a whole multiple of the controller's.
@@ -105,9 +107,10 @@ def simulate_closed_loops(
         if name not in vehicle.parameter_names:
             raise CardError("is not a parameter of the vehicle.", where=vehicle.name, channel=name)
         p[vehicle.parameter_names.index(name)] = values
-    late = np.round(np.broadcast_to(np.asarray(delay, dtype=np.float64), (size,)) * rate)
-    if not np.all(late >= 0.0):
+    further = np.broadcast_to(np.asarray(delay, dtype=np.float64), (size,))
+    if not np.all(further >= 0.0):
         raise SwashError("is negative or no number.", channel="delay")
+    late = steps_late(flown_delays(vehicle, controller, delays=delays)[:, None] + further, rate)
     waiting = int(np.ceil(late.max() / round(substeps)))
     sigma = np.zeros(len(vehicle.state_names))
     for name, value in (noise or {}).items():
@@ -135,7 +138,7 @@ def simulate_closed_loops(
             p[:, part],
             np.array(vehicle.input_limits).T[:, :, None],
             sigma[:, None],
-            late[part].astype(int),
+            late[:, part],
             begin.inputs,
             key,
             1.0 / rate,
@@ -191,7 +194,9 @@ def _flying_many(
 ) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=False, xp=vector_backend())
     flying: Any = jax.vmap(
-        lambda x, w, p: rk4_step(lambda x, w: rates(x, w, p), x, (w, w, w), dt), in_axes=(1, 1, 1), out_axes=1
+        lambda x, w, p: rk4_step(lambda x, w: rates(x, w, p), x, lambda _: w, dt, looped=False),
+        in_axes=(1, 1, 1),
+        out_axes=1,
     )
     deciding: Any = control
     if not getattr(control, "stacks", False):
@@ -204,7 +209,7 @@ def _flying_many(
     def arrived(sent: Any, j: Any) -> Any:
         """What the actuators get in step j of a sample: the command of so many samples ago."""
         ago = jnp.clip(-((j - late) // substeps), 0, waiting)
-        return jnp.take_along_axis(sent, ago[None, None, :], axis=0)[0]
+        return jnp.take_along_axis(sent, ago[None], axis=0)[0]
 
     def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
         x, memory, sent, k = carry

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import os
+import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import jax
 import platformdirs
+
+from swashplate.atomic import write_text
+from swashplate.errors import WriteError
 
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
@@ -53,10 +60,57 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
         return None
     if not os.access(chosen, os.W_OK):
         return None
+    _without_damaged(chosen)
     _set("jax_compilation_cache_dir", str(chosen))
     _set("jax_persistent_cache_min_compile_time_secs", 0.3)
     _set("jax_persistent_cache_min_entry_size_bytes", 0)
     return chosen
+
+
+_CHECKED = "checked.json"
+
+
+def _without_damaged(folder: Path) -> None:
+    """Removes entries that do not unpack, so that they are compiled anew.
+
+    JAX writes an entry in place and never again: one that a kill or a full disk cut off stays for ever, and each run
+    warns of it. An entry is unpacked once; a note beside the entries says which were whole, by size and time.
+    """
+    note = folder / _CHECKED
+    try:
+        known = json.loads(note.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        known = {}
+    known = known if isinstance(known, dict) else {}
+    whole = {}
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if not entry.name.endswith("-cache"):
+                continue
+            with suppress(OSError):
+                found = entry.stat()
+                seen = [found.st_size, found.st_mtime_ns]
+                if known.get(entry.name) == seen or _unpacks(Path(entry.path).read_bytes()):
+                    whole[entry.name] = seen
+                else:
+                    os.unlink(entry.path)
+    if whole != known:
+        with suppress(WriteError):  # without the note they are unpacked again the next time
+            write_text(note, json.dumps(whole))
+
+
+def _unpacks(content: bytes) -> bool:
+    """Whether an entry is complete: JAX packs it by Zstandard where that is installed, by zlib otherwise."""
+    for name in ("compression.zstd", "zstandard"):
+        with suppress(ImportError):
+            unpack = importlib.import_module(name).decompress
+            break
+    else:
+        unpack = zlib.decompress
+    try:
+        return len(unpack(content)) > 0
+    except Exception:  # each library has errors of its own
+        return False
 
 
 def _set(option: str, value: object) -> None:

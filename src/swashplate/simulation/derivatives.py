@@ -10,6 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.errors import SwashError
+from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
+from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
+from swashplate.models.conventional.helicopter_options import HelicopterOptions
+from swashplate.models.nesting import leaves, rebuild
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -21,11 +26,6 @@ from swashplate.simulation.dynamics import (
     unpack_rows,
 )
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.conventional import CONTRIBUTORS, loads
-from swashplate.vehicles.derivatives import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
-from swashplate.vehicles.helicopter_options import HelicopterOptions
-from swashplate.vehicles.structure import leaves, rebuild
-from swashplate.vehicles.vehicle import Vehicle
 
 _FAST = ("a1", "b1", "lam0", "lam_c", "lam_s")
 """States that follow without delay in a table of derivatives with six degrees of freedom."""
@@ -39,7 +39,7 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     Raises:
         SwashError: for a vehicle that is no single-rotor helicopter.
     """
-    if not isinstance(options_of(vehicle), HelicopterOptions):
+    if not isinstance(vehicle.options, HelicopterOptions):
         raise SwashError("has no table of derivatives.", where=vehicle.name, hint="It needs a single-rotor card.")
     enable_double_precision()
     surroundings = [float(getattr(trim.environment, name)) for name in SURROUNDINGS]
@@ -64,21 +64,15 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     return DerivativeTable(parts, following[:2], "automatic differentiation")
 
 
-def options_of(vehicle: Vehicle) -> Any:
-    """The options of a single-rotor helicopter's equations; None for another vehicle."""
-    return vehicle.derivatives.keywords.get("options") if isinstance(vehicle.derivatives, partial) else None
-
-
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _slopes(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
     vehicle = equations.vehicle
-    options = options_of(vehicle)
 
     def acting(x: Any, w: Any) -> Any:
         inputs, parameters, environment = unpack_rows(equations, w, p)
         state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
         commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))
-        found = loads(state, commands, parameters, environment, jax_backend(), options=options)
+        found = loads(state, commands, parameters, environment, jax_backend(), options=vehicle.options)
         rows = []
         for name in CONTRIBUTORS:
             part = getattr(found, name)

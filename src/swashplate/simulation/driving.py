@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import SURROUNDINGS
-from swashplate.vehicles.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Interpolation = Literal["held", "linear"]
 Inputs = Flight | Mapping[str, ArrayLike] | NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""A vehicle's equations as functions of flat JAX rows, and Runge-Kutta steps: what every compiled loop is made of."""
+"""A vehicle's equations as functions of flat JAX rows."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.models.nesting import rebuild
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import compile_small_loops_whole
 from swashplate.simulation.trigonometry import vector_backend
-from swashplate.vehicles.structure import rebuild
-from swashplate.vehicles.vehicle import Vehicle
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
 RowRates = Callable[[Any, Any, Any], Any]
@@ -50,15 +50,6 @@ def rates_function(vehicle: Vehicle) -> Rates:
     return rates
 
 
-def rk4_step(rates: Callable[[Any, Any], Any], x: Any, u: tuple[Any, Any, Any], dt: Any) -> Any:
-    """One classical Runge-Kutta step of length dt; `u` are the inputs at the step's start, middle and end."""
-    k1 = rates(x, u[0])
-    k2 = rates(x + 0.5 * dt * k1, u[1])
-    k3 = rates(x + 0.5 * dt * k2, u[1])
-    k4 = rates(x + dt * k3, u[2])
-    return x + (dt / 6.0) * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-
-
 @dataclass(frozen=True)
 class Equations:
     """A vehicle's equations without its numbers: equal for two cards of one vehicle, so that compiled code is shared.
@@ -79,8 +70,9 @@ def equations_of(vehicle: Vehicle) -> Equations:
 
 
 def _identity(function: Any) -> Hashable:
-    if isinstance(function, partial):
-        return (function.func, function.args, tuple(sorted(function.keywords.items())))
+    if isinstance(function, partial):  # two of the same function and numbers are the same equations
+        keywords = ((name, _identity(value)) for name, value in sorted(function.keywords.items()))
+        return (_identity(function.func), tuple(map(_identity, function.args)), tuple(keywords))
     return function  # type: ignore[no-any-return]
 
 
@@ -142,27 +134,3 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
         return jnp.stack(vehicle.specific_force(nested, commands, parameters, environment, operations))
 
     return felt
-
-
-def rk4_step_looped(rates: Callable[[Any, Any], Any], x: Any, w: Callable[[Any], Any], dt: Any) -> Any:
-    """The same step as `rk4_step` with the four stages in an inner loop.
-
-    XLA's CPU compiler turns a small loop into one function instead of 75 separately launched kernels (measured: 2.6
-    times faster for one CoaX; no gain for batches, whose rows are long).
-
-    Args:
-        rates: `f(x, w)`.
-        x: state row.
-        w: the driving row at a fraction 0 to 1 of the step.
-        dt: step length [s].
-    """
-
-    def stage(i: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-        k, total = carry
-        inner = (i == 1) | (i == 2)
-        fraction = jnp.where(inner, 0.5, jnp.where(i == 0, 0.0, 1.0)).astype(x.dtype)
-        k = rates(x + fraction * dt * k, w(fraction))
-        return k, total + jnp.where(inner, 1.0 / 3.0, 1.0 / 6.0).astype(x.dtype) * k
-
-    _, total = jax.lax.fori_loop(0, 4, stage, (jnp.zeros_like(x), jnp.zeros_like(x)))
-    return x + dt * total

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import (
@@ -21,17 +21,14 @@ from swashplate.simulation.dynamics import (
     enable_double_precision,
     equations_of,
     parameter_row,
-    rk4_step_looped,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence, simulated_flight
+from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.trim import Trim, start_row
-from swashplate.vehicles.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from swashplate.simulation.sensors import Sensors
-
-Array = NDArray[np.float64]
 
 
 def simulate(
@@ -111,13 +108,10 @@ def trajectory(equations: Equations, x0: Any, rows: Any, p: Any, dt: Any, *, sub
     def sample(x: Any, ends: tuple[Any, Any]) -> tuple[Any, Any]:
         w0, w1 = ends
 
-        def substep(x: Any, i: Any) -> Any:
-            def drive(fraction: Any) -> Any:
-                return w0 if held else w0 + ((i + fraction) / substeps) * (w1 - w0)
+        def drive(i: Any, fraction: Any) -> Any:
+            return w0 if held else w0 + ((i + fraction) / substeps) * (w1 - w0)
 
-            return rk4_step_looped(lambda x, w: rates(x, w, p), x, drive, h)
-
-        after = substep(x, 0.0) if substeps == 1 else jax.lax.fori_loop(0, substeps, lambda i, x: substep(x, i), x)
+        after = rk4_steps(lambda x, w: rates(x, w, p), x, drive, h, substeps)
         return after, after
 
     ends = (rows[:-1], rows[:-1] if held else rows[1:])

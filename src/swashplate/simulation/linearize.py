@@ -8,8 +8,9 @@ from typing import Any
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -21,10 +22,6 @@ from swashplate.simulation.dynamics import (
 )
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
-
 
 _ORIGIN = 1e-6
 """1/s; chains of integrators leave eigenvalues of rounding's root about the origin, which are no modes."""

@@ -21,10 +21,13 @@ from typing import Any, Literal
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
@@ -37,11 +40,10 @@ from swashplate.simulation.dynamics import (
 )
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Scheme = Literal["as-printed", "trim-term", "stitched"]
 
 _U, _W, _Q, _THETA, _V, _P, _PHI, _R = range(8)
@@ -215,11 +217,7 @@ def _scheduled(tables: Any, x0: Any, u: Any, dt: Any, g: Any, *, stitched: bool)
         return aerodynamic + _kinematics(x, g) - _kinematics(xt, g)
 
     def step(x: Any, command: Any) -> tuple[Any, Any]:
-        k1 = rates(x, command)
-        k2 = rates(x + 0.5 * dt * k1, command)
-        k3 = rates(x + 0.5 * dt * k2, command)
-        k4 = rates(x + dt * k3, command)
-        return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), x
+        return rk4_step(rates, x, lambda _: command, dt, looped=False), x
 
     _, states = jax.lax.scan(step, jnp.asarray(x0), jnp.asarray(u))
     return states

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import TrimError
+from swashplate.models.catalogue import from_card
+from swashplate.models.conventional.buildup import build_up
+from swashplate.models.conventional.derivative_table import DerivativeTable, split_name
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.derivatives import options_of
 from swashplate.simulation.trim import Trim, trim
-from swashplate.vehicles.buildup import build_up
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.derivatives import DerivativeTable, split_name
-from swashplate.vehicles.vehicle import Vehicle
 
 _SMALL = 0.02
 """Share of the largest of its kind below which a published derivative's relative difference says nothing."""
@@ -51,7 +50,7 @@ class Assumption:
 
 
 @dataclass(frozen=True)
-class Step:
+class ComparisonStep:
     """An assumption taken on, after those before it, and the table that it gives."""
 
     words: str
@@ -61,7 +60,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PublishedComparison:
     """Published derivatives against a card's.
 
     Attributes:
@@ -72,7 +71,7 @@ class Comparison:
 
     published: Mapping[str, float]
     scale: Mapping[str, float]
-    steps: tuple[Step, ...]
+    steps: tuple[ComparisonStep, ...]
 
     def differences(self, table: DerivativeTable) -> dict[str, float]:
         """By name; 0.1 is 10 % too much, -2 the same size with the wrong sign."""
@@ -82,7 +81,9 @@ class Comparison:
         }
 
 
-def hold_against(vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, primed: bool = False) -> Comparison:
+def hold_against(
+    vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, primed: bool = False
+) -> PublishedComparison:
     """A card's table by build-up against published derivatives, and which assumptions bring it nearer, best first.
 
     An assumption is taken on while it lowers the mean difference (each at most 100 %) by 0.3 points. It explains a
@@ -98,15 +99,15 @@ def hold_against(vehicle: Vehicle, at: Trim, published: Mapping[str, float], *, 
         SwashError: for a vehicle without a build-up.
     """
     scale = _scale(published)
-    comparison = Comparison(published, scale, ())
+    comparison = PublishedComparison(published, scale, ())
 
-    def step(words: str, flown: Vehicle, where: Trim, mixed: bool) -> Step:
+    def step(words: str, flown: Vehicle, where: Trim, mixed: bool) -> ComparisonStep:
         table = build_up(flown, where.state, where.inputs, where.environment)
         if mixed:
             card = flown.card.values()
             table = table.primed(**{name: card[name] for name in ("inertia_xx", "inertia_zz", "inertia_xz")})
         off = np.abs(list(comparison.differences(table).values()))
-        return Step(words, table, float(np.mean(np.minimum(off, 1.0))), int(np.sum(off <= 0.1)))
+        return ComparisonStep(words, table, float(np.mean(np.minimum(off, 1.0))), int(np.sum(off <= 0.1)))
 
     here = (vehicle, at, primed)
     steps, left = [step("", *here)], list(_assumptions(vehicle, primed))
@@ -141,7 +142,7 @@ def _scale(published: Mapping[str, float]) -> dict[str, float]:
 
 
 def _assumptions(vehicle: Vehicle, primed: bool) -> Iterable[Assumption]:
-    options, card = options_of(vehicle), vehicle.card.values()
+    options, card = vehicle.options, vehicle.card.values()
     if card.get("inertia_xz"):
         yield Assumption("without --primed" if primed else "--primed", mixes=True)
     for name, values, new_trim in _SWITCHES:

@@ -7,15 +7,14 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
-from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
 from swashplate.flights.schema import CHANNELS
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import SURROUNDINGS
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _ABSURD = {"m": 1e6, "m/s": 1e4, "rad": 1e4, "rad/s": 1e5}
 """Beyond these no small helicopter flies: a simulation that gets there has diverged, finite or not."""

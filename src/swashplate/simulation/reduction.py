@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
+from swashplate.models.conventional.derivative_table import ROWS
 from swashplate.simulation.linearize import LinearModel
-from swashplate.vehicles.derivatives import ROWS
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 PAPER_STATES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 PAPER_INPUTS = ("theta0", "B1", "A1", "theta0T")

@@ -9,12 +9,13 @@ from typing import Any
 import jax
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.schema import POSITION, QUATERNION, RATES
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -23,9 +24,6 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_force,
 )
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 
 from swashplate.errors import TrimError
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim, trim
-from swashplate.vehicles.vehicle import Vehicle
 
 
 def trims_over_speed(

@@ -1,8 +1,8 @@
 """A vehicle that can stand on level ground with its rotors at rest, spool up, lift off and land.
 
-Conventional helicopters have skids and an engine among their options. Any other rigid body gets four skid ends added
-around its own equations: forces add, so its rates only gain what the ground's push gives a body at rest. Without states
-for them, these do not stick: what the wind pushes creeps.
+Some have skids and an engine among their options (`Traits.standing`). Any other rigid body gets four skid ends added
+around its own equations: forces add, so its rates only gain what the ground's push gives a body at rest. Either kind's
+ends stick to the ground with eight states more (`ground_contact.Grip`): what is parked stays where it is.
 """
 
 from __future__ import annotations
@@ -10,20 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
+from swashplate.models.catalogue import from_card
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
-from swashplate.physics.ground_contact import Skids, skid_loads
+from swashplate.physics.ground_contact import Grip, Skids, skid_loads
 from swashplate.physics.rigid_body import Inertia, RigidBody, rigid_body_rates
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.linear import NAME as LINEAR
-from swashplate.vehicles.vehicle import Vehicle
 
 _SINK = 0.002
 """m: how far skids that are not on a card sink under the weight."""
@@ -32,29 +31,37 @@ _DAMPING = 0.4
 _FRICTION = 0.5
 
 
+class Standing(NamedTuple):
+    """A body on skids that were added: the rigid body, the vehicle's own state with None for it, and the grip."""
+
+    body: RigidBody
+    rest: Any
+    grip: Grip
+
+
 def standing(vehicle: Vehicle) -> Vehicle:
     """The vehicle with ground under it at z = 0, and an engine that can be shut off where it has one.
 
     Args:
-        vehicle: of any equations with a rigid body; a conventional helicopter keeps its card's other options.
+        vehicle: of any equations with a rigid body; its card's other options stay.
 
     Raises:
-        SwashError: where its states hold no rigid body, or it is a linear model.
+        SwashError: where its states hold no rigid body, or its equations can have no ground.
     """
-    if vehicle.name == "conventional":
-        options = {**vehicle.card.options, "ground": True, "grip": True, "rotor_speed": "throttle"}
-        return from_card(replace(vehicle.card, options=options))
-    if vehicle.name == LINEAR:
+    if vehicle.traits.standing:
+        return from_card(replace(vehicle.card, options={**vehicle.card.options, **vehicle.traits.standing}))
+    if not vehicle.traits.ground:
         raise no_ground(vehicle.card.where)
     if vehicle.state_names[: len(RigidBody._fields)] != RigidBody._fields:
         raise SwashError("has no position and attitude to stand with.", where=vehicle.name)
-    whole: Any = vehicle.derivatives
-    felt: Any = vehicle.specific_force
     skids = skids_of(vehicle)
     return replace(
         vehicle,
-        derivatives=partial(_derivatives, whole.func, skids, **whole.keywords),
-        specific_force=partial(_specific_force, felt.func, skids, **felt.keywords),
+        state=Standing(vehicle.state.body, vehicle.state._replace(body=None), Grip(*(0.0,) * len(Grip._fields))),
+        state_names=(*vehicle.state_names, *Grip._fields),
+        state_units=(*vehicle.state_units, *("m",) * len(Grip._fields)),
+        derivatives=partial(_derivatives, vehicle.derivatives, skids),
+        specific_force=partial(_specific_force, vehicle.specific_force, skids),
     )
 
 
@@ -91,20 +98,25 @@ def at_rest(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:
 
 
 def _derivatives(
-    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, **how: Any
+    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend
 ) -> Any:
-    force, moment, _ = skid_loads(state.body, skids, xp)
+    force, moment, bending = skid_loads(state.body, skids, xp, state.grip)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None))
     still = state.body._replace(u=0.0, v=0.0, w=0.0, p=0.0, q=0.0, r=0.0)
     pushed = rigid_body_rates(still, force, moment, inertia, xp)
-    rates = free(state, inputs, par, env, xp, **how)
+    rates = free(_own(state), inputs, par, env, xp)
     body = RigidBody(*(own + gained for own, gained in zip(rates.body, pushed, strict=True)))
-    return rates._replace(body=body)
+    assert bending is not None  # a grip was given
+    return Standing(body, rates._replace(body=None), bending)
 
 
 def _specific_force(
-    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend, **how: Any
+    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend
 ) -> Vector:
-    force, _, _ = skid_loads(state.body, skids, xp)
-    felt: Vector = free(state, inputs, par, env, xp, **how)
+    force, _, _ = skid_loads(state.body, skids, xp, state.grip)
+    felt: Vector = free(_own(state), inputs, par, env, xp)
     return felt + force.scaled(1.0 / par.mass)
+
+
+def _own(state: Standing) -> Any:
+    return state.rest._replace(body=state.body)

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, body_to_local
@@ -29,13 +30,10 @@ from swashplate.simulation.dynamics import (
     enable_double_precision,
     equations_of,
     parameter_row,
-    rk4_step_looped,
     row_rates,
 )
+from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 LONGEST_STEP = 5e-4
 """s, of one Runge-Kutta step: skids on the ground are the stiffest part (friction of a light body: 1/1400 s)."""
@@ -143,7 +141,7 @@ def _advance(equations: Equations, x: Any, row: Any, p: Any) -> tuple[Any, Any]:
         return rates(*barrier((x, w, p)))
 
     def one(i: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
-        after = rk4_step_looped(held, carry[0], lambda fraction: w, h)
+        after = rk4_step(held, carry[0], lambda _: w, h, looped=True)
         return after, held(after, w)
 
     x, slope = jax.lax.fori_loop(0, steps, one, (x, jnp.zeros_like(x)))

@@ -10,9 +10,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import TrimError
+from swashplate.models.nesting import leaves
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
@@ -26,10 +28,6 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
-from swashplate.vehicles.structure import leaves
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _BODY = len(RigidBody._fields)
 _ACCELERATIONS = slice(3, 6)
@@ -85,6 +83,17 @@ class Trim:
         return "\n".join([head, *lines])
 
 
+def need_whole_body(vehicle: Vehicle) -> None:
+    """Refuse a vehicle that is not enough to fly.
+
+    Raises:
+        TrimError: saying what it lacks.
+    """
+    if vehicle.traits.no_trim:
+        hint = "It can be fitted, simulated and exported; a trim needs the motion of a whole body."
+        raise TrimError(f"{vehicle.traits.no_trim}.", where=vehicle.card.where, hint=hint)
+
+
 def trim(
     vehicle: Vehicle,
     *,
@@ -121,6 +130,7 @@ def trim(
     surroundings = environment or Environment()
     if voltage is not None:
         surroundings = surroundings._replace(voltage=voltage)
+    need_whole_body(vehicle)
     if vehicle.state_names[:_BODY] != RigidBody._fields:
         raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
     equations = equations_of(vehicle)
@@ -315,7 +325,7 @@ def _hint(*, battery: bool, too_low: bool) -> str:
 
 
 def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, environment: Environment) -> Array:
-    """The state row that a simulation starts from: a trim's, hover's, or hover's with some states replaced.
+    """The state row that a simulation starts from: a trim's, or hover (or rest) with some states replaced.
 
     Raises:
         TrimError: where a named state is not one of the vehicle's.
@@ -332,7 +342,12 @@ def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, enviro
             )
     if set(named) == set(vehicle.state_names):
         return np.array([named[name] for name in vehicle.state_names], dtype=np.float64)
-    row = np.array(trim(vehicle, environment=environment).state)
+    rest = vehicle.traits.rest
+    if rest is not None:
+        resting = rest(vehicle.card)
+        row = np.array([resting[name] for name in vehicle.state_names], dtype=np.float64)
+    else:
+        row = np.array(trim(vehicle, environment=environment).state)
     for name, value in named.items():
         row[vehicle.index(name)] = value
     return row

@@ -13,16 +13,14 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector
 from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of, quaternion_rates
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _FLOATS = FloatBackend()
 _PHI: Final = 6  # where attitude begins in a row
@@ -52,7 +50,6 @@ def tumbling(vehicle: Vehicle) -> Vehicle:
 
     Only for compiled steps: its card, inputs and parameters are the vehicle's own, its states one more.
     """
-    inner: Any = vehicle.derivatives
     still: RigidBody = vehicle.state.body
     body = TumblingBody._make((*still[:_PHI], 1.0, 0.0, 0.0, 0.0, *still[_P:]))
     count = len(RigidBody._fields)
@@ -61,24 +58,22 @@ def tumbling(vehicle: Vehicle) -> Vehicle:
         state=vehicle.state._replace(body=body),
         state_names=(*TumblingBody._fields, *vehicle.state_names[count:]),
         state_units=(*vehicle.state_units[:_PHI], *("1",) * 4, *vehicle.state_units[_P:]),
-        derivatives=partial(_derivatives, inner.func, inner.args, **inner.keywords),
+        derivatives=partial(_derivatives, vehicle.derivatives),
     )
 
 
 def _derivatives(
     free: Callable[..., Any],
-    args: tuple[Any, ...],
     state: Any,
     inputs: Any,
     par: Any,
     env: Environment,
     xp: Backend,
-    **how: Any,
 ) -> Any:
     body: TumblingBody = state.body
     rotation = Quaternion(body.q0, body.q1, body.q2, body.q3)
     seen = RigidBody(*body[:_PHI], *euler_of(rotation, xp), body.p, body.q, body.r)
-    rates = free(*args, state._replace(body=seen), inputs, par, env, xp, **how)
+    rates = free(state._replace(body=seen), inputs, par, env, xp)
     turned = quaternion_rates(rotation, Vector(body.p, body.q, body.r))
     return rates._replace(body=TumblingBody._make((*rates.body[:_PHI], *turned, *rates.body[_P:])))
 

@@ -9,19 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError, TrimError
+from swashplate.models.catalogue import from_card
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim, trim
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Spread:
+class CardSpread:
     """Bounds on derivatives and eigenvalues of one trim.
 
     Attributes:
@@ -37,10 +36,26 @@ class Spread:
     draws: int
     refused: int
 
+    def modes(self) -> list[dict[str, dict[str, float]]]:
+        """Every mode of the card with the 5 % and 95 % quantiles of the samples' [1/s], fastest first."""
+        found = []
+        for i in np.argsort(-np.abs(self.eigenvalues), kind="stable"):
+            value, drawn = self.eigenvalues[i], self.samples[:, i]
+            if value.imag < 0.0 or abs(value) < 1e-6:
+                continue
+            real, imag = np.quantile(drawn.real, [0.05, 0.95]), np.quantile(np.abs(drawn.imag), [0.05, 0.95])
+            found.append(
+                {
+                    "real": {"value": value.real, "5 %": real[0], "95 %": real[1]},
+                    "imag": {"value": value.imag, "5 %": imag[0], "95 %": imag[1]},
+                }
+            )
+        return found
+
 
 def spread(
     vehicle: Vehicle, at: Trim, *, draws: int = 200, seed: int = 0, environment: Environment | None = None
-) -> Spread:
+) -> CardSpread:
     """Samples of the card (independent, normal, within its bounds), each trimmed again, and the quantiles.
 
     Args:
@@ -97,7 +112,7 @@ def spread(
     low, high = np.quantile(np.array(tables), [0.05, 0.95], axis=0)
     centre = derivative_table(vehicle, at).total.ravel()
     found = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}
-    return Spread(found, values, np.array(modes), len(tables), refused)
+    return CardSpread(found, values, np.array(modes), len(tables), refused)
 
 
 def _matched(

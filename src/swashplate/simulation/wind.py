@@ -7,11 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

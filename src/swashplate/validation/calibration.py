@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from swashplate.identification.parameters import Parameterization
-from swashplate.identification.prediction_error import PredictionError
-from swashplate.identification.records import Record
-from swashplate.identification.scoring import minimise
-from swashplate.identification.stochastic import Noise, Nuisance
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.records import Record
+from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.models.vehicle import Vehicle
 
 CALIBRATION = 5.0
 """Seconds at the start of a record that may be used; no prediction starts before they are over."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 from swashplate.validation.validation import InnovationCheck
 
 _LAGS = 20

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swashplate.flights.flight import Array
+from swashplate.arrays import Array
 
 
 def rms(rows: Array) -> Array:

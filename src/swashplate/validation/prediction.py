@@ -11,21 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.flights.flight import Array
-from swashplate.identification.innovations import filter_record
-from swashplate.identification.kinematics import PREDICTED
-from swashplate.identification.records import Record
-from swashplate.identification.riccati import predicted_covariance
-from swashplate.identification.start_states import mean_velocity, slopes, steady_flight
-from swashplate.identification.stochastic import (
-    FilterState,
-    Noise,
-    Nuisance,
-    StochasticModel,
-    commands,
-    stochastic_model,
-)
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, commands, stochastic_model
+from swashplate.filtering.riccati import gain_at, predicted_covariance
+from swashplate.identification.core.records import Record
+from swashplate.identification.time.innovations import filter_record
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.start_states import mean_velocity, slopes, steady_flight
+from swashplate.models.vehicle import Vehicle
 
 HORIZONS = (0.5, 1.0, 2.0, 5.0)
 """Seconds ahead at which predictions are judged."""
@@ -165,8 +159,7 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
     x, u = steady_flight(vehicle, parameters, voltage, mean_velocity(vehicle, record))
     A, C, Q, R = model.linear(x, u, parameters, voltage, noise, nuisance)
     predicted = predicted_covariance(A, C, Q, R)
-    gain = jnp.linalg.solve(C @ predicted @ C.T + R, C @ predicted).T
-    corrected = predicted - gain @ C @ predicted
+    corrected = predicted - gain_at(predicted, C, R, jnp) @ C @ predicted
     kept = jnp.array([vehicle.index(name) for name in PREDICTED])
 
     def ahead(P: Any, _: None) -> tuple[Any, Any]:

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, SwashError
-from swashplate.flights.flight import Array, Flight
-from swashplate.identification.feedback import excitation
-from swashplate.identification.fit import AxisExcitation, Fit
-from swashplate.identification.kinematics import PREDICTED, measured_states
-from swashplate.identification.records import Record, records
-from swashplate.identification.stochastic import Noise, Nuisance
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.result import Result
+from swashplate.identification.time.feedback import excitation
+from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.models.card import packaged_cards
+from swashplate.models.catalogue import from_card
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
@@ -23,9 +29,6 @@ from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import THRESHOLDS, verdict
-from swashplate.vehicles.card import packaged_cards
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.vehicle import Vehicle
 
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 _T = TypeVar("_T", Noise, Nuisance)
@@ -44,7 +47,7 @@ class _Rival:
 
 
 def validate(
-    model: Fit | Vehicle,
+    model: Result[Vehicle, Any] | Vehicle,
     flights: Flight | Iterable[Flight],
     *,
     published: Vehicle | None = None,
@@ -76,8 +79,8 @@ def validate(
     """
     enable_double_precision()
     enable_compilation_cache()
-    if isinstance(model, Fit):
-        vehicle, published = model.vehicle, published or model.published
+    if isinstance(model, Result):
+        vehicle, published = model.model, published or model.start
     else:
         vehicle, published = model, published or started_from(model)
     alone = _same_numbers(vehicle, published)
@@ -170,9 +173,8 @@ def started_from(vehicle: Vehicle) -> Vehicle:
     before = vehicle.card.started_from()
     if before is not None:
         return vehicle.with_card(before)
-    packaged = packaged_cards()
-    if vehicle.name in packaged:
-        return from_card(packaged[vehicle.name])
+    if vehicle.traits.published:
+        return from_card(packaged_cards()[vehicle.traits.published])
     if any(entry.status == "identified" for entry in vehicle.card.parameters.values()):
         raise CardError(
             "does not say from which card it was identified.",

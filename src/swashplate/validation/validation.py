@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from swashplate.flights.flight import Array, Flight
-from swashplate.identification.records import Record
-from swashplate.identification.stochastic import Nuisance
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.arrays import Array
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.records import Record
+from swashplate.models.vehicle import Vehicle
+from swashplate.public import resolve
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
 
@@ -140,6 +145,15 @@ class Validation:
                 for record, told in zip(self.records, self.calibrated, strict=False)
             ],
         }
+
+    def plot(self) -> Figure:
+        """Fit of every predictor on every channel, as a matplotlib figure."""
+        figure: Figure = resolve("plot_validation")(self)
+        return figure
+
+    def _repr_html_(self) -> str:
+        page: str = resolve("html_of_validation")(self)
+        return page
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from swashplate.identification.fit import AxisExcitation
+from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.validation.validation import AxisVerdict, Score
 
 THRESHOLDS = {"good": 50.0, "usable": 20.0}

@@ -36,11 +36,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights import units
-from swashplate.flights.filters import lowpass
+from swashplate.flights.conditioning.filters import lowpass
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, delimited
 from swashplate.flights.readers.options import Options
@@ -49,8 +49,6 @@ from swashplate.flights.schema import channel, is_known
 
 NAME = "analogue recorder"
 VERSION = "1"
-
-Array = NDArray[np.float64]
 
 _TABLES = {"recorder", "filter", "channels"}
 _RECORDER = {"range", "rate", "time", "delimiter", "header"}

@@ -17,11 +17,12 @@ import numpy as np
 import xarray as xr
 
 from swashplate.errors import FlightError
-from swashplate.flights import ardupilot_chirp
-from swashplate.flights.flight import Event, Flight
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers import ardupilot_chirp
+from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked, dataflash, dataflash_text
 from swashplate.flights.readers.ardupilot_events import seconds, story
-from swashplate.flights.readers.dataflash import Messages, Table
+from swashplate.flights.readers.dataflash import Messages, MessageTable
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import is_known
@@ -162,7 +163,7 @@ def _one_run(found: Messages) -> tuple[Messages, float, str]:
     return found, float(np.quantile(inside, 0.999)) if inside.size > 2000 else float(inside.max(initial=0.0)), said
 
 
-def _chosen(table: Table, wanted: tuple[tuple[str, ...], int] | None) -> Table:
+def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> MessageTable:
     """The messages of one sensor, where the message says which."""
     if wanted is None:
         return table

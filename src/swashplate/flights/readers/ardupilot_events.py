@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swashplate.flights.ardupilot_chirp import START_DELAY, Chirp
-from swashplate.flights.flight import Event
-from swashplate.flights.readers.dataflash import Messages, Table
-
-Array = NDArray[np.float64]
+from swashplate.arrays import Array
+from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
+from swashplate.flights.provenance import Event
+from swashplate.flights.readers.dataflash import Messages, MessageTable
 
 _STATISTICS = "STAT_"  # counters that ArduPilot keeps among its parameters
 _EV_ARMED, _EV_DISARMED = (10, 15), 11
@@ -32,7 +30,7 @@ _CHIRP = {
 }  # fmt: skip
 
 
-def seconds(table: Table) -> Array:
+def seconds(table: MessageTable) -> Array:
     """Time stamps of a table since the autopilot's start [s], NaN where it has none."""
     micro = table.number("TimeUS")
     return micro / 1e6 if np.isfinite(micro).any() else table.number("TimeMS") / 1e3
@@ -143,7 +141,7 @@ def _sweeps(messages: Messages, end: float) -> tuple[list[Event], list[str]]:
     return events, damage
 
 
-def _between(data: Table | None, start: float, stop: float) -> tuple[Array, Array]:
+def _between(data: MessageTable | None, start: float, stop: float) -> tuple[Array, Array]:
     """Stamps and the mode's own time [s] of the SIDD messages of one sweep."""
     if data is None:
         return np.zeros(0), np.zeros(0)
@@ -152,7 +150,7 @@ def _between(data: Table | None, start: float, stop: float) -> tuple[Array, Arra
     return stamps[chosen], own[chosen]
 
 
-def _on_the_clock(data: Table | None, chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
+def _on_the_clock(data: MessageTable | None, chirp: Chirp, begin: float, until: float) -> tuple[float, float]:
     """Start and stop of the chirp on the log's clock: the mode's own time runs by loop counts, a little off it."""
     stamps, own = _between(data, begin, until)
     start, stop = begin + START_DELAY, begin + START_DELAY + chirp.record
@@ -163,7 +161,7 @@ def _on_the_clock(data: Table | None, chirp: Chirp, begin: float, until: float) 
     return start, stop
 
 
-def _reached(data: Table | None, begin: float, until: float) -> float | None:
+def _reached(data: MessageTable | None, begin: float, until: float) -> float | None:
     """How far the mode's own time came [s]; None where it is not logged."""
     _, own = _between(data, begin, until)
     return float(own.max()) if own.size else None

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-
-Array = NDArray[np.float64]
 
 _NORM_TOLERANCE = 0.01  # six decimals of a motion capture export lose 1e-6; anything near 1 % is no unit quaternion
 

@@ -10,11 +10,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from swashplate.arrays import Array
 from swashplate.flights import units
 from swashplate.flights.flight import stream
 from swashplate.flights.schema import channel
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _END = 1 << 62  # behind every place in a file

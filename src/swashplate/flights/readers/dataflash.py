@@ -33,7 +33,7 @@ _LETTERS: Mapping[str, tuple[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Table:
+class MessageTable:
     """All messages of one name.
 
     Attributes:
@@ -62,9 +62,9 @@ class Table:
             return [""] * len(self)
         return [v.decode("utf-8", "replace").rstrip("\0") if isinstance(v, bytes) else str(v) for v in values.tolist()]
 
-    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Table:
+    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> MessageTable:
         """The messages that are chosen, by mask or index."""
-        return Table({name: values[chosen] for name, values in self.columns.items()}, self.place[chosen])
+        return MessageTable({name: values[chosen] for name, values in self.columns.items()}, self.place[chosen])
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,11 @@ class Messages:
         damage: what is broken in the file.
     """
 
-    tables: Mapping[str, Table]
+    tables: Mapping[str, MessageTable]
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
 
-    def get(self, name: str) -> Table | None:
+    def get(self, name: str) -> MessageTable | None:
         return self.tables.get(name)
 
 
@@ -174,20 +174,20 @@ class _Scan:
             self.lost.append((start, stop))
 
 
-def _gathered(content: bytes, kind: _Kind) -> Table:
+def _gathered(content: bytes, kind: _Kind) -> MessageTable:
     size = kind.dtype.itemsize
     payload = b"".join([content[at + 3 : at + 3 + size] for at in kind.at])
     records = np.frombuffer(payload, kind.dtype) if size else np.zeros(len(kind.at), kind.dtype)
     columns = {
         name: records[name] if factor == 1.0 else records[name] * factor for name, factor in kind.factors.items()
     }
-    return Table(columns, np.asarray(kind.at, dtype=np.int64))
+    return MessageTable(columns, np.asarray(kind.at, dtype=np.int64))
 
 
 def messages(content: bytes) -> Messages:
     """Every message in the bytes that is whole, whatever stands between them."""
     scan = _Scan(content)
-    tables: dict[str, Table] = {}
+    tables: dict[str, MessageTable] = {}
     for kind in scan.kinds.values():
         if kind.at and kind.name not in tables:
             tables[kind.name] = _gathered(content, kind)

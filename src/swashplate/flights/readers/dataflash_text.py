@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate.flights.readers.dataflash import Messages, Table
+from swashplate.flights.readers.dataflash import Messages, MessageTable
 
 _TEXT_LETTERS = frozenset("nNZa")
 _FREE_TEXT = "MSG"  # its last cell may hold commas
@@ -19,7 +19,7 @@ def is_dataflash_text(text: str | None) -> bool:
     return any(line.startswith("FMT,") and line.count(",") >= 5 for line in text[:8192].split("\n", 40)[:40])
 
 
-def _table(columns: Sequence[str], letters: str, rows: list[list[str]], places: list[int]) -> tuple[Table, int]:
+def _table(columns: Sequence[str], letters: str, rows: list[list[str]], places: list[int]) -> tuple[MessageTable, int]:
     """The rows as columns, and how many rows were left out because a number does not parse."""
     kept: list[list[float | str]] = []
     where: list[int] = []
@@ -33,7 +33,7 @@ def _table(columns: Sequence[str], letters: str, rows: list[list[str]], places: 
         name: np.array([row[i] for row in kept], dtype=np.str_ if letters[i] in _TEXT_LETTERS else np.float64)
         for i, name in enumerate(columns)
     }
-    return Table(made, np.asarray(where, dtype=np.int64)), len(rows) - len(kept)
+    return MessageTable(made, np.asarray(where, dtype=np.int64)), len(rows) - len(kept)
 
 
 def messages(text: str) -> Messages:
@@ -67,7 +67,7 @@ def messages(text: str) -> Messages:
             continue
         rows.setdefault(name, []).append(values)
         places.setdefault(name, []).append(number)
-    tables: dict[str, Table] = {}
+    tables: dict[str, MessageTable] = {}
     unread = 0
     for name, found in rows.items():
         letters, columns = formats[name]

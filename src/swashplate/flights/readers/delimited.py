@@ -13,6 +13,9 @@ A mapping file is TOML; with one, only the channels it names are read:
 
 A value inside is (cell * factor + offset), then converted from `unit`. Axes are not turned: a CSV log is expected in
 the schema's own axes (NED, FRD), or brought there with factors of -1.
+
+Time is read digit by digit, so that Unix time in seconds, milliseconds or nanoseconds loses nothing, or as ISO 8601
+(2026-03-05T14:20:01.25Z). `time [s since 2026-03-05T14:20:00Z]` says where zero lies.
 """
 
 from __future__ import annotations
@@ -20,13 +23,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
-from swashplate.flights import units
+from swashplate.flights import epoch, units
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, tables
 from swashplate.flights.readers.options import Options
@@ -35,8 +39,6 @@ from swashplate.flights.schema import channel, is_known
 
 NAME = "csv"
 VERSION = "1"
-
-Array = NDArray[np.float64]
 
 _HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?$", re.DOTALL)
 _COLUMN_KEYS = {"column", "unit", "factor", "offset"}
@@ -233,7 +235,8 @@ def read(source: Source, options: Options) -> Flight:
             channel=", ".join(sorted(unknown)),
             hint="Correct the name that the unit is given for.",
         )
-    _check_units(columns, options, source)
+    iso = "time" in columns and bool(rows) and _is_date(rows[0], columns["time"].index)
+    _check_units({name: c for name, c in columns.items() if not (iso and name == "time")}, options, source)
     width = max(column.index for column in columns.values()) + 1
     for i, row in enumerate(rows):
         if len(row) < width:
@@ -244,14 +247,18 @@ def read(source: Source, options: Options) -> Flight:
             )
     channels: dict[str, Array] = {}
     labels: dict[str, str] = {}
+    time, zero = np.arange(len(rows)) / float(rate or 1.0), 0.0
     for name, place in columns.items():
+        if name == "time":
+            unit = options.units.get(name, place.unit)
+            time, zero = _time(rows, place, unit=unit, source=source, first_line=first_line)
+            continue
         raw = tables.column(rows, place.index, name=name, where=source.name, first_line=first_line)
         checks.finite(raw, channel=name, where=source.name)
         with np.errstate(over="ignore"):  # what overflows is refused below, by name
             scaled = raw if (place.factor, place.offset) == (1.0, 0.0) else raw * place.factor + place.offset
         channels[name], labels[name] = _inside(scaled, name, options.units.get(name, place.unit), source)
         checks.finite(channels[name], channel=name, where=source.name)  # a factor can overflow
-    time = channels.pop("time") if "time" in channels else np.arange(len(rows)) / float(rate or 1.0)
     if not channels:
         raise FlightError("there is no channel beside time.", where=source.name, hint="Export the channels too.")
     keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
@@ -260,8 +267,53 @@ def read(source: Source, options: Options) -> Flight:
     notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
     return Flight(
         streams={"log": stream(time[keep], channels, foreign)},
-        provenance=source.provenance(NAME, VERSION, notes=notes),
+        provenance=source.provenance(NAME, VERSION, notes=notes, epoch=zero),
     )
+
+
+_SINCE = re.compile(r"(?P<unit>\S+)\s+since\s+(?P<zero>.+)")
+
+
+def _is_date(row: Sequence[str], index: int) -> bool:
+    return index < len(row) and epoch.from_iso(row[index]) is not None
+
+
+def _time(
+    rows: Sequence[Sequence[str]], place: _Column, *, unit: str | None, source: Source, first_line: int
+) -> tuple[Array, float]:
+    """Stamps [s] without a lost digit, shape (n,), and time zero on the file's clock [s]."""
+    if rows and _is_date(rows[0], place.index):
+        dates = [epoch.from_iso(row[place.index]) for row in rows]
+        if None in dates:
+            bad = dates.index(None)
+            raise FlightError(
+                f"'{rows[bad][place.index][:40]}' in line {first_line + bad} is no date and time in ISO 8601, as the "
+                "first stamp is.",
+                where=source.name,
+                channel="time",
+                hint="Write all stamps in one way, as 2026-03-05T14:20:01.25Z.",
+            )
+        return epoch.small([date for date in dates if date is not None])
+    raw = tables.column(rows, place.index, name="time", where=source.name, first_line=first_line)
+    checks.finite(raw, channel="time", where=source.name)
+    since = _SINCE.fullmatch(unit or "")
+    zero = epoch.from_iso(since["zero"]) if since else Decimal(0)
+    if zero is None:
+        raise UnitError(
+            f"unit is '{unit}', expected 'UNIT since' and a date and time in ISO 8601.",
+            where=source.name,
+            channel="time",
+            hint="For example: time [s since 2026-03-05T14:20:00Z].",
+        )
+    with np.errstate(over="ignore"):  # what overflows is refused below, by name
+        rough, _ = _inside(raw * place.factor + place.offset, "time", since["unit"] if since else unit, source)
+    checks.finite(rough, channel="time", where=source.name)
+    if not rows or not epoch.zero_of(float(rough[0])):
+        return rough, float(zero)
+    scale = Decimal(repr(float(units.to_inside(1.0, (since["unit"] if since else unit) or "s"))))
+    factor, offset = Decimal(repr(place.factor)), Decimal(repr(place.offset))
+    times, first = epoch.small([(Decimal(row[place.index]) * factor + offset) * scale for row in rows])
+    return times, float(first + zero)
 
 
 def _is_number(cell: str) -> bool:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-
-Array = NDArray[np.float64]
 
 _DIRECTIONS = {
     "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0),

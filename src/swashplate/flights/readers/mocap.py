@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight, stream
@@ -14,8 +14,6 @@ from swashplate.flights.readers import checks, frames
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import POSITION, QUATERNION
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from swashplate.errors import FlightError
-from swashplate.flights import storage
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
@@ -36,4 +35,4 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Leave them out.",
         )
-    return storage.load(source.path)
+    return Flight.load(source.path)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from swashplate import documents
 from swashplate.errors import FlightError
 
 _MOCAP_KEYS = ("body", "rotation", "body_axes", "world_axes")
@@ -26,6 +27,7 @@ class Options:
         body_axes: where the logged body axes x, y, z point, for example "forward-left-up".
         world_axes: where the logged world axes x, y, z point, for example "north-west-up".
         bad_stamps: "error", or "drop" to leave out samples whose time does not increase.
+        log: which of a file's logs is read, from 1; None for the longest.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -36,24 +38,21 @@ class Options:
     body_axes: str | None = None
     world_axes: str | None = None
     bad_stamps: str = "error"
+    log: int | None = None
 
 
-def load_mapping(mapping: str | Path | Mapping[str, Any] | None) -> Mapping[str, Any]:
+def load_mapping(mapping: str | os.PathLike[str] | Mapping[str, Any] | None) -> Mapping[str, Any]:
     """The mapping as a dictionary, read from a TOML file where a path is given."""
     if mapping is None:
         return {}
     if isinstance(mapping, Mapping):
         return mapping
-    try:
-        return tomllib.loads(Path(mapping).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise FlightError("there is no such mapping file.", where=mapping, hint="Check the path.") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FlightError(
-            f"the mapping file does not read as TOML: {error}.",
-            where=mapping,
-            hint="Correct it there; `docs/howto/your-own-csv.md` has one to copy.",
-        ) from None
+    return documents.read_document(
+        Path(mapping),
+        form="toml",
+        error=FlightError,
+        hint="Correct the mapping file; `docs/howto/your-own-csv.md` has one to copy.",
+    )
 
 
 def with_mocap_table(options: Options) -> Options:

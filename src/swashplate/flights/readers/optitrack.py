@@ -16,8 +16,8 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import frames, mocap, tables
@@ -28,8 +28,6 @@ NAME = "optitrack"
 VERSION = "1"
 WORLD_AXES = "north-up-east"
 BODY_AXES = "forward-up-right"
-
-Array = NDArray[np.float64]
 
 _LENGTH_UNITS = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
 _HEADER_ROWS = 16

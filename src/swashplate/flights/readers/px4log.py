@@ -11,19 +11,18 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Event, Flight
+from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import Event
 from swashplate.flights.readers import ardupilot, checks, clocked, dataflash
-from swashplate.flights.readers.dataflash import Messages, Table
+from swashplate.flights.readers.dataflash import Messages, MessageTable
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 
 NAME = "px4log"
 VERSION = "1"
-
-Array = NDArray[np.float64]
 
 # message -> (stream, field -> (channel, unit)); a quantity that an earlier message gave is left out.
 _MESSAGES: Mapping[str, tuple[str, Mapping[str, tuple[str, str]]]] = {
@@ -77,7 +76,7 @@ def read(source: Source, options: Options) -> Flight:
         )
     found = dataflash.messages(source.content)
     notes: list[str] = list(found.notes)
-    clock = found.get("TIME") or Table({}, np.zeros(0, np.int64))
+    clock = found.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
     (first, last), said = clocked.longest_run(clock.place, clock.number("StartTime") / 1e6)
     clock = clock.rows((clock.place >= first) & (clock.place < last))
     streams: dict[str, xr.Dataset] = {}
@@ -110,7 +109,7 @@ def read(source: Source, options: Options) -> Flight:
     return Flight(streams, provenance)
 
 
-def _stamps(table: Table, clock: Table) -> Array:
+def _stamps(table: MessageTable, clock: MessageTable) -> Array:
     """The time [s] of each message: that of the last TIME message before it."""
     group = np.searchsorted(clock.place, table.place) - 1
     return np.asarray(clock.number("StartTime")[np.maximum(group, 0)] / 1e6)
@@ -124,7 +123,7 @@ def _parameters(found: Messages) -> dict[str, float]:
     return {name: value for name, value in rows if re.fullmatch(r"\w+", name) and np.isfinite(value)}
 
 
-def _states(found: Messages, clock: Table) -> tuple[Event, ...]:
+def _states(found: Messages, clock: MessageTable) -> tuple[Event, ...]:
     table = found.get("STAT")
     if table is None or not len(clock):
         return ()

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import clocked, frames
@@ -27,7 +26,6 @@ from swashplate.flights.schema import QUATERNION
 NAME = "rosbag"
 VERSION = "1"
 
-Array = NDArray[np.float64]
 Row = dict[str, float]
 
 _BODY, _WORLD = "forward-left-up", "east-north-up"
@@ -112,7 +110,7 @@ def read(source: Source, options: Options) -> Flight:
     body = frames.axes(options.body_axes or _BODY, where=source.name)
     world = frames.axes(options.world_axes or _WORLD, where=source.name)
     stamps, rows, counts, begin, damage = _collected(source)
-    notes = [f"time zero is {datetime.fromtimestamp(begin * 1e-9, UTC):%Y-%m-%d %H:%M:%S.%f} UTC"]
+    notes: list[str] = []
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     for topic, found in rows.items():
@@ -132,7 +130,8 @@ def read(source: Source, options: Options) -> Flight:
         )
     by_topic = {f"{topic} [{kind}]": n for (topic, kind), n in counts.items()}
     notes += clocked.unread(by_topic, [f"{topic} [{kind}]" for topic, kind in counts if kind in _TYPES])
-    return Flight(streams, source.provenance(NAME, VERSION, notes=tuple(notes), damage=tuple(damage)))
+    said = source.provenance(NAME, VERSION, notes=tuple(notes), damage=tuple(damage), epoch=begin * 1e-9)
+    return Flight(streams, said)
 
 
 Collected = tuple[dict[str, list[float]], dict[str, list[Row]], dict[tuple[str, str], int], int, list[str]]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Provenance
+from swashplate.flights.provenance import Provenance
 
 # The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
 LARGEST_FILE = 1 << 30
@@ -101,7 +102,7 @@ def _files(place: Path) -> list[Path]:
     return [metadata, *sorted(file for file in place.iterdir() if file.is_file() and file != metadata)]
 
 
-def open_source(path: str | Path) -> Source:
+def open_source(path: str | os.PathLike[str]) -> Source:
     """Reads a log's bytes: those of a file, or of all files of a rosbag2 folder.
 
     Raises:

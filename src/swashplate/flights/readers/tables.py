@@ -7,11 +7,9 @@ import io
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-
-Array = NDArray[np.float64]
 
 
 def separator(text: str) -> str:

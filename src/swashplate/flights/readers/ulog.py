@@ -17,8 +17,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Event, Flight
+from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked
 from swashplate.flights.readers.extras import needed
 from swashplate.flights.readers.options import Options
@@ -28,8 +30,6 @@ from swashplate.flights.schema import QUATERNION
 
 NAME = "ulog"
 VERSION = "1"
-
-Array = NDArray[np.float64]
 
 _LARGEST = 65535  # bytes of a message: its size is two bytes
 _ARMED = 2

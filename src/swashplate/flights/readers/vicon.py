@@ -16,8 +16,8 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight
@@ -29,8 +29,6 @@ NAME = "vicon"
 VERSION = "1"
 WORLD_AXES = "north-west-up"
 BODY_AXES = "forward-left-up"
-
-Array = NDArray[np.float64]
 
 _POSES = ("Objects", "Segments")
 _BLOCKS = (*_POSES, "Trajectories", "Devices", "Joints", "Model Outputs")

@@ -3,6 +3,9 @@
 ArduPilot counts frames from zero when it starts, sends the next one only after an answer, and repeats the last one
 every second while it gets none. A packet that would throw a flight away (its count fell back) is believed at once only
 where a restart looks like that; anything else has to be said twice, as an autopilot that waits for us will.
+
+A link belongs to its sender. Another one gets it only when the owner has been silent for `SILENT`, or when it has asked
+for it `ASKED` times while the owner was silent for `QUIET`, as an autopilot does that was restarted with another port.
 """
 
 from __future__ import annotations
@@ -23,10 +26,15 @@ AHEAD = 10_000
 AGAIN = 0.5
 """s between two equal packets that make a restart believed; ArduPilot repeats itself every second."""
 SILENT = 3.0
-"""s after which another sender may take the link over."""
+"""s of silence after which another sender's first packet takes the link over."""
+QUIET = 1.5
+"""s of silence after which a sender that keeps asking takes it over: an owner that lost an answer repeats itself after
+1 s, so it is not silent for so long."""
+ASKED = 3
+"""Packets of one other sender, all of them since the owner was last heard, that make it one that keeps asking."""
 
 
-class Step(Enum):
+class PacketAction(Enum):
     """What to do with a packet."""
 
     START = "start"
@@ -46,15 +54,17 @@ class Frames(NamedTuple):
         last: count of the last frame that was answered.
         heard: when that was [s].
         doubt: sender, count and time of a packet that fell back and was not believed.
+        claim: another sender, how often it has asked for the link since the owner was last heard, and since when.
     """
 
     sender: Address | None = None
     last: int = 0
     heard: float = 0.0
     doubt: tuple[Address, int, float] | None = None
+    claim: tuple[Address, int, float] | None = None
 
 
-def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Frames, Step]:
+def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Frames, PacketAction]:
     """What a packet means after what came before it.
 
     Args:
@@ -68,26 +78,36 @@ def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Fram
     """
     here = Frames(sender, count, now)
     if frames.sender is None:
-        return here, Step.START
+        return here, PacketAction.START
     if sender != frames.sender:
-        restarted = count <= FRESH and count < frames.last
-        if restarted or now - frames.heard >= SILENT:
-            return here, Step.START
-        return frames, Step.STRANGER
+        return _claimed(frames, here)
+    frames = frames._replace(heard=now, claim=None)  # whatever it says, the owner is there
     if count == frames.last:
-        return here, Step.RESEND
+        return here, PacketAction.RESEND
     if count == frames.last + 1:
-        return here, Step.NEXT
+        return here, PacketAction.NEXT
     if frames.last < count <= frames.last + AHEAD:
-        return here, Step.SKIP
+        return here, PacketAction.SKIP
     fallen = frames.last - count
     if fallen > 0 and (count <= FIRST or (fallen > LATE and count <= FRESH)):
-        return here, Step.START
+        return here, PacketAction.START
     if frames.doubt is not None:
         who, which, when = frames.doubt
         if (who, which) == (sender, count) and now - when >= AGAIN:
-            return here, Step.START if fallen > 0 else Step.SKIP
+            return here, PacketAction.START if fallen > 0 else PacketAction.SKIP
         if (who, which) == (sender, count):
-            return frames, Step.DOUBTFUL
+            return frames, PacketAction.DOUBTFUL
     late = 0 < fallen <= LATE
-    return frames._replace(doubt=(sender, count, now)), Step.LATE if late else Step.DOUBTFUL
+    return frames._replace(doubt=(sender, count, now)), PacketAction.LATE if late else PacketAction.DOUBTFUL
+
+
+def _claimed(frames: Frames, here: Frames) -> tuple[Frames, PacketAction]:
+    """A packet of somebody else than the owner: what is known of the two now, and who has the link."""
+    assert here.sender is not None
+    who, times, since = frames.claim or (here.sender, 0, here.heard)
+    if who != here.sender:
+        times, since = 0, here.heard
+    silent, times = here.heard - frames.heard, times + 1
+    if silent >= SILENT or (silent >= QUIET and times >= ASKED and here.heard - since >= AGAIN):
+        return here, PacketAction.START
+    return frames._replace(claim=(here.sender, times, since)), PacketAction.STRANGER

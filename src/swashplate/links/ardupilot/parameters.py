@@ -14,9 +14,9 @@ import numpy as np
 from swashplate.errors import LinkError
 from swashplate.links.servo import Servo
 from swashplate.links.servos import CoaxialMapping, HelicopterMapping, ServoMapping
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.vehicle import Vehicle
 
 Parameters = dict[str, float]
 
@@ -26,6 +26,10 @@ CYCLIC = 0.9
 """Share of the servos' travel that a full roll or pitch command takes (twice the 0.45 of AP_MotorsHeli_Swash)."""
 SPARE = 16.0
 """% that the throttle's set point lies above where the governor has the whole engine."""
+SINGLE_ROTOR, COAXIAL = 6, 9
+"""FRAME_CLASS: Heli and CoaxCopter. 8 is SingleCopter, a ducted fan on which these outputs mean something else."""
+BASES = {SINGLE_ROTOR: ("copter-heli.parm",), COAXIAL: ("copter-single.parm", "copter-coax.parm")}
+"""ArduPilot's own files of defaults that come before ours, in the order in which they are read, by FRAME_CLASS."""
 RUN_UP = 7.0
 """s that a rotor needs beyond its engine's ramp."""
 _HELI_SERVOS, _FIFTH, _TAIL, _THROTTLE = (33, 34, 35), 37, 36, 31
@@ -53,7 +57,7 @@ def parameters(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Paramete
         LinkError: for a swashplate that has no number in ArduPilot.
     """
     if isinstance(mapping, CoaxialMapping):
-        found: Parameters = {"FRAME_CLASS": 8}
+        found: Parameters = {"FRAME_CLASS": COAXIAL}
         for servo in (*mapping.servos, *mapping.motors):
             if servo.channel not in _MOTORS:
                 raise LinkError(f"output {servo.channel} is none of ArduPilot's coaxial frame.", channel="--servos")
@@ -65,7 +69,7 @@ def parameters(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Paramete
 
 def parameter_file(found: Parameters, *, title: str) -> str:
     """The text of a file that SITL (`--defaults`, `--add-param-file`) and ground stations load."""
-    base = "copter-heli.parm" if found["FRAME_CLASS"] == 6 else "copter-coax.parm"
+    base = " and ".join(BASES[int(found["FRAME_CLASS"])])
     head = f"# {' '.join(title.split())}: on top of ArduPilot's {base}, written by swash link ardupilot\n"
     return head + "".join(f"{name},{round(value, 4):g}\n" for name, value in found.items())
 
@@ -90,7 +94,7 @@ def _helicopter(mapping: HelicopterMapping, vehicle: Vehicle, hover: Trim) -> Pa
         name = f"SERVO{mapping.tail.channel}_REVERSED"
         tail[name] = 1.0 - tail[name]
     return {
-        "FRAME_CLASS": 6,
+        "FRAME_CLASS": SINGLE_ROTOR,
         "H_SW_TYPE": TYPES[mapping.type],
         "H_SW_COL_DIR": 0,
         "H_COL_MIN": low,

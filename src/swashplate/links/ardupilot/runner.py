@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from swashplate.links.ardupilot.packets import LONGEST
-from swashplate.links.ardupilot.session import Session
+from swashplate.links.ardupilot.session import ArduPilotSession
 
 PORT = 9002
 _LOOK_UP = 0.2
@@ -16,7 +16,7 @@ _LOOK_UP = 0.2
 
 def serve(
     bound: socket.socket,
-    session: Session,
+    session: ArduPilotSession,
     *,
     idle_exit: float | None = None,
     go_on: Callable[[], bool] = lambda: True,

@@ -5,22 +5,25 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from swashplate.links.ardupilot.answer import line
-from swashplate.links.ardupilot.frames import Address, Frames, Step, place
+from swashplate.links.ardupilot.frames import SILENT, Address, Frames, PacketAction, place
 from swashplate.links.ardupilot.packets import Refusal, ServoPacket, parse
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant
 from swashplate.links.sensing import Sensing
 
 
-class Progress(NamedTuple):
-    """How a link is doing: exchanges since it was opened, restarts, and the physics' time [s]."""
+class LinkProgress(NamedTuple):
+    """How a link is doing: exchanges since it was opened, restarts, how many of these were another sender's that took
+    the link over, packets of other senders that were ignored, and the physics' time [s]."""
 
     exchanges: int
     restarts: int
+    takeovers: int
+    strays: int
     time: float
 
 
-class Session:
+class ArduPilotSession:
     """A plant under an autopilot.
 
     Args:
@@ -35,12 +38,14 @@ class Session:
         self._frames = Frames()
         self._rate = 0
         self._answer = b""
-        self._exchanges = self._restarts = 0
+        self._exchanges = self._restarts = self._takeovers = 0
         self._said_broken = False
 
     @property
-    def progress(self) -> Progress:
-        return Progress(self._exchanges, self._restarts, self.plant.time)
+    def progress(self) -> LinkProgress:
+        return LinkProgress(
+            self._exchanges, self._restarts, self._takeovers, self._notices.counts["stray"], self.plant.time
+        )
 
     def handle(self, data: bytes, sender: Address, now: float) -> bytes | None:
         """The answer to a datagram, or None where it deserves none.
@@ -56,38 +61,48 @@ class Session:
             return None
         before = self._frames
         self._frames, step = place(before, sender, packet.frame_count, now)
-        if step is Step.RESEND:
+        if step is PacketAction.RESEND:
             self._notices.tell("resend", "the autopilot repeats a frame: it is answered again, and nothing moves.")
             return self._answer
-        if step is Step.LATE:
+        if step is PacketAction.LATE:
             self._notices.tell("late", f"frame {packet.frame_count} came late and is ignored.")
             return None
-        if step is Step.DOUBTFUL:
+        if step is PacketAction.DOUBTFUL:
             self._notices.tell(
                 "count",
                 f"frame {packet.frame_count} after {before.last} is neither the next one nor a restart's; it is "
                 "ignored until it is repeated.",
             )
             return None
-        if step is Step.STRANGER:
+        if step is PacketAction.STRANGER:
+            assert before.sender is not None
             self._notices.tell(
-                "sender", f"another autopilot at {sender[0]}:{sender[1]} is ignored while the first one speaks."
+                "stray",
+                f"packets of another sender, {_at(sender)}, are ignored and counted: the link belongs to "
+                f"{_at(before.sender)} until that one has been silent for {SILENT:g} s.",
             )
             return None
-        if step is Step.START:
-            self._start(packet, sender, again=before.sender is not None)
-        elif step is Step.SKIP:
+        if step is PacketAction.START:
+            self._start(packet, sender, before, now)
+        elif step is PacketAction.SKIP:
             missed = packet.frame_count - before.last - 1
             self._notices.tell("skip", f"{missed} frames before {packet.frame_count} never came; the flight goes on.")
         return self._fly(packet)
 
-    def _start(self, packet: ServoPacket, sender: Address, *, again: bool) -> None:
-        where = f"{sender[0]}:{sender[1]}, {len(packet.pulses)} outputs, {packet.frame_rate} Hz"
-        if again:
+    def _start(self, packet: ServoPacket, sender: Address, before: Frames, now: float) -> None:
+        where = f"{_at(sender)}, {len(packet.pulses)} outputs, {packet.frame_rate} Hz"
+        if before.sender is None:
+            self._notices.always(f"an autopilot is here ({where}): the vehicle stands on the ground.")
+        elif sender == before.sender:
             self._restarts += 1
             self._notices.always(f"the autopilot started anew ({where}): the vehicle is back on the ground.")
         else:
-            self._notices.always(f"an autopilot is here ({where}): the vehicle stands on the ground.")
+            self._restarts += 1
+            self._takeovers += 1
+            self._notices.always(
+                f"another autopilot has taken the link over ({where}) after {now - before.heard:.1f} s without a "
+                f"packet of {_at(before.sender)}: the vehicle is back on the ground."
+            )
         self._rate, self._said_broken = packet.frame_rate, False
         self.plant.restart()
         self._sensing.restart()
@@ -108,3 +123,7 @@ class Session:
         self._exchanges += 1
         self._answer = line(self._sensing.read(moved))
         return self._answer
+
+
+def _at(address: Address) -> str:
+    return f"{address[0]}:{address[1]}"

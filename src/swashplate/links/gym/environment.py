@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.links.gym.flying import Flying, flying
 from swashplate.links.gym.tasks import Task, task_of
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.models.vehicle import Vehicle
 
 Observation = NDArray[np.float32]
 

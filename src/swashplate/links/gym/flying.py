@@ -12,8 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.links.gym.tasks import Task
+from swashplate.models.catalogue import vehicle as find_vehicle
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -24,15 +27,11 @@ from swashplate.simulation.dynamics import (
     equations_of,
     jax_backend,
     parameter_row,
-    rk4_step_looped,
     row_rates,
 )
+from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, trim
-from swashplate.vehicles.catalogue import vehicle as find_vehicle
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 OBSERVED = (
     *("ahead", "right", "below"),
@@ -245,10 +244,7 @@ def _advance(
         inputs = jnp.asarray(rest["inputs"]).at[jnp.array(free)].add(rest["reach"] * action)
         w = jnp.concatenate([jnp.clip(inputs, *rest["limits"]), rest["around"]])
 
-        def substep(_: Any, x: Any) -> Any:
-            return rk4_step_looped(lambda x, w: rates(x, w, p), x, lambda _: w, rest["dt"] / substeps)
-
-        after = jax.lax.fori_loop(0, substeps, substep, x)
+        after = rk4_steps(lambda x, w: rates(x, w, p), x, lambda *_: w, rest["dt"] / substeps, substeps)
         errors = _errors(after, target, rest["angles"])
         away = target[:3] - after[:3]
         level, height = jnp.hypot(away[0], away[1]), jnp.abs(away[2])

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
-from swashplate.flights.maneuvers import Maneuver
-
-Array = NDArray[np.float64]
+from swashplate.flights.maneuvers.series import Maneuver
 
 TARGET = ("north", "east", "down", "v_north", "v_east", "v_down", "heading", "roll", "pitch")
 """Columns of a target: place [m], velocity [m/s], heading [rad], and roll and pitch beyond the trim's [rad]."""

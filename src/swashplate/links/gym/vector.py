@@ -13,7 +13,7 @@ from swashplate.errors import SwashError
 from swashplate.links.gym.environment import spaces
 from swashplate.links.gym.flying import flying
 from swashplate.links.gym.tasks import Task, task_of
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.models.vehicle import Vehicle
 
 Observations = NDArray[np.float32]
 

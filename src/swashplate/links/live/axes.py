@@ -8,18 +8,15 @@ from typing import Any
 
 import control
 import numpy as np
-import scipy.linalg
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from swashplate.control.linear_decoupling import static_decoupling
+from swashplate.arrays import Array
+from swashplate.control.laws.linear_decoupling import static_decoupling
 from swashplate.errors import SwashError
-from swashplate.flights.maneuvers import AXES
+from swashplate.flights.maneuvers.series import AXES
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.discretisation import zero_order_hold
 from swashplate.simulation.linearize import LinearModel
-from swashplate.vehicles.linear import NAME as LINEAR
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 STICKS = ("roll", "pitch", "yaw", "heave")
 _OUTPUTS = ("p", "q", "r", "w")
@@ -63,7 +60,7 @@ def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
     Raises:
         SwashError: where the inputs are fewer than four or move too little.
     """
-    soon = _step_response(model.A, model.B, [vehicle.index(name) for name in _MOVED])
+    soon = zero_order_hold(model.A, model.B, _SOON)[1][[vehicle.index(name) for name in _MOVED]]
     directions, excited = _directions(vehicle, soon)
     moved = soon @ directions
     reached = np.diag(moved)
@@ -75,11 +72,11 @@ def axes_of(vehicle: Vehicle, model: LinearModel) -> Axes:
     ranges = np.ptp(np.array(vehicle.input_limits), axis=1)
     half = np.array([0.5 * np.min(ranges[column != 0.0]) for column in directions.T])
     travel = _SHARES * half
-    if vehicle.name == LINEAR:
+    if vehicle.traits.linear:
         travel = np.minimum(travel, _ENOUGH / np.abs(reached))
     scale = np.sign(reached) * _SENSE * travel
     # Axes to inputs: the rotors' senses decide about signs (nose down is ahead, thrust is up).
-    matrix = None if vehicle.name == LINEAR else _at_once_decoupled(model, directions)
+    matrix = None if vehicle.traits.linear else _at_once_decoupled(model, directions)
     if matrix is None:
         matrix = _soon_decoupled(moved, vehicle)
     mixing = {True: directions @ matrix @ np.diag(scale), False: directions @ np.diag(scale)}
@@ -111,13 +108,6 @@ def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
     if np.linalg.cond(ratio) * _SINGULAR > 1.0:
         raise SwashError("has inputs that move two axes alike: four sticks cannot fly it.", where=vehicle.card.where)
     return np.asarray(np.linalg.inv(ratio), dtype=np.float64)
-
-
-def _step_response(A: Array, B: Array, states: list[int]) -> Array:
-    """Some states' answer to a step of each input after `_SOON`, shape (4, n_inputs)."""
-    n, m = B.shape
-    whole = scipy.linalg.expm(_SOON * np.block([[A, B], [np.zeros((m, n + m))]]))
-    return np.asarray(whole[states, n:], dtype=np.float64)
 
 
 def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:

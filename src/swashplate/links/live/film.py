@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import subprocess
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.atomic import replaced_when_complete
+from swashplate.arrays import Array
+from swashplate.atomic import make_folder, replaced_when_complete, write_bytes
 from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
 from swashplate.links.live.picture import inputs_of, picture, pose_of
@@ -19,7 +22,6 @@ from swashplate.links.live.replay import Replay, floor, gaps
 from swashplate.links.live.wireframe import Camera, ground, helicopter
 from swashplate.physics.environment import Environment
 
-Array = NDArray[np.float64]
 Tell = Callable[[int, int], None]
 
 SIZE = (1280, 720)
@@ -87,10 +89,12 @@ def write_pictures(shown: Replay, folder: Path, *, rate: float = 25.0, tell: Tel
     """`frame-00001.png` and so on in a folder, which is made if missing; returns their number."""
     from matplotlib.image import imsave
 
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     count = 0
     for count, picture_ in enumerate(pictures(shown, rate=rate, tell=tell), start=1):
-        imsave(folder / f"frame-{count:05d}.png", picture_)
+        drawn = io.BytesIO()
+        imsave(drawn, picture_, format="png")
+        write_bytes(folder / f"frame-{count:05d}.png", drawn.getbuffer())
     return count
 
 
@@ -125,6 +129,9 @@ class _Page:
         self._clock = self._scene.text(0.02, 0.965, "", transform=self._scene.transAxes, va="top", animated=True)
         words = ("SIMULATED  " if shown.simulated else "") + shown.title
         self._scene.text(0.02, 0.025, words, transform=self._scene.transAxes, color="#444")
+        if shown.notes:
+            told = "\n".join(line for note in shown.notes for line in textwrap.wrap(note, 110))
+            self._scene.text(0.02, 0.065, told, transform=self._scene.transAxes, color="#a33", fontsize=7, va="bottom")
         if shown.predicted is not None:
             self._scene.text(
                 0.98,

@@ -15,19 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate import progress_lines
-from swashplate.links.live.picture import is_coaxial
-from swashplate.vehicles.linear import NAME as LINEAR
-from swashplate.vehicles.vehicle import Vehicle
+from swashplate.models.vehicle import Vehicle
 
 How = Literal["model", "responses"]
 Window = tuple[float, float]
 HOWS: tuple[How, ...] = get_args(How)
 REPORT = "report.html"
 _LONGEST_WORD = 300
-_LONGEST_MODEL = 20.0
-"""s of a recording that a single rotor's model is fitted to: what a fit costs grows with it."""
-_MODEL_RATE = 50
-"""Hz: enough for a body's motion."""
 USUAL = 25
 """Iterations that such fits have taken (22 from a recording of 3-2-1-1s): what the time left is estimated with."""
 
@@ -66,26 +60,23 @@ def commands(
 ) -> tuple[list[str], ...]:
     """Command lines to try in this order until one leaves a report, as lists that no shell ever sees.
 
-    A single rotor frees what turns its answer to a stick, by output error at half the rate and in `window` [s] of the
-    recording: a minute of one processor (measured for 20 s flown: 45 s; prediction error at full rate took 160 s and
-    had not settled). Where a flight gives no model, its frequency responses are left, which can also be asked for at
-    once. Of a linear model they are all there is: it has no card to fit.
+    The model is fitted as its traits say, in `window` [s] of the recording. Where a flight gives no model, its
+    frequency responses are left, which can also be asked for at once. Of a model that says nothing they are all there
+    is.
     """
     python = [sys.executable, "-m", "swashplate"]
     identify = [*python, "identify", "--vehicle", str(card), "--out", str(out), "--quiet"]
     inputs = ",".join(name for name in vehicle.input_names if name != "throttle")
     channels = ["--inputs", inputs, "--outputs", "p,q,r,w"]
     respond = [*python, "respond", str(flight), *channels, "--out", str(out), "--quiet"]
-    if how == "responses" or vehicle.name == LINEAR:
+    fitted = vehicle.traits.recording
+    if how == "responses" or fitted is None:
         return (respond,)
-    if is_coaxial(vehicle):
-        return ([*identify, "--flight", str(flight)],)
     part = str(flight) if window is None else f"{flight}@{window[0]:g}-{window[1]:g}"
-    cheap = ["--flight", part, "--free", "rotor", "--method", "output-error", "--rate", str(_MODEL_RATE)]
-    return ([*identify, *cheap], respond)
+    return ([*identify, "--flight", part, *fitted.options], respond)
 
 
-def busiest(inputs: NDArray[np.float64], *, period: float, seconds: float = _LONGEST_MODEL) -> Window | None:
+def busiest(inputs: NDArray[np.float64], *, period: float, seconds: float) -> Window | None:
     """The stretch [s] in which inputs, shape (n, n_inputs), move most, each by its own spread; None where all fits."""
     count = round(seconds / period)
     if len(inputs) <= count:

@@ -15,20 +15,19 @@ from typing import Any, Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
-from swashplate.control.autopilot import Autopilot, autopilot, row_step
-from swashplate.control.state_hold import state_hold, state_hold_step
+from swashplate.arrays import Array
+from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
+from swashplate.control.laws.state_hold import state_hold, state_hold_step
 from swashplate.errors import ControllerError
-from swashplate.flights.maneuvers import DEFAULT_AMPLITUDE
+from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE
 from swashplate.links.live.axes import STICKS, axes_of
-from swashplate.links.live.picture import is_coaxial, picture
+from swashplate.links.live.picture import picture
+from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, Step
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
-from swashplate.vehicles.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Mode = Literal["raw", "held", "velocity", "position"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 WANTED = (*REFERENCES, "yaw", "heave")
@@ -75,7 +74,7 @@ def pilot(vehicle: Vehicle, trim: Trim, *, controller: Autopilot | None = None) 
     """
     if controller is not None and controller.vehicle != vehicle.name:
         raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-    if is_coaxial(vehicle):
+    if vehicle.traits.coaxial:
         return _coaxial(vehicle, trim, controller)
     return _state_feedback(vehicle, trim)
 

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.linear_vehicle import delays_of
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError, FlightError, SwashError
 from swashplate.flights.flight import Flight
-from swashplate.identification.kinematics import PREDICTED, measured_states
-from swashplate.identification.records import records
-from swashplate.links.live.picture import inputs_of, is_coaxial, picture, pose_of
+from swashplate.identification.core.records import records
+from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.links.live.picture import inputs_of, picture, pose_of
+from swashplate.models.catalogue import from_card
+from swashplate.models.catalogue import vehicle as named_vehicle
+from swashplate.models.delays import input_delays
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
 from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
 from swashplate.validation.prediction import predict
 from swashplate.validation.validate import observer_of
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.catalogue import vehicle as named_vehicle
-from swashplate.vehicles.linear import NAME as LINEAR
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 RATE = 50.0
 """Moments per second [Hz]."""
@@ -48,6 +47,7 @@ class Replay:
         predicted: body states (n, 12) of the model, NaN where there is no prediction; None without a model.
         ahead: seconds after which a prediction starts anew.
         simulated: whether no aircraft flew.
+        notes: what the log does not have and what stands in for it, in sentences.
     """
 
     vehicle: Vehicle
@@ -58,6 +58,7 @@ class Replay:
     predicted: Array | None
     ahead: float
     simulated: bool
+    notes: tuple[str, ...] = ()
 
 
 def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
@@ -82,17 +83,18 @@ def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
     )
 
 
-def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) -> Replay:
+def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, hold_missing: bool = False) -> Replay:
     """What is shown of a conditioned flight.
 
     Args:
         flight: at one rate, see `Flight.condition`.
         model: predicts the flight from its own inputs; None for no prediction.
         ahead: how long each prediction runs [s]; then the next one starts from what an observer knew by then.
+        hold_missing: hold inputs of the model that the log lacks at the hover's, and say so in `Replay.notes`.
 
     Raises:
-        FlightError: where a channel of the motion or an input of a linear model is missing, or the flight is too short
-            to be predicted.
+        FlightError: where a channel of the motion is missing, or an input of the model without `hold_missing`, or the
+            flight is too short to be predicted.
     """
     enable_double_precision()
     if not ahead > 0.0:
@@ -104,8 +106,11 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
             where=flight.provenance.source,
             hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least.",
         )
+    notes: list[str] = []
+    if model is not None:
+        flight, notes = _driven(flight, model, hold_missing=hold_missing)
     vehicle = drawn_as(flight, model)
-    if model is not None and model.name == LINEAR:
+    if model is not None and model.traits.linear:
         vehicle = model = _about_the_flight(model, flight)
     rate = flight.rate("phi")
     stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))
@@ -113,19 +118,21 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
     hover = trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal"))
     states = np.tile(hover.state, (time.size, 1))
     states[:, : len(PREDICTED)] = body
+    unknown = [name for name in vehicle.state_names[len(PREDICTED) :] if name not in flight]
     for i, name in enumerate(vehicle.state_names[len(PREDICTED) :], start=len(PREDICTED)):
         if name in flight:
             states[:, i] = np.interp(time, flight.time(name), flight.values(name))
-    inputs = np.tile(hover.inputs, (time.size, 1))
-    for i, name in enumerate(vehicle.input_names):
-        if name in flight:
-            inputs[:, i] = np.interp(time, flight.time(name), flight.values(name))
+    inputs = np.stack([np.interp(time, flight.time(n), flight.values(n)) for n in vehicle.input_names], axis=1)
     predicted = None
-    if model is not None:
-        if is_coaxial(model):
-            predicted = _predicted(flight, model, ahead, time)
-        else:
-            predicted = _flown(model, time, states, inputs, ahead)
+    if model is not None and model.traits.observed:
+        predicted = _predicted(flight, model, ahead, time)
+    elif model is not None:
+        around = {n: np.interp(time, flight.time(n), flight.values(n)) for n in SURROUNDINGS if n in flight}
+        predicted = _flown(model, time, states, inputs, around, ahead)
+        if unknown:
+            notes.append(f"The log has no {', '.join(unknown)}: every prediction starts with them as at hover.")
+    if unknown and (model is None or model.traits.observed):
+        notes.append(f"The log has no {', '.join(unknown)}: they are drawn as at hover.")
     return Replay(
         vehicle,
         flight.provenance.source or "flight",
@@ -135,7 +142,41 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0) 
         predicted,
         ahead,
         flight.provenance.simulated,
+        tuple(notes),
     )
+
+
+def _driven(flight: Flight, model: Vehicle, *, hold_missing: bool) -> tuple[Flight, list[str]]:
+    """A flight that has every input of the model, and sentences about what was not logged.
+
+    Raises:
+        FlightError: where it lacks one and `hold_missing` was not asked for.
+    """
+    notes = []
+    nominal = model.card.values().get("voltage_nominal")
+    if nominal is not None and "voltage" not in flight:
+        notes.append(f"The log has no battery voltage: the prediction takes {nominal:g} V, the card's nominal.")
+    missing = [name for name in model.input_names if name not in flight]
+    if not missing:
+        return flight, notes
+    if not hold_missing:
+        raise FlightError(
+            f"lacks {', '.join(missing)}: {model.card.where or model.card.title} is driven by them, and without them "
+            "there is no prediction.",
+            where=flight.provenance.source,
+            hint=f"It has {', '.join(flight.channels)}. Map its columns to these names (--mapping), give a model of "
+            "the channels that it has, leave --model out, or hold what is missing at the hover's with --hold-missing.",
+        )
+    hover = trim(model, voltage=nominal)
+    held = {name: float(hover.inputs[model.input_names.index(name)]) for name in missing}
+    for name, value in held.items():
+        flight = flight.with_channel(name, np.full(flight.time("phi").size, value), like="phi")
+    values = ", ".join(f"{name} at {value:.4g}" for name, value in held.items())
+    notes.append(
+        f"The log has no {', '.join(missing)}. They are held ({values}, as at hover) because that was asked for: the "
+        "prediction knows nothing of what was done with them, and is none of this flight."
+    )
+    return flight, notes
 
 
 def _about_the_flight(model: Vehicle, flight: Flight) -> Vehicle:
@@ -143,14 +184,7 @@ def _about_the_flight(model: Vehicle, flight: Flight) -> Vehicle:
 
     What a linear model itself flew is in deviations already.
     """
-    missing = [name for name in model.input_names if name not in flight]
-    if missing:
-        raise FlightError(
-            f"lacks {', '.join(missing)}, which the linear model {model.card.where or model.card.title} is driven by.",
-            where=flight.provenance.source,
-            hint=f"It has {', '.join(flight.channels)}; fit the model to channels that the log has.",
-        )
-    if flight.provenance.vehicle == LINEAR:
+    if flight.provenance.vehicle == model.name:
         return model
     means = {f"trim_{name}": float(np.mean(flight.values(name))) for name in ("phi", "theta", *model.input_names)}
     card = model.card.with_values(means, source="derived: mean of the flight", status="derived")
@@ -192,13 +226,15 @@ def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Arr
     return found
 
 
-def _flown(model: Vehicle, time: Array, states: Array, inputs: Array, ahead: float) -> Array:
-    """The model from the logged state on, anew every `ahead` seconds, on the logged inputs.
+def _flown(
+    model: Vehicle, time: Array, states: Array, inputs: Array, around: Mapping[str, Array], ahead: float
+) -> Array:
+    """The model from the logged state on, anew every `ahead` seconds, on the logged inputs, voltage and wind.
 
     For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for. A
     linear model's own delays are flown.
     """
-    late = delays_of(model)
+    late = input_delays(model)
     waits = (late.get(name, 0.0) for name in model.input_names)
     inputs = np.stack([np.interp(time - d, time, u) for d, u in zip(waits, inputs.T, strict=True)], axis=1)
     step = float(np.median(np.diff(time)))
@@ -210,7 +246,7 @@ def _flown(model: Vehicle, time: Array, states: Array, inputs: Array, ahead: flo
         try:
             flown = simulate(
                 model,
-                inputs[part],
+                {n: u[part] for n, u in (*zip(model.input_names, inputs.T, strict=True), *around.items())},
                 start=dict(zip(model.state_names, states[first].tolist(), strict=True)),
                 rate=1.0 / step,
                 substeps=max(1, round(500.0 * step)),
@@ -255,6 +291,7 @@ def as_json(shown: Replay) -> dict[str, Any]:
         "ahead": shown.ahead if shown.predicted is not None else None,
         "picture": {**picture(vehicle), "floor": floor(shown)},
         "inputs": inputs_of(vehicle),
+        "notes": list(shown.notes),
         "time": _short(shown.time - shown.time[0]),
         "moments": moments,
     }

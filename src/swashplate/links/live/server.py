@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import ipaddress
 import json
 import logging
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -28,10 +29,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from swashplate.errors import SwashError
+from swashplate.links.live.connections import OneLine, Punctual
 from swashplate.links.live.identifying import REPORT
 from swashplate.links.live.messages import LONGEST, MessageError, parse
 from swashplate.links.live.priority import come_first
-from swashplate.links.live.session import Session
+from swashplate.links.live.session import LiveSession
 
 UPDATES = 30.0
 """Updates of the page per second [Hz]."""
@@ -40,6 +42,8 @@ MOST_PAGES = 8
 MOST_BAD = 20
 """Messages of one connection that the schema refuses, before it is closed."""
 PAGE = Path(__file__).parent / "page"
+LIBRARIES: Mapping[str, str] = json.loads((Path(__file__).parent / "libraries.json").read_text(encoding="utf-8"))
+"""SHA-256 of what `scripts/vendor_page.py` brings, by name."""
 _LOG = logging.getLogger("swashplate.live")
 _POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
 _HEADERS = {
@@ -52,17 +56,25 @@ _HEADERS = {
 
 
 def check_page() -> None:
-    """That the page's libraries are here.
+    """That the page's libraries are here and are those that were pinned: they run in the pilot's browser.
 
     Raises:
         SwashError: saying how to get them.
     """
-    missing = [name for name in ("three.module.min.js", "uPlot.esm.js") if not (PAGE / "vendor" / name).is_file()]
+    files = {name: PAGE / "vendor" / name for name in LIBRARIES}
+    missing = [name for name, path in files.items() if not path.is_file()]
     if missing:
         raise SwashError(
             f"lacks {', '.join(missing)}: this is a source checkout without the page's libraries.",
             where=PAGE / "vendor",
             hint="Run `python scripts/vendor_page.py` there (it needs Node's npm), or install a wheel.",
+        )
+    changed = [n for n, path in files.items() if hashlib.sha256(path.read_bytes()).hexdigest() != LIBRARIES[n]]
+    if changed:
+        raise SwashError(
+            f"{', '.join(changed)}: not the library that was pinned (SHA-256 differs); the page is not served.",
+            where=PAGE / "vendor",
+            hint="Somebody or something changed it. Run `python scripts/vendor_page.py`, or install the wheel again.",
         )
 
 
@@ -163,7 +175,7 @@ def _page(name: str) -> Callable[[Request], Response]:
     return answer
 
 
-def live_app(session: Session, *, remote: bool = False) -> ASGIApp:
+def live_app(session: LiveSession, *, remote: bool = False) -> ASGIApp:
     """The live page, its socket, and the reports of its recordings."""
     pages: set[WebSocket] = set()
     steering: list[WebSocket] = []
@@ -225,7 +237,7 @@ def live_app(session: Session, *, remote: bool = False) -> ASGIApp:
     return Guard(Starlette(routes=routes), remote=remote)
 
 
-async def _tell(socket_: WebSocket, session: Session) -> None:
+async def _tell(socket_: WebSocket, session: LiveSession) -> None:
     """Updates at their rate; a page that does not keep up gets fewer, and never a heap of old ones."""
     version, due = 0, time.monotonic()
     while True:
@@ -247,10 +259,11 @@ def replay_app(flight: dict[str, Any], *, remote: bool = False) -> ASGIApp:
     return Guard(Starlette(routes=routes), remote=remote)
 
 
-def serve(app: ASGIApp, listening: socket.socket) -> None:
-    """Serve until interrupted; an interrupt is the ordinary end."""
-    config = uvicorn.Config(
+def configured(app: ASGIApp) -> uvicorn.Config:
+    """How an app is served: what does not ask in time, or not in text, is let go."""
+    made = uvicorn.Config(
         app,
+        http=Punctual,
         log_level="warning",
         access_log=False,
         server_header=False,
@@ -259,6 +272,13 @@ def serve(app: ASGIApp, listening: socket.socket) -> None:
         ws_max_size=4 * LONGEST,
         timeout_graceful_shutdown=2,
     )
+    logging.getLogger("uvicorn.error").addFilter(OneLine())
+    return made
+
+
+def serve(app: ASGIApp, listening: socket.socket) -> None:
+    """Serve until interrupted; an interrupt is the ordinary end."""
+    config = configured(app)
     come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
     with contextlib.suppress(KeyboardInterrupt):
         uvicorn.Server(config).run(sockets=[listening])

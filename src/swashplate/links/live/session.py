@@ -11,20 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.autopilot import Autopilot
+from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import SwashError
-from swashplate.flights.maneuvers import Maneuver
+from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
-from swashplate.links.live.linear_picture import ABOUT
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
 from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
+from swashplate.models.catalogue import from_card
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.vehicles.catalogue import from_card
-from swashplate.vehicles.vehicle import Vehicle
 
 _BODY = len(RigidBody._fields)
 _SWEEP_SECONDS, _SWEEP_BAND = 30.0, (0.3, 5.0)
@@ -41,7 +40,7 @@ class Recording:
     window: Window | None = None
 
 
-class Session:
+class LiveSession:
     """What `swash live` runs.
 
     Args:
@@ -137,8 +136,8 @@ class Session:
             world.setting.decoupled = bool(value)
         elif kind == "ghost":
             world.set_ghost(bool(value))
-        elif world.linear and kind in ("wind", "gusts"):
-            raise SwashError("A linear model has no wind in its equations.")
+        elif not world.vehicle.traits.wind and kind in ("wind", "gusts"):
+            raise SwashError("This model has no wind in its equations.")
         elif kind == "wind":
             world.setting.wind = tuple(float(message[name]) for name in ("north", "east", "down"))  # type: ignore[assignment]
         elif kind == "gusts":
@@ -160,8 +159,8 @@ class Session:
         return Maneuver(kind, (moved,), _UNIT_SECONDS * {"doublet": 2, "3211": 7}[kind], amplitude)
 
     async def _set_bar(self, on: bool) -> None:
-        if self.world.linear:
-            raise SwashError("A linear model has no bar to put on or off.")
+        if "bar" not in self.world.vehicle.traits.switches:
+            raise SwashError("This model has no bar to put on or off.")
         card = self.world.vehicle.card
         if card.options.get("bar", _has_bar(self.world.vehicle)) == on:
             return
@@ -183,12 +182,12 @@ class Session:
             rows, self.world.rows = self.world.rows, [] if on else None
         if not rows or on:
             return
-        number, vehicle = len(self.recordings) + 1, self.world.vehicle
-        await asyncio.to_thread(
-            save_recording, vehicle, rows, period=self.world.period, folder=self.folder, number=number
-        )
-        period, first = self.world.period, len(vehicle.state_names)
-        window = busiest(np.stack(rows)[:, first : first + len(vehicle.input_names)], period=period)
+        vehicle, period = self.world.vehicle, self.world.period
+        number, _ = await asyncio.to_thread(save_recording, vehicle, rows, period=period, folder=self.folder)
+        first, fitted = len(vehicle.state_names), vehicle.traits.recording
+        inputs = np.stack(rows)[:, first : first + len(vehicle.input_names)]
+        longest = None if fitted is None else fitted.longest
+        window = None if longest is None else busiest(inputs, period=period, seconds=longest)
         self.recordings.append(Recording(number, len(rows) * period, vehicle, window))
 
     def _identify(self, number: int, how: How) -> None:
@@ -208,10 +207,10 @@ class Session:
             "version": self.version,
             "title": vehicle.card.title,
             "trust": vehicle.card.trust,
-            "about": ABOUT if world.linear else "",
-            "wind": not world.linear,
-            "bar": not world.linear,
-            "hows": ["responses"] if world.linear else list(HOWS),
+            "about": vehicle.traits.about,
+            "wind": vehicle.traits.wind,
+            "bar": "bar" in vehicle.traits.switches,
+            "hows": ["responses"] if vehicle.traits.recording is None else list(HOWS),
             "controller": world.pilot.title,
             "picture": picture(vehicle),
             "inputs": inputs_of(vehicle),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from swashplate.arrays import Array
+
 Lines = list[tuple[str, Array]]
 
 _TURN = np.linspace(0.0, 2.0 * np.pi, 33)

@@ -11,14 +11,16 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.autopilot import Autopilot
-from swashplate.control.linear_vehicle import delays_of
+from swashplate.arrays import Array
+from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import SwashError
-from swashplate.flights.maneuvers import Maneuver
+from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
 from swashplate.links.live.recording import LONGEST
+from swashplate.models.delays import input_delays
+from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Step
 from swashplate.simulation.dynamics import (
@@ -27,18 +29,14 @@ from swashplate.simulation.dynamics import (
     enable_double_precision,
     equations_of,
     parameter_row,
-    rk4_step_looped,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence
+from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
 from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 from swashplate.simulation.wind import Gusts, Turbulence
-from swashplate.vehicles.linear import NAME as LINEAR
-from swashplate.vehicles.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz]."""
@@ -82,11 +80,10 @@ def advance(
     past = jnp.concatenate([past[1:], inputs[None]])
     columns, last = jnp.arange(inputs.size), past.shape[0] - 1
 
-    def substep(i: Any, y: Any) -> Any:
-        w = jnp.concatenate([past[last - back[i], columns], around])
-        return rk4_step_looped(lambda y, w: rates(y, w, p), y, lambda _: w, dt)
+    def acting(i: Any, _: Any) -> Any:
+        return jnp.concatenate([past[last - back[i], columns], around])
 
-    return jax.lax.fori_loop(0, substeps, substep, y), past, memory, inputs
+    return rk4_steps(lambda y, w: rates(y, w, p), y, acting, dt, substeps), past, memory, inputs
 
 
 @dataclass
@@ -146,7 +143,7 @@ class World:
     def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None = None, seed: int = 0) -> None:
         enable_double_precision()
         self.vehicle = vehicle
-        self.linear = vehicle.name == LINEAR
+        self._linear = vehicle.traits.linear
         battery = vehicle.card.values().get("voltage_nominal")
         self.nominal_voltage = battery
         around = Environment() if battery is None else Environment(voltage=battery)
@@ -157,7 +154,7 @@ class World:
         self.rows: list[Array] | None = None
         self._environment, self._seed = around, seed
         # A linear model's angles are small ones, and their rates its own.
-        self._equations = equations_of(vehicle if self.linear else tumbling(vehicle))
+        self._equations = equations_of(vehicle if self._linear else tumbling(vehicle))
         self._p = parameter_row(vehicle, around)
         self._limits = np.array(vehicle.input_limits).T
         self._substeps = round(PHYSICS_RATE / self.pilot.rate)
@@ -238,7 +235,7 @@ class World:
                 self.pilot.step,
                 self._substeps,
                 craft.x,
-                craft.x if self.linear else from_euler(craft.x),
+                craft.x if self._linear else from_euler(craft.x),
                 craft.past,
                 self._back,
                 craft.memory,
@@ -251,7 +248,7 @@ class World:
                 1.0 / PHYSICS_RATE,
             )
             row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in found)
-            craft.x = row if self.linear else to_euler(row, craft.x)
+            craft.x = row if self._linear else to_euler(row, craft.x)
         own = self._crafts["own"]
         self._check(own, before)
         if self.trouble:
@@ -267,7 +264,7 @@ class World:
         """Whether a ghost has flown to where it shows nothing any more."""
         if not np.all(np.isfinite(x)):
             return True
-        return _leans_too_far(x) if self.linear else bool(x[2] >= 0.5 + self.start_height)
+        return _leans_too_far(x) if self._linear else bool(x[2] >= 0.5 + self.start_height)
 
     def _check(self, own: Craft, before: Array) -> None:
         try:
@@ -276,7 +273,7 @@ class World:
             self.trouble = "The simulation left the range in which the equations hold. Reset to fly again."
             own.x = before
             return
-        if self.linear:
+        if self._linear:
             if _leans_too_far(own.x):
                 self.trouble = "Leans 60 deg, where a linear model tells nothing any more. Reset to fly again."
                 own.x = before
@@ -296,7 +293,7 @@ class World:
             row.update(yaw=s["yaw"], heave=s["heave"])
         else:
             height = self._target[2] - self.period * law.climb * s["heave"]
-            self._target[2] = height if self.linear else min(height, -0.2)
+            self._target[2] = height if self._linear else min(height, -0.2)
             self._target[3] += self.period * law.turn * s["yaw"]
         if setting.mode in ("raw", "held"):
             row.update(roll=s["roll"], pitch=s["pitch"])
@@ -347,7 +344,7 @@ class World:
 
 def _steps_back(vehicle: Vehicle, substeps: int) -> NDArray[np.int_]:
     """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
-    late = delays_of(vehicle)
+    late = input_delays(vehicle) if vehicle.traits.linear else {}  # the page's own pilots are tuned without
     waits = np.array([round(late.get(name, 0.0) * PHYSICS_RATE) for name in vehicle.input_names], dtype=np.int_)
     return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
 

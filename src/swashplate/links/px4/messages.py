@@ -18,7 +18,7 @@ _LOCKSTEP = 1
 _STANDARD_GRAVITY = 9.80665
 
 
-class Controls(NamedTuple):
+class ActuatorControls(NamedTuple):
     """Actuator controls: -1 to 1 for servos, 0 to 1 for motors, and whether the autopilot waits for sensors."""
 
     values: tuple[float, ...]
@@ -43,13 +43,13 @@ class Mavlink:
         self._reader: Any = common.MAVLink(None)
         self._reader.robust_parsing = True
 
-    def read(self, data: bytes) -> tuple[list[Controls], int]:
+    def read(self, data: bytes) -> tuple[list[ActuatorControls], int]:
         """Actuator controls in the next bytes of the stream, and how many pieces of it were no messages."""
         found, bad = [], 0
         for message in self._reader.parse_buffer(data) or ():
             kind = message.get_type()
             if kind == "HIL_ACTUATOR_CONTROLS":
-                found.append(Controls(tuple(message.controls), bool(message.flags & _LOCKSTEP)))
+                found.append(ActuatorControls(tuple(message.controls), bool(message.flags & _LOCKSTEP)))
             elif kind == "BAD_DATA":
                 bad += 1
         return found, bad

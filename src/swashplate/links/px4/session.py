@@ -17,7 +17,7 @@ _FIELD_NOISE, _PRESSURE_NOISE = 5e-4, 0.01
 """Gauss and hPa. PX4 takes a sensor that never changes for a broken one, so these two always shake a little."""
 
 
-class Session:
+class Px4Session:
     """A plant under PX4.
 
     Args:

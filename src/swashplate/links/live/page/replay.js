@@ -100,6 +100,9 @@ document.title = `${flight.title} · swash replay`;
 $("simulated").hidden = !flight.simulated;
 $("state").textContent = flight.vehicle;
 $("told").textContent = flight.ahead ? `Blue and dashed: the model, anew every ${flight.ahead} s.` : "";
+$("notes").replaceChildren(
+  ...flight.notes.map((words) => Object.assign(document.createElement("p"), { textContent: words })),
+);
 $("scrub").max = flight.time.at(-1);
 $("scrub").oninput = () => go(Number($("scrub").value));
 $("play").onclick = () => play(!playing);

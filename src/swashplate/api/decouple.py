@@ -1,0 +1,283 @@
+"""The verb `decouple`: from a coaxial helicopter's model to the controller that decouples its roll and pitch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from swashplate.api.design_controller import margins_document
+from swashplate.control.analysis.margins import Margins
+from swashplate.control.analysis.stability import loop_margins, loop_modes, require_stable
+from swashplate.control.analysis.straightness import StepRun, command_for_speed, step_run
+from swashplate.control.controller_file import save_controller
+from swashplate.control.draws.robustness import draw_models
+from swashplate.control.lateness import lateness
+from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
+from swashplate.control.laws.decoupling import Lag, estimated_lag
+from swashplate.control.laws.learning import corrected_by_step, drift_sources
+from swashplate.control.laws.observed_autopilot import ObservedAutopilot
+from swashplate.control.lqg.design import design
+from swashplate.errors import SwashError
+from swashplate.export.controller_c import ControllerCode, Precision, controller_code
+from swashplate.filtering.sensor_suite import suite
+from swashplate.identification.core.result import Result
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.straightness import compose_straightness
+from swashplate.reporting.structure import Report
+from swashplate.simulation.trim import Trim, trim
+from swashplate.text_table import text_table
+
+Fitted = Result[Any, Any] | str | Path
+"""What an identification found, or its file."""
+PAPERS_SPEED = 1.8
+"""m/s, of the step of Fankhauser et al., Fig. 10."""
+_FURTHEST = 6.0
+"""m of drift, as far as the step goes."""
+
+
+@dataclass(frozen=True)
+class FlownStep:
+    """A step of the pitch command with the decoupling and without.
+
+    Attributes:
+        command: the step.
+        runs: "without" and "with".
+        draws: how many models were drawn.
+        sources: of the drift's variance over them: numbers and their shares.
+        explained: share of it that a line explains.
+    """
+
+    command: float
+    runs: Mapping[str, StepRun]
+    draws: int
+    sources: tuple[tuple[str, float], ...] = ()
+    explained: float = 0.0
+
+    def figures(self) -> dict[str, dict[str, Any]]:
+        """Paths on the step: of the model itself, and percentiles over drawn models."""
+        figures = ("drift", "leftmost", "rightmost", "speed")
+        found: dict[str, dict[str, Any]] = {}
+        for name, run in self.runs.items():
+            found[name] = {key: float(getattr(run.path, key)[0]) for key in figures} | {"models": "this one"}
+            if run.drawn is not None:
+                arrived = int(np.sum(np.isfinite(run.drawn.drift)))
+                for percent in (5, 50, 95):
+                    values = {key: float(np.nanpercentile(getattr(run.drawn, key), percent)) for key in figures}
+                    found[f"{name}, {percent} %"] = values | {"models": f"{arrived} of {self.draws}"}
+        return found
+
+    def __repr__(self) -> str:
+        head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
+        cells = [
+            (name, *(f"{entry[key]:+.2f}" for key in ("drift", "leftmost", "rightmost", "speed")), entry["models"])
+            for name, entry in self.figures().items()
+        ]
+        lines = [f"step of the pitch command: {self.command:.3f}", text_table(head, cells)]
+        if self.sources:
+            told = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in self.sources[:4])
+            lines.append(
+                f"\nof the drift's variance with the law: {told} (a line explains {100.0 * self.explained:.0f} %)"
+            )
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, repr=False)
+class DecouplingDesign:
+    """The controller of a coaxial helicopter: height and yaw held, roll and pitch decoupled.
+
+    Attributes:
+        vehicle, hover: what it was made from.
+        controller: it flies; fed with the states, or on estimates where sensors were given.
+        law: the autopilot in it.
+        mode: least stable of the loop [1/s].
+        margins: None in mode "manual", where a pilot holds the lean.
+        step: flown where one was asked for.
+        late: how late commands are taken to be, in words.
+    """
+
+    vehicle: Vehicle
+    hover: Trim
+    controller: Autopilot | ObservedAutopilot
+    law: Autopilot
+    mode: complex
+    margins: Margins | None
+    step: FlownStep | None
+    late: str
+
+    def lag(self, *, less: float = 0.0) -> float:
+        """Phase lag that is taken out at the hover's motor command [deg], with the battery by `less` volts lower."""
+        volts = float(self.hover.environment.voltage) - less
+        return math.degrees(estimated_lag(self.law.numbers.law, self.hover.commands()["motor_lower"], volts))
+
+    @property
+    def mixing(self) -> str:
+        """Form of the equations that are inverted."""
+        return "rotation" if self.law.numbers.law.mixing > 0 else "as_printed"
+
+    def save(self, path: str | Path) -> Path:
+        """Write the controller's file (.toml)."""
+        save_controller(self.controller, path)
+        return Path(path)
+
+    def code(self, *, precision: Precision = "double") -> ControllerCode:
+        """One step as C99; needs the extra `export`."""
+        return controller_code(self.controller, precision=precision)
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        found: dict[str, Any] = {
+            "vehicle": self.vehicle.name,
+            "model": self.vehicle.card.title,
+            "mode": self.law.mode,
+            "rate": self.law.rate,
+            "mixing": self.mixing,
+            "lag_at_hover_deg": self.lag(),
+            "law": self.law.numbers.law._asdict(),
+            "late": self.late,
+            "least_stable_mode": {"real": self.mode.real, "imaginary": abs(self.mode.imag)},
+        }
+        if self.margins is not None:
+            found["margins"] = margins_document(self.margins)
+        if self.step is not None:
+            sources = dict(self.step.sources)
+            found["step"] = {"command": self.step.command, **self.step.figures(), "drift_sources": sources}
+        return found
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes: the two paths.
+
+        Raises:
+            SwashError: where no step was flown.
+        """
+        if self.step is None:
+            raise SwashError("has no flown step to report.", where=self.vehicle.name, hint="Give step or to_speed.")
+        return compose_straightness(
+            self.vehicle,
+            self.step.runs,
+            command=self.step.command,
+            lag=self.lag(),
+            sources=self.step.sources,
+            title=title,
+        )
+
+    def __repr__(self) -> str:
+        law, lag = self.law.numbers.law, self.lag()
+        across = 100.0 * math.sin(math.radians(lag))
+        rows = [
+            ("form of the equations", self.mixing, ""),
+            ("lower rotor at hover", f"{self.hover.states()['omega_lower']:.1f}", "rad/s"),
+            ("phase lag taken out at hover", f"{lag:.2f}", "deg"),
+            ("  at the same command, 1 V less", f"{self.lag(less=1.0):.2f}", "deg"),
+            ("of a command goes across without it", f"{across:.0f}", "%"),
+            ("roll command against 1 m/s ahead", f"{(law.across_u + law.across_u_linear) / law.linkage:+.3f}", "1"),
+            ("pitch command against 1 m/s right", f"{-(law.across_v + law.across_v_linear) / law.linkage:+.3f}", "1"),
+            ("least stable mode of the loop", f"{self.mode.real:+.3f} +- {abs(self.mode.imag):.3f}j", "1/s"),
+        ]
+        head = (f"decoupling of {self.vehicle.name}, mode {self.law.mode}", "", "")
+        parts = [f"late: {self.late}\n{text_table(head, rows, left=(0, 2))}"]
+        parts += [repr(part) for part in (self.margins, self.step) if part is not None]
+        return "\n\n".join(parts)
+
+
+def decouple(
+    vehicle: Vehicle,
+    *,
+    mode: Mode = "manual",
+    lag: Lag | float = "battery",
+    mixing: Literal["rotation", "as_printed"] | None = None,
+    speed_terms: bool = True,
+    voltage: float | None = None,
+    rate: float = 100.0,
+    sensors: str | None = None,
+    step: float | None = None,
+    to_speed: float | None = None,
+    drift: float | None = None,
+    fit: Fitted | None = None,
+    draws: int = 500,
+    seed: int = 0,
+) -> DecouplingDesign:
+    """Design the decoupling controller of a coaxial helicopter (Fankhauser et al., eqs 19 to 22).
+
+    Args:
+        vehicle: with the CoaX's equations, published or identified.
+        mode: what the servos hold besides a pilot's commands.
+        lag, mixing, speed_terms: of the decoupling; see `swashplate.control.laws.autopilot.autopilot`.
+        voltage: battery of the hover [V]; the card's nominal one where not given.
+        rate: of the controller [Hz].
+        sensors: fly on estimates from these, "imu@100,mocap@50+20ms", not on measurements.
+        step: fly this step of the pitch command for 6 m, with and without the decoupling.
+        to_speed: the same with the step that reaches this speed [m/s].
+        drift: seen on the step with this law [m to the right after 6 m]: take it out.
+        fit: what an identification found, or its file: fly the step also on models drawn from its covariance.
+        draws, seed: how many, and of which seed.
+
+    Raises:
+        ControllerError: where the loop does not stand, or a step does not get there.
+        SwashError: for a vehicle with other inputs, or options that contradict each other.
+    """
+    _check(step, to_speed, drift, fit)
+    nominal = vehicle.card.values().get("voltage_nominal")
+    hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
+    made = autopilot(vehicle, hover, mode=mode, rate=rate, lag=lag, speed_terms=speed_terms, mixing=mixing)
+    if to_speed is not None:
+        step = command_for_speed(vehicle, made, hover, speed=to_speed)
+    if drift is not None and step is not None:
+        made = corrected_by_step(vehicle, made, hover, command=step, drift=drift)
+    slowest = loop_modes(vehicle, made, hover)[0]
+    if made.mode != "manual":  # a pilot damps what "manual" leaves alone
+        require_stable(slowest, rate=made.rate, where=str(vehicle.card.path or vehicle.name))
+    return DecouplingDesign(
+        vehicle,
+        hover,
+        made if sensors is None else _on_estimates(vehicle, made, sensors, float(hover.environment.voltage)),
+        made,
+        complex(slowest),
+        None if made.mode == "manual" else loop_margins(vehicle, made, hover),
+        None if step is None else _flown(vehicle, made, hover, step, fit, draws, seed),
+        lateness(vehicle, made, given=None),
+    )
+
+
+def _check(step: float | None, to_speed: float | None, drift: float | None, fit: Fitted | None) -> None:
+    flown = step is not None or to_speed is not None
+    if step is not None and to_speed is not None:
+        raise SwashError("are two steps.", channel="--step and --to-speed", hint="Give one.")
+    if to_speed is not None and not to_speed > 0.0:
+        raise SwashError(f"is {to_speed:g} m/s, expected a positive speed.", channel="--to-speed")
+    if fit is not None and not flown:
+        raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
+    if drift is not None and not flown:
+        raise SwashError("was seen on a step.", channel="--drift", hint="Add that step: --step 0.4 or --to-speed 1.8.")
+    if drift is not None and not abs(drift) <= _FURTHEST:
+        raise SwashError(f"is {drift:g} m, expected at most {_FURTHEST:g} either way.", channel="--drift")
+
+
+def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
+    return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
+
+
+def _flown(
+    vehicle: Vehicle,
+    made: Autopilot,
+    hover: Trim,
+    step: float,
+    fit: Fitted | None,
+    draws: int,
+    seed: int,
+) -> FlownStep:
+    bare = autopilot(vehicle, hover, mode="manual", rate=made.rate, decoupled=False)
+    drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+    runs = {
+        name: step_run(vehicle, controller, hover, command=step, parameters=drawn)
+        for name, controller in (("without", bare), ("with", made))
+    }
+    spread = runs["with"].drawn
+    if drawn is None or spread is None:
+        return FlownStep(step, runs, draws)
+    sources, explained = drift_sources(spread.drift, drawn)
+    return FlownStep(step, runs, draws, tuple(sources), explained)

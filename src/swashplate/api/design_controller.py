@@ -1,0 +1,184 @@
+"""The verb `design_controller`: a linear-quadratic controller from a model's own trims and linear models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from swashplate.arrays import Array
+from swashplate.control.analysis.margins import Margins
+from swashplate.control.controller_file import save_controller
+from swashplate.control.lateness import lateness
+from swashplate.control.lqg.analysis import Analysis, analyse
+from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain
+from swashplate.control.lqg.controller import Lqg
+from swashplate.control.lqg.design import Holding, design
+from swashplate.errors import ControllerError
+from swashplate.export.controller_c import ControllerCode, Precision, controller_code
+from swashplate.filtering.sensor_suite import suite
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.controller_design import compose_design
+from swashplate.reporting.structure import Report
+from swashplate.text_table import text_table
+
+USUAL_SENSORS = "imu@100,mocap@100+10ms"
+Method = Literal["lqg", "lqr"]
+Gain = Literal["flying", "steady"]
+
+
+@dataclass(frozen=True, repr=False)
+class ControllerDesign:
+    """A designed controller, and what linear algebra promises of it.
+
+    Attributes:
+        controller: it flies: `sp.simulate_closed_loop`, `sp.check_controller`, `sp.monte_carlo`.
+        analyses: modes, margins and expected spread at every speed.
+        speeds: of the trims [m/s].
+        late: how late commands are taken to be, in words.
+    """
+
+    controller: Lqg
+    analyses: tuple[Analysis, ...]
+    speeds: tuple[float, ...]
+    late: str
+
+    def save(self, path: str | Path) -> Path:
+        """Write the controller's file (.toml)."""
+        save_controller(self.controller, path)
+        return Path(path)
+
+    def code(self, *, precision: Precision = "double") -> ControllerCode:
+        """One step as C99; needs the extra `export`."""
+        return controller_code(self.controller, precision=precision)
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        made = self.controller
+        return {
+            "vehicle": made.vehicle.name,
+            "model": made.vehicle.card.title,
+            "rate": made.rate,
+            "sensors": [str(sensor) for sensor in made.plan.sensors],
+            "delays": [d / made.rate for d in made.plan.delays],
+            "late": self.late,
+            "trims": [
+                {
+                    "speed": speed,
+                    "least_stable_mode": {"real": a.modes[0].real, "imaginary": abs(a.modes[0].imag)},
+                    "margins": margins_document(a.margins),
+                    "spread": a.spread,
+                    "uncertainty": a.uncertainty,
+                }
+                for speed, a in zip(self.speeds, self.analyses, strict=True)
+            ],
+        }
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes."""
+        rows = spread_rows(self.controller, self.analyses[0])
+        return compose_design(self.controller, self.speeds, self.analyses, rows, title=title, late=self.late)
+
+    def __repr__(self) -> str:
+        plan, vehicle = self.controller.plan, self.controller.vehicle
+        told = ", ".join(map(str, plan.sensors)) or "the states themselves"
+        lines = [f"{'LQG' if plan.sensors else 'LQR'} of {vehicle.called}, {plan.rate:g} Hz, {plan.n} states"]
+        if plan.period:
+            told += f"; constant gains, a cycle of {plan.period}"
+        lines += [f"told: {told}", f"late: {self.late}"]
+        waits = ", ".join(f"{name} {d}" for name, d in zip(vehicle.input_names, plan.delays, strict=True) if d)
+        if waits:
+            lines.append(f"in whole samples: {waits}")
+        for speed, analysis in zip(self.speeds, self.analyses, strict=True):
+            mode = analysis.modes[0]
+            lines.append(f"\nAt {speed:g} m/s, least stable mode {mode.real:+.3f} +- {abs(mode.imag):.3f}j 1/s")
+            lines.append(repr(analysis.margins))
+        head = (f"in gusts as assumed, at {self.speeds[0]:g} m/s", "strays (1 sigma)", "known to")
+        lines += ["", text_table(head, spread_rows(self.controller, self.analyses[0]))]
+        return "\n".join(lines)
+
+
+def margins_document(margins: Margins) -> dict[str, Any]:
+    """Margins as what becomes JSON."""
+    together = margins.together
+    return {
+        **{a.name: {"gain": a.gain, "phase_deg": math.degrees(a.phase), "delay": a.delay} for a in margins.axes},
+        "together": {
+            "disc": together.alpha,
+            "gain": together.gain,
+            "phase_deg": math.degrees(together.phase),
+            "delay": margins.delay,
+        },
+    }
+
+
+def spread_rows(made: Lqg, analysis: Analysis) -> list[tuple[str, str, str]]:
+    """Of every state how far it strays and how well it is known, angles in degrees."""
+    units = dict(zip(made.vehicle.state_names, made.vehicle.state_units, strict=True))
+    rows = []
+    for name, value in analysis.spread.items():
+        angle = "rad" in units[name]
+        factor, unit = (math.degrees(1.0), units[name].replace("rad", "deg")) if angle else (1.0, units[name])
+        known = analysis.uncertainty.get(name)
+        rows.append((f"{name} [{unit}]", f"{factor * value:.3g}", "-" if known is None else f"{factor * known:.3g}"))
+    return rows
+
+
+def design_controller(
+    vehicle: Vehicle,
+    *,
+    method: Method = "lqg",
+    sensors: str = USUAL_SENSORS,
+    holding: Holding = "place",
+    speeds: Sequence[float] = (0.0,),
+    rate: float = 100.0,
+    delays: Mapping[str, float] | float | None = None,
+    computation: float | None = None,
+    allowed: Mapping[str, float] | None = None,
+    effort: Mapping[str, float] | float | None = None,
+    Q: Array | Sequence[float] | None = None,
+    R: Array | Sequence[float] | None = None,
+    gain: Gain = "flying",
+    voltage: float | None = None,
+) -> ControllerDesign:
+    """Design a linear-quadratic controller with integral action.
+
+    Args:
+        vehicle: the model, published or identified.
+        method: "lqg" with an observer on sensors, "lqr" fed with the states.
+        sensors: KIND@RATE+DELAYms, by commas; see `swashplate.filtering.sensor_suite.suite`.
+        gain: of the observer: "flying", found as it flies, or "steady", constant.
+        holding, speeds, rate, delays, computation, allowed, effort, Q, R, voltage: see
+            `swashplate.control.lqg.design.design`.
+
+    Raises:
+        ControllerError: what cannot be seen, held or reached, with the direction; TrimError for a speed that cannot be
+            flown.
+    """
+    if method not in ("lqg", "lqr") or gain not in ("flying", "steady"):
+        raise ControllerError(f"method {method!r}, gain {gain!r}: expected lqg or lqr, flying or steady.")
+    made = design(
+        vehicle,
+        sensors=() if method == "lqr" else suite(sensors),
+        rate=rate,
+        delays=delays,
+        computation=computation,
+        holding=holding,
+        speeds=speeds,
+        allowed=allowed,
+        effort=effort,
+        Q=Q,
+        R=R,
+        voltage=voltage,
+    )
+    where = str(vehicle.card.path or vehicle.name)
+    found = [analyse(made, at=i, where=where) for i in range(len(speeds))]
+    if gain == "steady":
+        made = with_steady_gain(made)
+        kept = dict(zip(made.plan.names, map(float, steady_sigmas(made)), strict=True))
+        found = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in found]
+    took = "not known, one sample is left for it" if computation is None else f"{1e3 * computation:g} ms"
+    late = f"{lateness(vehicle, None, given=delays)}; computation: {took}"
+    return ControllerDesign(made, tuple(found), tuple(speeds), late)

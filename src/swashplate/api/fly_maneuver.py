@@ -1,0 +1,176 @@
+"""The verb `fly_maneuver`: a maneuver flown by a vehicle, as a flight like any other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from swashplate.api.controllers import flown_by
+from swashplate.control.laws.hold import hover_hold
+from swashplate.control.laws.state_hold import state_hold
+from swashplate.errors import SwashError
+from swashplate.flights.csv_export import write_csv
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.models.delays import input_delays
+from swashplate.models.doubts import doubts_along
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.flight_page import compose_flight
+from swashplate.reporting.structure import Report
+from swashplate.simulation.closed_loop import Controller, simulate_maneuver
+from swashplate.simulation.sensors import QUIET, Sensors, observe
+from swashplate.simulation.trim import Trim
+
+SensorSet = Literal["none", "clean", "real"]
+_HELD = 0.02  # share of a flight that an input may stand at a limit before that is said
+_WIND = ("wind_north", "wind_east", "wind_down")
+
+
+@dataclass(frozen=True, repr=False)
+class SimulatedFlight:
+    """A maneuver that was flown.
+
+    Attributes:
+        vehicle, maneuver: what flew what.
+        truth: states and inputs as they were.
+        flight: as sensors saw it; the truth where there were none.
+        remarks: where it may not be believed.
+    """
+
+    vehicle: Vehicle
+    maneuver: str
+    truth: Flight
+    flight: Flight
+    remarks: tuple[str, ...] = ()
+
+    def to_document(self) -> dict[str, Any]:
+        """Every state and input at the start, at the end, and how far it went [SI units]."""
+        channels = (*self.vehicle.state_names, *self.vehicle.input_names)
+        units = (*self.vehicle.state_units, *self.vehicle.input_units)
+        columns = {channel: self.truth.values(channel) for channel in channels}
+        return {
+            "vehicle": self.vehicle.name,
+            "maneuver": self.maneuver,
+            "duration": self.truth.duration,
+            "rate": round(self.truth.rate(channels[0]), 9),
+            "channels": {
+                channel: {
+                    "unit": unit,
+                    "start": columns[channel][0],
+                    "end": columns[channel][-1],
+                    "least": columns[channel].min(),
+                    "greatest": columns[channel].max(),
+                }
+                for channel, unit in zip(channels, units, strict=True)
+            },
+            "remarks": list(self.remarks),
+        }
+
+    def save(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the flight: .nc (nothing lost) or .csv."""
+        return save_flight(self.flight, path)
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes."""
+        return compose_flight(self.vehicle, self.truth, remarks=self.remarks, title=title)
+
+    def __repr__(self) -> str:
+        return repr(self.flight)
+
+
+def save_flight(flight: Flight, path: str | Path) -> tuple[Path, ...]:
+    """Write a flight by its suffix.
+
+    Raises:
+        SwashError: for another suffix than .nc or .csv, or a place that cannot be written to.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".nc":
+        return (flight.save(path),)
+    if suffix == ".csv":
+        return write_csv(flight, Path(path))
+    raise SwashError(f"ends in '{Path(path).suffix}', expected .nc or .csv.", where=path)
+
+
+def fly_maneuver(
+    vehicle: Vehicle,
+    maneuver: Maneuver | str,
+    *,
+    controller: Controller | str | Path | None = None,
+    pilot: bool = False,
+    sensors: SensorSet = "none",
+    voltage: float | None = None,
+    sag: float = 0.0,
+    speed: float = 0.0,
+    rate: float = 100.0,
+    wind: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> SimulatedFlight:
+    """Fly a maneuver from hover or steady flight under a controller.
+
+    Args:
+        vehicle: what flies.
+        maneuver: one, or its description, e.g. "sweep:pitch,0.5-8Hz,60s".
+        controller: one, or its file; the hold of the vehicle's kind where not given.
+        pilot: roll and pitch are a pilot's commands to the controller.
+        sensors: "none" for the true states, motion capture with noise only ("clean"), or with gaps and outliers.
+        voltage: the battery's at the start [V]; the card's nominal one where not given.
+        sag: its fall [V/s].
+        speed: ahead, that the maneuver begins at [m/s].
+        rate: samples per second [Hz].
+        wind: "wind_north", "wind_east", "wind_down" [m/s].
+        seed: of all that is random.
+
+    Raises:
+        ControllerError: where the controller is for another vehicle.
+        DivergenceError: where the flight was lost, with the flight up to there.
+    """
+    if pilot and controller is None:
+        raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
+    coaxial = vehicle.traits.coaxial
+    remarks = []
+    if controller is None and coaxial and any(input_delays(vehicle).values()):
+        remarks.append("The hover hold acts at once; identified delays are left out.")
+
+    def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if controller is not None:
+            return flown_by(controller, vehicle, trim, seed=seed)[0]
+        return hover_hold(vehicle, trim) if coaxial else state_hold(vehicle, trim)
+
+    truth = simulate_maneuver(
+        vehicle,
+        maneuver,
+        controller=make,
+        pilot=pilot,
+        speed=speed,
+        voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage,
+        sag=sag,
+        rate=rate,
+        wind=wind,
+    )
+    remarks += [f"{words}." for words in _doubts(vehicle, truth)] + _at_limits(vehicle, truth)
+    seen = truth
+    if sensors != "none":
+        seen = observe(truth, vehicle, sensors=QUIET if sensors == "clean" else Sensors(), seed=seed)
+    return SimulatedFlight(vehicle, str(maneuver), truth, seen, tuple(remarks))
+
+
+def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
+    """Where a simulated flight leaves what its equations hold for."""
+    rows = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
+    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), *rows)
+
+
+def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:
+    """Inputs that stood at a limit: what they were told beyond it was not flown."""
+    found = []
+    for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True):
+        if name in dict(vehicle.trim_held) or name not in flight:
+            continue
+        values = flight.values(name)
+        share = float(((values <= low) | (values >= high)).mean())
+        if share > _HELD:
+            found.append(f"{name} stands at its limit for {100.0 * share:.0f} % of the time; fly a smaller amplitude.")
+    return found

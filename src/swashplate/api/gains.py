@@ -1,0 +1,33 @@
+"""Autopilot gains from identified models."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from swashplate.control.analysis import ardupilot_gains
+from swashplate.control.analysis.ardupilot_gains import Suggestion
+from swashplate.errors import SwashError
+from swashplate.identification.frequency.reading_accuracy import Fitted
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+
+
+def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion, ...]:
+    """ArduPilot rate-loop gains for every axis of a fit, beside those that the log flew with, with margins of both.
+
+    Args:
+        fit: of transfer functions or of a state-space model.
+        responses: that it was fitted to; they remember their logs' channels and parameters.
+
+    Raises:
+        SwashError: no axis joins a rate with its mixer command.
+    """
+    settings: dict[str, Any] = dict(responses.settings)
+    found = ardupilot_gains.suggest_gains(fit, autopilot=settings.get("autopilot"), sources=settings.get("channels"))
+    if not found:
+        pairs = ", ".join(f"{rate} with {command}" for rate, command in ardupilot_gains.AXES.values())
+        raise SwashError(
+            f"the model joins no rate with its mixer command ({pairs}).",
+            channel="--gains",
+            hint="Name the log's own channels in `swash respond`, for example --inputs mixer_yaw --outputs r.",
+        )
+    return found

@@ -1,0 +1,124 @@
+"""Flying a model, or looking at a logged flight, in the browser."""
+
+from __future__ import annotations
+
+import webbrowser
+from collections.abc import Callable
+from importlib import util
+from pathlib import Path
+
+from swashplate.control.controller_file import read_controller
+from swashplate.control.kinds import kind_of
+from swashplate.control.laws.autopilot import Autopilot
+from swashplate.errors import ControllerError, SwashError
+from swashplate.links.live.replay import Replay, as_json
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
+
+
+def _silent(_: str) -> None:
+    """Says nothing."""
+
+
+def live(
+    vehicle: Vehicle,
+    *,
+    controller: Autopilot | str | Path | None = None,
+    folder: str | Path = "live",
+    host: str = "127.0.0.1",
+    port: int = 8017,
+    allow_remote: bool = False,
+    open_page: bool = False,
+    say: Callable[[str], None] = _silent,
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Fly a model in the browser by gamepad, keyboard or touch, until it is interrupted.
+
+    Args:
+        vehicle: what flies.
+        controller: an autopilot, or its file (`swash decouple`).
+        folder: for recordings and reports; made with the first one.
+        host, port: where the page is; port 0 takes any free one.
+        allow_remote: let other machines open the page and fly.
+        open_page: open it in the browser.
+        say: told what is being done.
+        ready: told the page's address when it can be opened.
+
+    Raises:
+        SwashError: where the extra `live` is missing, the address is taken, or the controller needs other sensors.
+    """
+    need_live_extra()
+    from swashplate.links.live import server
+    from swashplate.links.live.session import LiveSession
+
+    place = Path(folder)
+    if place.exists() and not place.is_dir():
+        raise SwashError("is a file, expected a folder.", where=place, channel="--out")
+    enable_compilation_cache()
+    dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
+    chosen = controller if controller is None or isinstance(controller, Autopilot) else _autopilot(controller)
+    server.check_page()
+    with server.listen(host, port, allow_remote=allow_remote) as listening:
+        say("preparing (compiling takes longest the first time)")
+        session = LiveSession(vehicle, controller=chosen, folder=place)
+        session.clock.start()
+        try:
+            _announce(server.address_of(listening), open_page=open_page, ready=ready, say=say)
+            server.serve(server.live_app(session, remote=allow_remote), listening)
+        finally:
+            session.close()
+
+
+def show_replay(
+    shown: Replay | Callable[[], Replay],
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8018,
+    allow_remote: bool = False,
+    open_page: bool = False,
+    say: Callable[[str], None] = _silent,
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Scrub through a flight in the browser until it is interrupted.
+
+    Args:
+        shown: what `sp.replay` made, or a function that makes it once the address is held.
+        host, port, allow_remote, open_page, say, ready: as of `live`.
+
+    Raises:
+        SwashError: where the extra `live` is missing, or the address is taken.
+    """
+    need_live_extra()
+    from swashplate.links.live import server
+
+    with server.listen(host, port, allow_remote=allow_remote) as listening:
+        made = shown if isinstance(shown, Replay) else shown()
+        server.check_page()
+        _announce(server.address_of(listening), open_page=open_page, ready=ready, say=say)
+        server.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
+
+
+def _announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+    ready(address)
+    if open_page and not webbrowser.open(address):
+        say(f"No browser was found; open {address} yourself.")
+
+
+def _autopilot(file: str | Path) -> Autopilot:
+    read = read_controller(file)
+    try:
+        made: Autopilot = kind_of(read).for_sticks(read)
+    except ControllerError as error:
+        raise SwashError(error.problem, where=file, channel="--controller", hint=error.hint) from None
+    return made
+
+
+def need_live_extra() -> None:
+    """That the libraries of the extra `live` are there.
+
+    Raises:
+        SwashError: saying how to install them.
+    """
+    missing = [name for name in ("starlette", "uvicorn", "websockets") if util.find_spec(name) is None]
+    if missing:
+        raise SwashError(f"needs {', '.join(missing)}.", hint="Install them with: pip install swashplate[live]")

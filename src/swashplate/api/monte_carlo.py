@@ -1,0 +1,269 @@
+"""The verb `monte_carlo`: one controller on many aircraft in many gusts, and the worst flight kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swashplate.api.controllers import flown_by
+from swashplate.api.fly_maneuver import save_flight
+from swashplate.arrays import Array
+from swashplate.control.draws.linear_draws import bounds_of, entries_of, vary_parameters
+from swashplate.control.draws.robustness import SENSOR_NOISE, draw_models
+from swashplate.control.draws.spread import Limits, Spread, spread
+from swashplate.control.draws.variations import draw_delays, draw_numbers, load_them, tolerances_of
+from swashplate.control.kinds import kind_of
+from swashplate.control.lateness import lateness
+from swashplate.errors import DivergenceError, SwashError
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.flights.maneuvers.series import parse as parse_maneuver
+from swashplate.identification.core.result import Result
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.monte_carlo import compose_monte_carlo
+from swashplate.reporting.structure import Report
+from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.trim import trim
+from swashplate.simulation.wind import Gusts, dryden
+
+_LEAD, _TAIL = 3.0, 3.0  # s of hover before and after, as `simulate_maneuver` has them
+_PHYSICS = 500.0  # Hz at least
+_KEPT = 20.0  # Hz of the samples that the summary sees
+
+
+@dataclass(frozen=True, repr=False)
+class MonteCarlo:
+    """Many flights of one controller.
+
+    Attributes:
+        vehicle, controller: what flew, and what it is called.
+        spread: what they did, and which were lost.
+        worst: the flight with the number `spread.worst`, up to where it diverged.
+        drawn: numbers of the aircraft that differ, by name, shape (flights,).
+        late: how late commands were, in words.
+        remarks: what may surprise.
+    """
+
+    vehicle: Vehicle
+    controller: str
+    spread: Spread
+    worst: Flight
+    drawn: Mapping[str, Array]
+    late: str
+    remarks: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def lost(self) -> int:
+        """Flights that were beyond a limit or diverged."""
+        return self.spread.lost
+
+    def save(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the worst flight: .nc (nothing lost) or .csv."""
+        return save_flight(self.worst, path)
+
+    def to_document(self) -> dict[str, Any]:
+        """The summary as what becomes JSON."""
+        return {
+            "kind": "monte-carlo",
+            "vehicle": self.vehicle.name,
+            "model": self.vehicle.card.title,
+            "controller": self.controller,
+            "late": self.late,
+            "settings": dict(self.settings),
+            **self.spread.to_document(),
+            "worst_drawn": {name: float(values[self.spread.worst]) for name, values in self.drawn.items()},
+            "remarks": list(self.remarks),
+        }
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes: the distribution and the worst flight."""
+        return compose_monte_carlo(
+            self.vehicle,
+            self.spread,
+            self.worst,
+            title=title or f"{self.spread.flights} flights of {self.controller} on {self.vehicle.name}",
+            late=self.late,
+            drawn={name: float(values[self.spread.worst]) for name, values in self.drawn.items()},
+            remarks=self.remarks,
+        )
+
+    def __repr__(self) -> str:
+        careful = [f"Careful: {words}" for words in self.remarks]
+        return "\n".join((f"late: {self.late}", *careful, repr(self.spread)))
+
+
+def monte_carlo(
+    vehicle: Vehicle,
+    controller: Controller | str | Path,
+    *,
+    maneuver: Maneuver | str,
+    count: int = 100,
+    fit: Result[Any, Any] | str | Path | None = None,
+    gusts: Gusts | None = None,
+    voltage: float | None = None,
+    sag: float = 0.0,
+    battery: tuple[float, float] | None = None,
+    tolerances: bool = False,
+    vary: Mapping[str, float | str] | None = None,
+    payload: float = 0.0,
+    delay: float = 0.0,
+    limits: Limits | None = None,
+    seed: int = 0,
+) -> MonteCarlo:
+    """Fly one controller on many aircraft.
+
+    Args:
+        vehicle: the model; of a linear one the parameters of its structure are drawn.
+        controller: one, or its file.
+        maneuver: a pilot's commands, only roll and pitch; of a controller that takes none, added to its inputs.
+        count: how many flights.
+        fit: what an identification found, or its file; aircraft are drawn from its covariance.
+        gusts: turbulence, `swashplate.simulation.wind.INDOOR` or `outdoor(...)`; None for still air.
+        voltage, sag: the battery's at the start [V], the card's nominal one where not given, and its fall [V/s].
+        battery: instead of both, its voltage at the start and at the end [V].
+        tolerances: draw the card's numbers from their sigmas too.
+        vary: standard deviations of the card's numbers by name, in their units or as "5%".
+        payload: the most that an aircraft carries [kg].
+        delay: the longest further delay of the commands to the actuators [s]; identified ones are flown anyhow.
+        limits: beyond which a flight is lost.
+        seed: of draws, gusts and sensor noise; every source has its own from it.
+
+    Raises:
+        SwashError: what the model has no equation for, a maneuver that the controller cannot be told.
+        ControllerError: a controller for another vehicle, a file that is none, a number that the card does not have.
+    """
+    excitation = parse_maneuver(maneuver) if isinstance(maneuver, str) else maneuver
+    if battery is not None and not 0.0 < battery[1] <= battery[0]:
+        raise SwashError(f"'{battery[0]:g}-{battery[1]:g}' does not fall.", channel="battery")
+    model = vehicle.structure
+    if model is not None:
+        _only_what_is_linear(model, gusts=gusts is not None, payload=payload > 0.0, battery=bool(battery or sag))
+    draws = _linear_draws if model is not None else _draws
+    drawn = draws(model or vehicle, fit, count=count, seed=seed, tolerances=tolerances, vary=vary, payload=payload)
+    nominal = vehicle.card.values().get("voltage_nominal") if voltage is None else voltage
+    hover = trim(vehicle, voltage=nominal if battery is None else battery[0])
+    pilot, name = flown_by(controller, vehicle, hover, seed=seed)
+    kind = kind_of(pilot)
+    strange = [axis for axis in excitation.axes if kind.takes_stick and axis not in ("roll", "pitch")]
+    if strange:
+        raise SwashError(
+            f"moves {', '.join(strange)}; with many flights a maneuver is a pilot's roll or pitch.",
+            channel="maneuver",
+        )
+    further = f", and up to {1e3 * delay:g} ms more" if delay else ""
+    duration = _LEAD + excitation.duration + _TAIL
+    samples = round(duration * pilot.rate)
+    time = np.arange(samples) / pilot.rate
+    fall = sag if battery is None else (battery[0] - battery[1]) / duration
+    late = draw_delays(most=delay, count=count, seed=seed + 3_000_003)
+    blowing = None if gusts is None else dryden(gusts, samples=samples, rate=pilot.rate, seed=seed, count=count)
+    flown = simulate_closed_loops(
+        vehicle,
+        pilot,
+        duration=duration,
+        size=count,
+        parameters=drawn or None,
+        reference=excitation.signals(time - _LEAD) if kind.takes_stick else None,
+        excitation=None if kind.takes_stick else excitation.offsets(time - _LEAD, inputs=vehicle.input_names),
+        wind=blowing,
+        voltage=float(hover.environment.voltage) - fall * time,
+        noise=None if kind.own_sensors else SENSOR_NOISE,
+        delay=late,
+        seed=seed,
+        start=hover,
+        rate=pilot.rate * max(1, round(_PHYSICS / pilot.rate)),
+        keep=max(1, round(pilot.rate / _KEPT)),
+    )
+    found = spread(flown, hover, limits=limits)
+    try:
+        worst = flown.flight(found.worst)
+    except DivergenceError as error:
+        if error.flight is None:
+            raise
+        worst = error.flight  # type: ignore[assignment]
+    own = {name: float(values[found.worst]) for name, values in drawn.items()}
+    remarks = () if kind.takes_stick else (_NO_STICK,)
+    worst = worst.done("drawn", seed=seed, number=found.worst, delay=float(late[found.worst]), parameters=own)
+    settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall}
+    told = lateness(vehicle, pilot, given=None) + further
+    return MonteCarlo(vehicle, name, found, worst, drawn, told, remarks, settings)
+
+
+_NO_STICK = "this controller takes no pilot's command; the maneuver moves its inputs."
+
+
+def _draws(
+    vehicle: Any,
+    fit: Result[Any, Any] | str | Path | None,
+    *,
+    count: int,
+    seed: int,
+    tolerances: bool,
+    vary: Mapping[str, float | str] | None,
+    payload: float,
+) -> dict[str, Array]:
+    """Numbers of the card of every aircraft, those that differ. Every source of randomness has its own seed, so that
+    adding one leaves the others as they were."""
+    drawn = {} if fit is None else draw_models(vehicle, fit, count=count, seed=seed)
+    known = tolerances_of(vehicle) if tolerances else {}
+    sigmas = {name: value for name, value in known.items() if name not in drawn}
+    sigmas |= _varied({name: p.value for name, p in vehicle.card.parameters.items()}, vary)
+    drawn = draw_numbers(vehicle, sigmas, count=count, seed=seed + 1_000_003, about=drawn)
+    if payload:
+        drawn = load_them(vehicle, drawn, most=payload, count=count, seed=seed + 2_000_003)
+    return drawn
+
+
+def _linear_draws(
+    model: Any,
+    fit: Result[Any, Any] | str | Path | None,
+    *,
+    count: int,
+    seed: int,
+    tolerances: bool,
+    vary: Mapping[str, float | str] | None,
+    payload: float,
+) -> dict[str, Array]:
+    """Entries of A and B of every aircraft."""
+    del payload
+    drawn = {} if fit is None else draw_models(model, fit, count=count, seed=seed)
+    known = bounds_of(model) if tolerances else {}
+    sigmas = {name: value for name, value in known.items() if name not in drawn}
+    sigmas |= _varied({name: p.value for name, p in model.parameters.items()}, vary)
+    drawn = vary_parameters(model, sigmas, count=count, seed=seed + 1_000_003, about=drawn)
+    return entries_of(model, drawn, count=count) if drawn else {}
+
+
+def _only_what_is_linear(model: StateSpaceModel, **asked: bool) -> None:
+    """Refuse what a linear model has no equation for; it would be flown as if nothing had been said."""
+    absent = [f"--{name}" for name, wanted in asked.items() if wanted]
+    if absent:
+        raise SwashError(
+            "a linear model has no equations for wind, mass or battery.",
+            where=model.name,
+            channel=", ".join(absent),
+            hint="Vary its parameters (--vary Xu=10%, --fit, --tolerances), or fly the nonlinear vehicle.",
+        )
+
+
+def _varied(values: Mapping[str, float], wanted: Mapping[str, float | str] | None) -> dict[str, float]:
+    """Sigmas in the parameters' units, of numbers or of texts such as "5%"."""
+    found = {}
+    for name, given in (wanted or {}).items():
+        if not isinstance(given, str):
+            found[name] = float(given)
+            continue
+        try:
+            number = float(given.removesuffix("%"))
+        except ValueError:
+            raise SwashError(f"{name} varies by '{given}', expected a number or 5%.", channel="vary") from None
+        share = name in values and given.endswith("%")
+        found[name] = abs(values[name]) * number / 100.0 if share else number
+    return found

@@ -1,0 +1,272 @@
+"""A folder of bench records becomes a parameter card: every procedure's numbers with their joint covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.bench import (
+    bar_linkage,
+    bar_motion,
+    bar_orientation,
+    drive_frequency,
+    drive_steps,
+    fuselage_drag,
+    phase_lag,
+    servo_steps,
+    single_rotor,
+    speed_map,
+    supply,
+    supply_compensated,
+    swashplate,
+    thrust,
+    thrust_loss,
+)
+from swashplate.bench.joint import Joint
+from swashplate.bench.record import BenchRecord
+from swashplate.bench.refusals import (
+    refuse_exchanged,
+    refuse_out_of_range,
+    refuse_saturated,
+    refuse_stalled,
+)
+from swashplate.bench.result import BenchCheck, BenchResult
+from swashplate.bench.virtual_bench import RecordSchedule
+from swashplate.errors import BenchError
+from swashplate.identification.core.result import Estimate, Result, correlation_of
+from swashplate.identification.core.sources import Source
+from swashplate.models.card import Card
+from swashplate.models.vehicle import Vehicle
+
+_MODULES: tuple[ModuleType, ...] = (
+    supply,
+    supply_compensated,
+    speed_map,
+    thrust,
+    single_rotor,
+    drive_steps,
+    drive_frequency,
+    phase_lag,
+    swashplate,
+    servo_steps,
+    bar_linkage,
+    bar_motion,
+    bar_orientation,
+    fuselage_drag,
+    thrust_loss,
+)
+PROCEDURES: Mapping[str, ModuleType] = {module.NAME: module for module in _MODULES}
+"""Every procedure, in an order in which each finds what it takes as known already measured."""
+
+_IN_TIME = (drive_steps, drive_frequency, servo_steps, bar_motion)
+"""Procedures that need samples at a fixed rate."""
+
+MEASURED = (
+    "k_drive_voltage",
+    *(f"{k}_drive_{rotor}" for rotor in ("upper", "lower") for k in ("k", "o")),
+    *thrust.NAMES,
+    "tau_drive_upper",
+    "tau_drive_lower",
+    "k_zeta_lower",
+    "linkage_lower",
+    "hub_stiffness_lower",
+    "tau_f_lower",
+    "linkage_upper",
+    "hub_stiffness_upper",
+    "tau_f_upper",
+    "drag_x",
+    "drag_y",
+)
+"""Every parameter that the bench can measure."""
+
+_WORTH_KEEPING = 1e-4
+"""Smaller correlations are not written to the card."""
+
+
+@dataclass(frozen=True)
+class BenchDetails:
+    """What the bench adds to a result.
+
+    Attributes:
+        results: of each procedure that has records, in the order of `PROCEDURES`.
+        kept: parameters that the bench could measure and that no record was there for.
+        disagreements: where two procedures measure the same parameter, in words.
+    """
+
+    kind: ClassVar[str] = "bench"
+    results: tuple[BenchResult, ...]
+    kept: tuple[str, ...]
+    disagreements: tuple[BenchCheck, ...] = ()
+
+
+Bench = Result[Vehicle, BenchDetails]
+"""What `evaluate` returns: the vehicle with the measured card, and the joint covariance of what was measured."""
+
+
+def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+    """The records of the whole bench before they are measured.
+
+    Args:
+        hover: `motor_lower` and `motor_upper` at hover.
+    """
+    made: list[RecordSchedule] = []
+    for module in _MODULES:
+        planned: Callable[[Mapping[str, float]], list[RecordSchedule]] | None = getattr(module, "schedules", None)
+        if planned is not None:
+            made += planned(hover)
+    return made
+
+
+def hover_commands(card: Mapping[str, float], gravity: float = 9.81) -> dict[str, float]:
+    """Motor commands that carry the card's mass without yawing at the nominal voltage (thrust and torque balance)."""
+    ratio = card["k_torque_lower"] / card["k_torque_upper"]
+    lower = np.sqrt(card["mass"] * gravity / (card["k_thrust_lower"] + card["k_thrust_upper"] * ratio))
+    speeds = {"lower": float(lower), "upper": float(lower * np.sqrt(ratio))}
+    return {
+        f"motor_{rotor}": round((speed - card[f"o_drive_{rotor}"]) / card[f"k_drive_{rotor}"], 4)
+        for rotor, speed in speeds.items()
+    }
+
+
+def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
+    """Every procedure that has records, and the card that follows.
+
+    Args:
+        records: in any order.
+        vehicle: whose published card holds what the bench does not measure.
+
+    Raises:
+        BenchError: for a record that no procedure knows, lacks a column, or contradicts what it measures: a saturated
+            sensor, a motor that did not reach its speed, signs that physics forbids, too few points.
+    """
+    published = vehicle.card
+    by_procedure = _sorted(records)
+    for record in records:
+        refuse_out_of_range(record)
+        refuse_saturated(record)
+        refuse_stalled(record, published.values())
+        refuse_exchanged(record, published.values())
+    numbers, joint, results, disagreements = published.values(), Joint(published), [], []
+    for name, chosen in by_procedure.items():
+        try:
+            estimated = PROCEDURES[name].estimate(chosen, numbers)
+        except np.linalg.LinAlgError:
+            raise BenchError(
+                f"{name} cannot tell its numbers from these records: something that has to be varied stood still.",
+                where=", ".join(record.name for record in chosen),
+                hint="`swash bench plan` says what to vary.",
+            ) from None
+        result, told = joint.add(estimated)
+        results.append(result)
+        disagreements += told
+        numbers = {**numbers, **joint.values}
+    card, covariance = _card(published, joint, results), joint.among(joint.measured)
+    doubts = [check.words for result in results for check in (*result.checks, *disagreements) if not check.good]
+    return Result(
+        method="bench",
+        model=vehicle.with_card(card),
+        start=vehicle,
+        estimates=tuple(
+            Estimate(
+                name,
+                card.parameters[name].unit,
+                published.parameters[name].value,
+                card.parameters[name].value,
+                sigma=float(np.sqrt(covariance[i, i])),
+            )
+            for i, name in enumerate(joint.measured)
+        ),
+        names=joint.measured,
+        covariance=covariance,
+        covariance_corrected=np.full_like(covariance, np.nan),
+        correlation=correlation_of(covariance),
+        details=BenchDetails(
+            tuple(results), tuple(name for name in MEASURED if name not in joint.measured), tuple(disagreements)
+        ),
+        warnings=tuple(dict.fromkeys(doubts)),
+        data=tuple(Source(record.name) for record in records),
+    )
+
+
+def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
+    """Records by procedure, in the order of `PROCEDURES`; columns are checked."""
+    found: dict[str, list[BenchRecord]] = {}
+    for record in records:
+        for name in record.procedures:
+            if name not in PROCEDURES:
+                raise BenchError(
+                    f"procedure '{name}' is not known; known are {', '.join(PROCEDURES)}.",
+                    where=record.name,
+                    hint="Correct the line '# procedure:' of its header.",
+                )
+            if PROCEDURES[name] in _IN_TIME:
+                _ = record.dt  # says that a table of points does not do
+            for column in PROCEDURES[name].COLUMNS:
+                _ = record[column]  # says what is missing
+            found.setdefault(name, []).append(record)
+    return {name: found[name] for name in PROCEDURES if name in found}
+
+
+def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card:
+    """The published card with what was measured."""
+    card = published
+    sigma = dict(zip(joint.names, np.sqrt(np.diag(joint.covariance)), strict=True))
+    for name in joint.measured:
+        sources = joint.sources[name]
+        files = ", ".join(
+            dict.fromkeys(file for result in sources for file in result.records_of.get(name, result.records))
+        )
+        how = ", ".join(result.procedure for result in sources)
+        _refuse_impossible(published, name, joint.values[name], files)
+        card = card.with_values(
+            {name: joint.values[name]},
+            status="measured",
+            sigma=float(sigma[name]),
+            source=f"bench: {how} from {files}",
+        )
+    if "k_zeta_lower" in joint.measured:  # both rotors alike (Fankhauser et al., sec. IV-A3)
+        value = card.parameters["k_zeta_lower"]
+        card = card.with_values(
+            {"k_zeta_upper": value.value}, status="derived", sigma=value.sigma, source="derived: k_zeta_lower"
+        )
+    for name in set(MEASURED) - set(joint.measured):
+        entry = card.parameters[name]
+        note = "; ".join(filter(None, (entry.note, "kept as published: the bench has no record of it")))
+        card = replace(card, parameters={**card.parameters, name: replace(entry, note=note)})
+    done = ", ".join(result.procedure for result in results)
+    return replace(
+        card,
+        title=f"{published.title}; measured on the bench: {done}",
+        correlations=_correlations(joint.names, joint.covariance),
+        path="",
+    )
+
+
+def _refuse_impossible(card: Card, name: str, value: float, files: str) -> None:
+    entry = card.parameters[name]
+    low = -np.inf if entry.lower is None else entry.lower
+    high = np.inf if entry.upper is None else entry.upper
+    if not low <= value <= high:
+        raise BenchError(
+            f"comes out as {value:.4g} {entry.unit}; physics allows {low:g} to {high:g}.",
+            where=files,
+            channel=name,
+            hint="Check signs, units and axes of the record.",
+        )
+
+
+def _correlations(names: Sequence[str], covariance: Array) -> dict[str, dict[str, float]]:
+    """Correlations worth keeping, by the first and the second name."""
+    sigma = np.sqrt(np.diag(covariance))
+    made: dict[str, dict[str, float]] = {}
+    for i, first in enumerate(names):
+        for j in range(i + 1, len(names)):
+            value = float(covariance[i, j] / (sigma[i] * sigma[j]))
+            if abs(value) > _WORTH_KEEPING:
+                made.setdefault(first, {})[names[j]] = round(value, 9)
+    return made

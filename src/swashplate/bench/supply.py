@@ -1,0 +1,111 @@
+"""Rotor speed against supply voltage at fixed commands.
+
+    Omega = k_d u + o_d + k_d,U (U - U_norm)                (Fankhauser et al., sec. IV-A7, eq. 22)
+
+The card has one factor for both rotors: it is their weighted mean, and how far the two are apart is told. What spoils
+it: the voltage at the plug instead of at the motors, and a battery that warms while it empties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy import stats
+
+from swashplate.arrays import Array
+from swashplate.bench.checks import check_settled, check_structure
+from swashplate.bench.record import BenchRecord
+from swashplate.bench.result import BenchCheck, BenchFinding, BenchResult, Curve
+from swashplate.bench.steady import SteadyLine, fit_line, steady_points
+from swashplate.bench.virtual_bench import RecordSchedule, points
+from swashplate.errors import BenchError
+
+NAME = "supply"
+TITLE = "Rotor speed against supply voltage"
+SOURCE = "Fankhauser et al., sec. IV-A7 and eq. 22"
+COLUMNS = ("point", "motor_lower", "motor_upper", "omega_lower", "omega_upper", "voltage")
+
+
+def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
+    """The supply from 10.5 to 12.5 V and back at hover's commands."""
+    levels = np.linspace(10.5, 12.5, 9)
+    settings = [{**hover, "voltage": float(v)} for v in (*levels, *levels[::-1])]
+    words = "commands of hover; supply 10.5 to 12.5 V in steps of 0.25 V and back"
+    return [points("supply", (NAME,), settings, settle=1.5, words=words)]
+
+
+def fit_supply(voltage: Array, speed: Array, *, where: str = "") -> SteadyLine:
+    """Slope [rad/s/V] and speed at the mean voltage [rad/s]."""
+    return fit_line([voltage - voltage.mean(), np.ones(voltage.size)], speed, where=where)
+
+
+def together(slopes: Sequence[float], sigmas: Sequence[float]) -> tuple[float, float, float]:
+    """Weighted mean of both rotors' slopes, its standard deviation and how many sigmas they are apart.
+
+    Where they are apart by more than chance allows (1 %), the bound grows by the scale factor of the Particle Data
+    Group (2022, sec. 5.2.2): one number cannot be better than the difference of what it stands for.
+    """
+    weights = np.array(sigmas) ** -2.0
+    mean = float(weights @ slopes / weights.sum())
+    square = float(np.sum(weights * (np.array(slopes) - mean) ** 2))
+    wider = square / (len(slopes) - 1) if stats.chi2.sf(square, len(slopes) - 1) < 0.01 else 1.0
+    return mean, float(np.sqrt(wider / weights.sum())), float((slopes[0] - slopes[1]) / np.hypot(sigmas[0], sigmas[1]))
+
+
+def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> BenchResult:
+    """`k_drive_voltage`.
+
+    Raises:
+        BenchError: where the commands change or the voltage hardly does.
+    """
+    slopes: list[float] = []
+    sigmas: list[float] = []
+    checks, curves, findings = [], [], []
+    for record in records:
+        found = steady_points(record, COLUMNS[1:])
+        moved = max(np.ptp(found["motor_lower"]), np.ptp(found["motor_upper"]))
+        if moved > 1e-3 or np.ptp(found["voltage"]) < 0.5:
+            raise BenchError(
+                f"motor commands move by {moved:.3g} and the supply by {np.ptp(found['voltage']):.2g} V.",
+                where=record.name,
+                hint="Hold the commands and vary the supply by a volt or more.",
+            )
+        for rotor in ("upper", "lower"):
+            speed = found[f"omega_{rotor}"]
+            line = fit_supply(found["voltage"], speed, where=record.name)
+            slopes.append(float(line.values[0]))
+            sigmas.append(float(np.sqrt(line.covariance[0, 0])))
+            findings.append(
+                BenchFinding(f"k_drive_voltage of the {rotor} rotor by itself", slopes[-1], sigmas[-1], "rad/s/V")
+            )
+            level = np.round(found["voltage"] * 8.0) / 8.0
+            checks += [
+                check_settled(found, f"omega_{rotor}"),
+                *check_structure(line, level, what=f"{rotor} rotor speed [rad/s]"),
+            ]
+            ends = np.array([found["voltage"].min(), found["voltage"].max()])
+            at = line.values[1] + line.values[0] * (ends - found["voltage"].mean())
+            curves.append(
+                Curve(f"Speed of the {rotor} rotor against the supply", "supply voltage [V]", "rotor speed [rad/s]",
+                      found["voltage"], speed, ends, at)
+            )  # fmt: skip
+    mean, sigma, apart = together(slopes, sigmas)
+    checks.append(
+        BenchCheck(
+            f"Upper and lower rotor give {slopes[0]:.2f} and {slopes[1]:.2f} rad/s/V, {apart:+.1f} sigmas apart.",
+            good=abs(apart) < 3.0,
+        )
+    )
+    return BenchResult(
+        NAME,
+        TITLE,
+        SOURCE,
+        ("k_drive_voltage",),
+        np.array([mean]),
+        np.array([[sigma**2]]),
+        tuple(record.name for record in records),
+        tuple(checks),
+        tuple(curves),
+        findings=tuple(findings),
+    )

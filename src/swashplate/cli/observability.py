@@ -1,0 +1,35 @@
+"""`swash control observability`: what a sensor suite can see of a vehicle, and what it cannot."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import conditions as given
+from swashplate.cli import controller_options as shared
+from swashplate.cli import options
+
+
+def observability(
+    model: shared.Model,
+    sensors: shared.Sensors = shared.USUAL_SENSORS,
+    speed: given.Speed = "0",
+    seconds: Annotated[float, typer.Option("--seconds", help="How long is watched [s].", min=0.1)] = 10.0,
+    rate: Annotated[float, typer.Option("--rate", help="Samples per second of the model [Hz].", min=1.0)] = 100.0,
+    voltage: shared.Voltage = None,
+    switched: given.Switch = None,
+    json: options.Json = False,
+) -> None:
+    """Say which directions of a vehicle's states a sensor suite cannot see, and how well the others are known."""
+    import swashplate as sp
+
+    found = sp.observability(
+        given.vehicle_of(model, None, switched),
+        sensors,
+        speeds=given.speeds(speed),
+        seconds=seconds,
+        rate=rate,
+        voltage=voltage,
+    )
+    shared.show(found, written=(), json=json, quiet=False)

@@ -1,0 +1,208 @@
+"""Margins of a loop from its frequency response: one input at a time, and all of them at once by disc margins.
+
+The multi-loop margin is the diagonally scaled upper bound of the structured singular value (Doyle 1982; Safonov 1982):
+it never promises more than there is. Disc margins as in Seiler, Packard and Gahinet, "An Introduction to Disk Margins",
+IEEE Control Systems Magazine (2020), balanced form.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import control
+import numpy as np
+import scipy.optimize
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.arrays import Array
+from swashplate.errors import ControllerError
+
+_REFINED = 8
+"""Frequencies about the peak at which the scaling is optimised; Perron's scaling, near the best, does elsewhere."""
+
+
+@dataclass(frozen=True)
+class DiscMargin:
+    """What a loop stands: every factor on it within a disc that contains one.
+
+    Attributes:
+        alpha: size of the disc, 0 (none) to 2.
+        frequency: where it is smallest [rad/s].
+        gain: the factor by which the gain may rise or fall, the phase unchanged.
+        phase: by how much the phase may turn, the gain unchanged [rad].
+    """
+
+    alpha: float
+    frequency: float
+
+    @property
+    def gain(self) -> float:
+        return (2.0 + self.alpha) / (2.0 - self.alpha) if self.alpha < 2.0 else float("inf")
+
+    @property
+    def phase(self) -> float:
+        return 2.0 * float(np.arctan(self.alpha / 2.0))
+
+
+@dataclass(frozen=True)
+class AxisMargins:
+    """One loop opened, the others closed.
+
+    Attributes:
+        name: of the input.
+        gain: the smallest factor that destabilises upwards (infinite where none does).
+        gain_down: the largest factor below one that does (0 where none does).
+        phase: the smallest lag that does [rad].
+        crossover: highest frequency at which the loop's gain is one [rad/s]; NaN where it never is.
+        disc: both at once.
+        sensitivity: largest |1 / (1 + L)|.
+        delay: the smallest further delay at this input that destabilises [s]; infinite where none does.
+    """
+
+    name: str
+    gain: float
+    gain_down: float
+    phase: float
+    crossover: float
+    disc: DiscMargin
+    sensitivity: float
+    delay: float
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins at the inputs: each axis alone, and all at once.
+
+    Attributes:
+        axes: one loop opened, the others closed.
+        together: disc of all loops.
+        delay: the smallest further delay of all inputs together that destabilises [s]; infinite where none does.
+    """
+
+    axes: tuple[AxisMargins, ...]
+    together: DiscMargin
+    delay: float
+
+    @property
+    def least_delay(self) -> float:
+        """The smallest of all delay margins, of single loops and of all together [s]."""
+        return min(self.delay, *(axis.delay for axis in self.axes))
+
+    def __repr__(self) -> str:
+        lines = [f"{'loop':<14}{'gain [dB]':>16}{'phase [deg]':>12}{'crossover [rad/s]':>19}"]
+        lines[0] += f"{'delay [ms]':>12}{'disc':>7}{'max |S|':>9}"
+        for a in self.axes:
+            with np.errstate(divide="ignore"):
+                down, up = 20.0 * np.log10([a.gain_down, a.gain])
+            lines.append(
+                f"{a.name:<14}{f'{down:.1f} to {up:+.1f}':>16}{np.degrees(a.phase):>12.0f}{a.crossover:>19.2f}"
+                f"{1e3 * a.delay:>12.0f}{a.disc.alpha:>7.2f}{a.sensitivity:>9.2f}"
+            )
+        t = self.together
+        lines.append(
+            f"all at once: gain +- {20.0 * np.log10(t.gain):.1f} dB, phase +- {np.degrees(t.phase):.0f} deg "
+            f"(disc {t.alpha:.2f} at {t.frequency:.2f} rad/s), delay {1e3 * self.delay:.0f} ms"
+        )
+        return "\n".join(lines)
+
+
+def margins(frequencies: ArrayLike, loop: ArrayLike, names: tuple[str, ...]) -> Margins:
+    """Margins from the loop's frequency response, for negative feedback and a stable closed loop.
+
+    Args:
+        frequencies: [rad/s], shape (n,), rising.
+        loop: L, shape (n, m, m), opened at the m inputs.
+        names: of the inputs.
+
+    Raises:
+        ControllerError: where the shapes do not belong together or a number is not finite.
+    """
+    w, L = np.asarray(frequencies, dtype=np.float64), np.asarray(loop, dtype=np.complex128)
+    m = len(names)
+    if L.shape != (w.size, m, m) or not np.all(np.isfinite(L)):
+        raise ControllerError(f"the loop has shape {L.shape}, expected finite numbers ({w.size}, {m}, {m}).")
+    S = np.linalg.inv(np.eye(m) + L)
+    half = S - 0.5 * np.eye(m)  # (S - T) / 2
+    axes = tuple(_axis(name, w, 1.0 / S[:, i, i] - 1.0, half[:, i, i]) for i, name in enumerate(names))
+    bounds = np.array([_scaled(M, _perron(M)) for M in half])
+    peak = int(np.argmax(bounds))
+    around = slice(max(peak - _REFINED // 2, 0), peak + _REFINED // 2 + 1)
+    for i in range(*around.indices(w.size)):
+        bounds[i] = _best_scaled(half[i])
+    # A neighbour that was not refined may now stand above the refined peak.
+    for i in np.flatnonzero(bounds > bounds[around].max()).tolist():
+        bounds[i] = _best_scaled(half[i])
+    worst = int(np.argmax(bounds))
+    together = DiscMargin(min(1.0 / float(bounds[worst]), 2.0), float(w[worst]))
+    return Margins(axes, together, float(np.min(crossing_delays(w, L), initial=np.inf)))
+
+
+def crossing_delays(frequencies: ArrayLike, loop: ArrayLike) -> Array:
+    """Delays of all opened inputs together at which an eigenvalue of L e^(-jwT) is -1 [s], ascending.
+
+    MacFarlane and Postlethwaite (1977); of one loop phase margin over crossover, at every crossover. Good below a fifth
+    of Nyquist's frequency, where a sampled loop with a delay is the loop times e^(-jwT).
+
+    Args:
+        frequencies: [rad/s], shape (n,), rising.
+        loop: shape (n, m, m).
+    """
+    w, values = np.asarray(frequencies, dtype=np.float64), np.linalg.eigvals(np.asarray(loop))
+    order = np.argsort(np.abs(values), axis=1)
+    values = np.take_along_axis(values, order, axis=1)
+    sizes = np.log(np.abs(values) + 1e-300)
+    turned = np.mod(np.pi + np.angle(values), 2.0 * np.pi)
+    found = []
+    for size, phase in zip(sizes.T, turned.T, strict=True):
+        for i in np.flatnonzero(np.diff(np.sign(size))):
+            share = size[i] / (size[i] - size[i + 1])
+            at = w[i] * (w[i + 1] / w[i]) ** share
+            ends = np.unwrap(phase[i : i + 2])
+            found.append(float(np.mod(ends[0] + share * (ends[1] - ends[0]), 2.0 * np.pi) / at))
+    return np.sort(np.array(found))
+
+
+def _axis(name: str, w: Array, loop: Any, half: Any) -> AxisMargins:
+    worst = int(np.argmax(np.abs(half)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of points at the edge of the grid
+        found: Any = control.stability_margins(control.frd(loop, w, smooth=True), returnall=True)
+    gains, phases, crossings = np.asarray(found[0]), np.asarray(found[1]), np.asarray(found[4])
+    up, down = gains[gains > 1.0], gains[(gains < 1.0) & (gains > 0.0)]
+    turned = np.abs((phases + 180.0) % 360.0 - 180.0)
+    return AxisMargins(
+        name,
+        gain=float(up.min()) if up.size else float("inf"),
+        gain_down=float(down.max()) if down.size else 0.0,
+        phase=float(np.radians(turned.min())) if turned.size else float("inf"),
+        crossover=float(crossings.max()) if crossings.size else float("nan"),
+        disc=DiscMargin(min(1.0 / float(np.abs(half[worst])), 2.0), float(w[worst])),
+        sensitivity=float(np.max(np.abs(1.0 / (1.0 + loop)))),
+        delay=float(np.min(crossing_delays(w, loop[:, None, None]), initial=np.inf)),
+    )
+
+
+def _perron(M: NDArray[np.complex128]) -> Array:
+    """log of the scaling that is best for |M|: the square root of its Perron vectors' ratio (Safonov 1982)."""
+    size = np.abs(M) + 1e-12 * np.abs(M).max()
+    vectors = []
+    for matrix in (size, size.T):
+        values, found = np.linalg.eig(matrix)
+        vectors.append(np.abs(found[:, int(np.argmax(values.real))]))
+    right, left = vectors
+    return np.asarray(0.5 * np.log(left / right), dtype=np.float64)
+
+
+def _scaled(M: NDArray[np.complex128], logs: Array) -> float:
+    """Largest singular value of D M D^-1."""
+    d = np.exp(logs - logs[-1])
+    return float(np.linalg.norm(d[:, None] * M / d, 2))
+
+
+def _best_scaled(M: NDArray[np.complex128]) -> float:
+    """The smallest over D found; a convex problem in log D."""
+    start = _perron(M)
+    best = scipy.optimize.minimize(lambda logs: _scaled(M, logs), start, method="Nelder-Mead", options={"xatol": 1e-4})
+    return min(_scaled(M, start), float(best.fun))

@@ -1,0 +1,177 @@
+"""A vehicle under a sampled controller, linearised about a trim: the loop's own map from one sample to the next.
+
+The controller's rate and its hold are in the map, so nothing is approximated by a delay. Terms such as u |u| have no
+slope at hover and no part in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import SwashError
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.discretisation import held_late, with_late_inputs
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.trim import Trim
+
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """Derivatives of x+ = f(x, command) and (command, m+) = g(x, m, reference), with n states and k memories.
+
+    Attributes:
+        states, inputs: names.
+        rate: of the controller [Hz].
+        by_state, by_input: of f, shapes (n, n) and (n, inputs).
+        command, memory: of g by (x, m), shapes (inputs, n + k) and (k, n + k).
+        command_reference, memory_reference: of g by the reference, shapes (inputs, 8) and (k, 8).
+        later: the same loop with further delays of the inputs [s], exact within a sample; None where it cannot tell.
+    """
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    rate: float
+    by_state: Array
+    by_input: Array
+    command: Array
+    memory: Array
+    command_reference: Array
+    memory_reference: Array
+    later: Callable[[Array], SampledLoop] | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def matrix(self) -> Array:
+        """The closed loop's map of (x, m), shape (n + k, n + k)."""
+        after = self.by_input @ self.command
+        after[:, : len(self.states)] += self.by_state
+        return np.concatenate([after, self.memory])
+
+    def answers(self, reference: str, state: str) -> bool:
+        """Whether a state moves when a reference does."""
+        seen = self.response(np.geomspace(0.1, 1.0, 3) * self.rate, reference, state)
+        return bool(np.max(np.abs(seen)) > _NOTHING)
+
+    def opened(self, frequencies: Array) -> Complex:
+        """The loop opened at the inputs, for negative feedback, shape (frequencies, inputs, inputs).
+
+        Args:
+            frequencies: [rad/s], shape (n,), below Nyquist's.
+        """
+        n = len(self.states)
+        k = self.memory.shape[0]
+        z = self._z(frequencies)
+        plant = np.linalg.solve(z * np.eye(n) - self.by_state, self.by_input.astype(complex))
+        inner = np.linalg.solve(z * np.eye(k) - self.memory[:, n:], self.memory[:, :n].astype(complex))
+        return np.asarray(-(self.command[:, :n] + self.command[:, n:] @ inner) @ plant, dtype=np.complex128)
+
+    def response(self, frequencies: Array, reference: str, state: str) -> Complex:
+        """A state's response to a reference with all loops closed, shape (frequencies,)."""
+        j = REFERENCES.index(reference)
+        return self._closed(frequencies, self.command_reference[:, j], self.memory_reference[:, j], state)
+
+    def sensitivity(self, frequencies: Array, state: str) -> Complex:
+        """What is left of a disturbance added to the measured state: (state + disturbance) / disturbance.
+
+        Args:
+            frequencies: [rad/s], shape (n,).
+            state: its name.
+        """
+        i = self.states.index(state)
+        return 1.0 + self._closed(frequencies, self.command[:, i], self.memory[:, i], state)
+
+    def _closed(self, frequencies: Array, command: Array, memory: Array, state: str) -> Complex:
+        drive = np.concatenate([self.by_input @ command, memory])
+        matrix = self.matrix
+        found = np.linalg.solve(self._z(frequencies) * np.eye(matrix.shape[0]) - matrix, drive[:, None].astype(complex))
+        return np.asarray(found[:, self.states.index(state), 0], dtype=np.complex128)
+
+    def _z(self, frequencies: Array) -> Complex:
+        return np.asarray(np.exp(1j * np.asarray(frequencies) / self.rate)[:, None, None], dtype=np.complex128)
+
+
+def sampled_loop(
+    vehicle: Vehicle,
+    controller: Controller,
+    trim: Trim,
+    *,
+    delays: Mapping[str, float] | float | None = None,
+) -> SampledLoop:
+    """The loop about a trim; commands that are on their way are states of the aircraft.
+
+    Args:
+        vehicle: what flies, which need not be what the controller was designed on.
+        controller: see `swashplate.simulation.closed_loop.Controller`.
+        trim: the hover or steady flight; the reference is its place and heading.
+        delays: from command to actuator [s]; see `swashplate.simulation.closed_loop.flown_delays`.
+
+    Raises:
+        SwashError: where the loop is not finite there.
+    """
+    enable_double_precision()
+    states = trim.states()
+    reference = np.array([states.get(name, 0.0) for name in REFERENCES])
+    felt = [0.0] * 3 if getattr(controller.step, "feels", False) else []  # an observer's; here the states are known
+    measured = np.array([*trim.state, *felt, trim.environment.voltage], dtype=np.float64)
+    inputs, *parts = (
+        np.asarray(part, dtype=np.float64)
+        for part in _decisions(
+            controller.step,
+            measured,
+            np.asarray(controller.memory, dtype=np.float64),
+            controller.gains,
+            reference,
+            np.array(vehicle.input_limits).T,
+            len(vehicle.state_names),
+        )
+    )
+    around = linearize(vehicle, replace(trim, inputs=inputs))
+    if not all(np.all(np.isfinite(part)) for part in (around.A, around.B, *parts)):
+        raise SwashError("the closed loop has no derivative at this hover.", where=vehicle.name)
+    late = flown_delays(vehicle, controller, delays=delays)
+
+    def made(further: Array) -> SampledLoop:
+        F, G, before, whole = held_late(around.A, around.B, 1.0 / controller.rate, (late + further).tolist())
+        F, G, added = with_late_inputs(F, G, whole, before)
+        n, more = len(vehicle.state_names), len(added)
+        command, memory = (np.hstack([d[:, :n], np.zeros((len(d), more)), d[:, n:]]) for d in parts[:2])
+        names = (*vehicle.state_names, *(f"{vehicle.input_names[j]} {ago} ago" for j, ago in added))
+        return SampledLoop(
+            names,
+            vehicle.input_names,
+            controller.rate,
+            F,
+            G,
+            command,
+            memory,
+            parts[2],
+            parts[3],
+            later=lambda extra: made(further + extra),
+        )
+
+    return made(np.zeros(len(late)))
+
+
+@partial(jax.jit, static_argnums=(0, 6), compiler_options=QUICK_TO_COMPILE)
+def _decisions(control: Step, measured: Any, memory: Any, gains: Any, reference: Any, limits: Any, n: int) -> Any:
+    """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
+
+    def deciding(both: Any, reference: Any) -> tuple[Any, Any]:
+        after, command = control(both[n:], 0.0, jnp.concatenate([both[:n], measured[n:]]), reference, gains)
+        return jnp.clip(command, limits[0], limits[1]), after
+
+    both = jnp.concatenate([measured[:n], memory])
+    (command, command_reference), (after, memory_reference) = jax.jacfwd(deciding, argnums=(0, 1))(both, reference)
+    return deciding(both, reference)[0], command, after, command_reference, memory_reference

@@ -1,0 +1,130 @@
+"""Kinds of controllers: what each can be asked beside its step, found by the `type` of its file.
+
+A controller itself is small (`swashplate.simulation.closed_loop.Controller`): a rate, a memory, gains, a step. Its kind
+knows how it becomes a file, how it is taken to another vehicle, which loop is judged, and how its step becomes C. A
+controller says its kind by an attribute `type`; one that says none is of the plain kind. Another package adds a kind by
+an entry point of the group `swashplate.controllers` that names an instance of a `ControllerKind`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
+from swashplate.control.analysis.margins import Margins
+from swashplate.errors import ControllerError
+from swashplate.models.vehicle import Vehicle
+from swashplate.registry import Registry
+from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.trim import Trim
+
+C = TypeVar("C", bound=Controller)
+
+
+@dataclass(frozen=True)
+class TracedStep:
+    """A step as a CasADi function of (memory, measured, reference) to (memory, command), and what its rows hold.
+
+    Attributes:
+        function: of columns; its result is memory and command in one.
+        start: what the memory starts with.
+        memory: what it holds, in words.
+        measured, commands: names, in order.
+        about: what it is for, in a line.
+    """
+
+    function: Any
+    start: tuple[float, ...]
+    memory: str
+    measured: tuple[str, ...]
+    commands: tuple[str, ...]
+    about: str
+
+
+class ControllerKind(Generic[C]):
+    """What one kind of controller can be asked; the methods here are right for one that is fed with the states.
+
+    Attributes:
+        takes_stick: whether it answers a pilot's roll and pitch commands.
+        own_sensors: whether it simulates sensors of its own, with their noise.
+    """
+
+    takes_stick: bool = True
+    own_sensors: bool = False
+
+    def about(self, controller: C, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> C:
+        """The same law for that vehicle at that trim; `seed` is of its sensors' noise.
+
+        Raises:
+            ControllerError: where it is for another vehicle.
+        """
+        return controller
+
+    def judged(self, controller: C, flying: Aircraft) -> JudgedLoop:
+        """The loop that margins, modes and disturbance rejection are told of.
+
+        Raises:
+            SwashError: where there is none.
+        """
+        return judged_with_states(controller, flying)
+
+    def differences(self, controller: C, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
+        """How far what flies is from the model of the design, in words; nothing where it is the same."""
+        return ()
+
+    def to_document(self, controller: C) -> dict[str, Any]:
+        """What its file says.
+
+        Raises:
+            ControllerError: where this kind has no file.
+        """
+        raise ControllerError("has no file: it is made where it flies.", where=type(controller).__name__)
+
+    def from_document(self, document: dict[str, Any], path: str) -> C:
+        """The controller of a file's document; `path` is named in messages.
+
+        Raises:
+            ControllerError: naming the file and the entry that is missing, unknown or of the wrong size.
+        """
+        raise ControllerError("is of a kind that has no file.", where=path)
+
+    def traced(self, controller: C) -> TracedStep:
+        """One step for CasADi, which must be installed.
+
+        Raises:
+            ControllerError: where its step cannot be printed as C.
+        """
+        raise ControllerError("has no C: its step is written for JAX only.", where=type(controller).__name__)
+
+    def for_sticks(self, controller: C) -> Any:
+        """The `Autopilot` that sticks and the live page move.
+
+        Raises:
+            ControllerError: where it is none.
+        """
+        raise ControllerError(
+            "flies on sensors of its own, and the page has none.",
+            where=type(controller).__name__,
+            hint="Give an autopilot, as `swash decouple` writes it without --sensors.",
+        )
+
+
+PLAIN: ControllerKind[Any] = ControllerKind()
+"""Of a controller that says nothing of itself."""
+
+CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
+    "controllers",
+    what="type of controller",
+    own={
+        "autopilot": "swashplate.control.laws.autopilot_kind:KIND",
+        "lqg": "swashplate.control.lqg.kind:KIND",
+        "observed-autopilot": "swashplate.control.laws.observed_autopilot_kind:KIND",
+    },
+)
+
+
+def kind_of(controller: Controller) -> ControllerKind[Any]:
+    """The kind of a controller, by its `type`."""
+    name = getattr(controller, "type", None)
+    return PLAIN if name is None else CONTROLLERS[name]

@@ -1,0 +1,38 @@
+"""How late commands are taken to be, and who says so, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.closed_loop import Controller
+
+
+def lateness(vehicle: Vehicle, controller: Controller | None, *, given: Mapping[str, float] | float | None) -> str:
+    """How late commands are taken to be, and who says so.
+
+    Args:
+        vehicle: what flies, or what is designed on.
+        controller: what flies it, which may believe in delays that the vehicle's card does not know.
+        given: delays that somebody asked for [s], one for all or by input.
+    """
+    known, believed = input_delays(vehicle), dict(getattr(controller, "delays", {}))
+    if given is not None:
+        found, whose = complete_delays(vehicle, given), "as given"
+        if any(known.get(name, 0.0) > value + 1e-4 for name, value in found.items()):
+            whose += f"; Careful: identified were {_listed(known)}"
+    elif getattr(controller, "at_once", False):
+        left = f"; the identified {_listed(known)} are left out" if any(known.values()) else ""
+        return f"nothing: the hold acts at once{left}"
+    elif known:
+        found, whose = known, "identified"
+    elif any(believed.values()):
+        found, whose = believed, "as the controller was designed for: the model knows none"
+    else:
+        return "nothing: no delay of this model is known, --delay says one"
+    return f"{_listed(found) or 'nothing'} ({whose})"
+
+
+def _listed(delays: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {1e3 * value:.3g} ms" for name, value in delays.items() if value)

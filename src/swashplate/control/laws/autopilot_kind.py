@@ -1,0 +1,111 @@
+"""The autopilot among the kinds of controllers: its file, its C."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+from swashplate import documents
+from swashplate.control.analysis.judged_loop import Aircraft
+from swashplate.control.analysis.margins import Margins
+from swashplate.control.kinds import ControllerKind, TracedStep
+from swashplate.control.laws.autopilot import MODES, Autopilot, CyclicGains, Gains, Memory, Mode, Reference, step
+from swashplate.control.laws.decoupling import Decoupler
+from swashplate.control.laws.height_yaw import CoaxialRotors, HeightYawGains, HeightYawMemory
+from swashplate.errors import ControllerError
+from swashplate.models.coax import CoaxInputs
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import CasadiBackend
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.trim import Trim
+
+SCHEMA = 1
+_GROUPS: dict[str, Any] = {
+    "motors": HeightYawGains,
+    "rotors": CoaxialRotors,
+    "cyclic": CyclicGains,
+    "law": Decoupler,
+}
+_NUMBERS: dict[str, Any] = {
+    name: msgspec.defstruct(name, [(field, float) for field in kind._fields], forbid_unknown_fields=True)
+    for name, kind in _GROUPS.items()
+}
+_FILE: Any = msgspec.defstruct(
+    "AutopilotFile",
+    [
+        ("kind", str),
+        ("schema", Literal[1]),
+        ("type", str),
+        ("vehicle", str),
+        ("model", str),
+        ("mode", Mode),
+        ("rate", float),
+        *_NUMBERS.items(),
+    ],
+    forbid_unknown_fields=True,
+)
+
+
+class AutopilotKind(ControllerKind[Autopilot]):
+    """The autopilot of a coaxial helicopter, fed with the states."""
+
+    def about(self, controller: Autopilot, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> Autopilot:
+        if controller.vehicle != vehicle.name:
+            raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
+        return controller
+
+    def differences(self, controller: Autopilot, flying: Aircraft, margins: Margins | None) -> tuple[str, ...]:
+        """The model of the design is known by its title only."""
+        own, theirs = controller.model, flying.vehicle.card.title
+        return () if own == theirs else (f"Designed on '{own}', flown on '{theirs}'.",)
+
+    def to_document(self, controller: Autopilot) -> dict[str, Any]:
+        return {
+            "kind": "controller",
+            "schema": SCHEMA,
+            "type": controller.type,
+            "vehicle": controller.vehicle,
+            "model": controller.model,
+            "mode": controller.mode,
+            "rate": controller.rate,
+            **{name: getattr(controller.numbers, name)._asdict() for name in _GROUPS},
+        }
+
+    def from_document(self, document: dict[str, Any], path: str) -> Autopilot:
+        if document.get("mode") not in MODES:
+            found = document.get("mode")
+            raise ControllerError(f"is {found!r:.60}, expected {', '.join(MODES)}.", where=path, channel="mode")
+        read = documents.checked(document, _FILE, where=path, error=ControllerError)
+        if read.rate <= 0.0:
+            raise ControllerError(f"is {read.rate:g} Hz, expected a positive rate.", where=path, channel="rate")
+        groups = {name: kind(**msgspec.structs.asdict(getattr(read, name))) for name, kind in _GROUPS.items()}
+        return Autopilot(read.vehicle, read.model, read.mode, Gains(1.0 / read.rate, **groups))
+
+    def traced(self, controller: Autopilot) -> TracedStep:
+        import casadi
+
+        names = ("height", "heading", "spool", "ahead", "right")
+        memory, measured, reference = (
+            casadi.SX.sym(name, n)
+            for name, n in (("memory", len(names)), ("measured", len(RigidBody._fields) + 1), ("reference", 8))
+        )
+        carried = Memory(HeightYawMemory(memory[0], memory[1], memory[2]), memory[3], memory[4])
+        body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
+        wanted = Reference(*(reference[i] for i in range(len(Reference._fields))))
+        after, command = step(carried, body, measured[len(body)], wanted, controller.numbers, CasadiBackend())
+        results = casadi.vertcat(*after.motors, after.ahead, after.right, *command)
+        return TracedStep(
+            casadi.Function("swash_traced", [memory, measured, reference], [results]),
+            tuple(controller.memory.tolist()),
+            ", ".join(names),
+            (*RigidBody._fields, "voltage"),
+            CoaxInputs._fields,
+            f"{controller.vehicle}, mode {controller.mode}, designed on: {controller.model}",
+        )
+
+    def for_sticks(self, controller: Autopilot) -> Autopilot:
+        return controller
+
+
+KIND = AutopilotKind()

@@ -1,0 +1,103 @@
+"""What one flown step teaches the decoupling: how the lower rotor tilts with speed, which a hover hardly shows.
+
+The identified models that a hover flight cannot tell apart differ most in that tilt (`drift_sources` says so for any
+fit), and a path that bends with the law on is its measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swashplate.arrays import Array
+from swashplate.control.analysis.straightness import step_paths
+from swashplate.control.laws.autopilot import Autopilot
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.trim import Trim
+
+_NUDGE = 0.004
+"""rad s/m; a change of the law's tilt with speed that moves the path by half a metre on the CoaX."""
+_MODELS_PER_NUMBER = 5
+"""Fewer models than that for each number, and a regression explains what is chance."""
+
+
+def corrected_by_step(
+    vehicle: Vehicle,
+    controller: Autopilot,
+    trim: Trim,
+    *,
+    command: float,
+    drift: float,
+    distance: float = 6.0,
+    duration: float = 10.0,
+) -> Autopilot:
+    """The controller whose law takes out the drift that the aircraft was seen to have with it.
+
+    The law's tilt across the motion per speed is changed by the drift over its sensitivity, which is that of the model;
+    by symmetry of the disc the tilt per speed to the right changes alike.
+
+    Args:
+        vehicle: the model that the law was made from.
+        controller: as it was flown, in mode "manual", decoupled.
+        trim: the hover.
+        command: the step of the pitch command that was flown.
+        drift: offset to the right of the first heading that was seen after `distance` [m].
+        distance: [m].
+        duration: after which the model's flight is given up [s].
+
+    Raises:
+        ControllerError: where the model does not cover the distance.
+    """
+
+    def with_tilt(change: float) -> Autopilot:
+        law = controller.numbers.law
+        across = law._replace(
+            across_u_linear=law.across_u_linear + change, across_v_linear=law.across_v_linear + change
+        )
+        return replace(controller, numbers=controller.numbers._replace(law=across))
+
+    ends = [
+        float(step_paths(vehicle, made, trim, command=command, distance=distance, duration=duration).drift[0])
+        for made in (controller, with_tilt(_NUDGE))
+    ]
+    slope = (ends[1] - ends[0]) / _NUDGE
+    return with_tilt(-drift / slope)
+
+
+def drift_sources(
+    drift: ArrayLike, drawn: Mapping[str, ArrayLike], *, least: float = 0.01
+) -> tuple[Sequence[tuple[str, float]], float]:
+    """Which drawn numbers make the spread of a drift: shares of its variance, and how much a line explains.
+
+    Regression of the drift on the standardised numbers; the share of a number is the covariance of its part with the
+    drift over the variance (shares add up to R^2; a number that others undo has a negative one).
+
+    Args:
+        drift: of each model, NaN where the distance was not covered, shape (models,).
+        drawn: numbers of the models by name, shape (models,) each; numbers that move together count once.
+        least: shares smaller than this are left out.
+
+    Returns:
+        (name, share), largest first, and R^2; nothing where there are too few models for a regression.
+    """
+    y = np.asarray(drift, dtype=np.float64)
+    arrived = np.isfinite(y)
+    columns: dict[str, Array] = {}
+    for name, values in drawn.items():
+        x = np.asarray(values, dtype=np.float64)[arrived]
+        spread = float(np.std(x))
+        if spread > 0.0:
+            x = (x - np.mean(x)) / spread
+            if not any(np.allclose(x, other) for other in columns.values()):
+                columns[name] = x
+    y = y[arrived] - np.mean(y[arrived])
+    if y.size < _MODELS_PER_NUMBER * len(columns) or not columns:
+        return (), 0.0
+    X = np.column_stack(list(columns.values()))
+    slopes = np.linalg.lstsq(X, y, rcond=None)[0]
+    shares = {name: float(b * (x @ y) / (y @ y)) for b, (name, x) in zip(slopes, columns.items(), strict=True)}
+    ordered = sorted(shares.items(), key=lambda item: -abs(item[1]))
+    return tuple((name, share) for name, share in ordered if abs(share) >= least), float(sum(shares.values()))

@@ -1,0 +1,120 @@
+"""A hold of hover or steady flight by state feedback, for any vehicle that can be linearised.
+
+The gains are those of a linear-quadratic regulator about a trim (Anderson and Moore 1990): enough to keep a vehicle
+around during a maneuver and to fly it from rest, and no more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg
+
+from swashplate.arrays import Array
+from swashplate.errors import SwashError
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.trim import Trim
+
+_ALLOWED = {
+    **dict.fromkeys(("x", "y"), 2.0),
+    "z": 0.5,
+    **dict.fromkeys(("u", "v", "w"), 2.0),
+    **dict.fromkeys(("phi", "theta", "psi"), 0.3),
+    **dict.fromkeys(("p", "q", "r"), 1.0),
+}
+"""Deviations [m, m/s, rad, rad/s] that weigh as much as a tenth of an input's range (Bryson's rule)."""
+
+
+@dataclass(frozen=True)
+class StateHold:
+    """A controller for `simulate_closed_loop`: see `state_hold`."""
+
+    rate: float
+    memory: Array
+    gains: Array
+    step: Step
+
+
+def state_hold(
+    vehicle: Vehicle,
+    trim: Trim,
+    *,
+    rate: float = 50.0,
+    effort: float = 0.1,
+    along: Array | None = None,
+    spans: Array | None = None,
+) -> StateHold:
+    """A hold of the trim's attitude, velocity, height, heading and (at rest) place.
+
+    Args:
+        vehicle: any with a rigid body.
+        trim: what to hold; inputs that it held itself (a throttle) stay.
+        rate: how often it runs [Hz].
+        effort: share of an input's range that weighs as much as the allowed deviations.
+        along: combinations of inputs that it moves, shape (n_inputs, k); each input alone if not given.
+        spans: their ranges [unit of the inputs], shape (k,); those of the inputs' limits if not given.
+
+    Raises:
+        SwashError: where no gain exists that holds it.
+    """
+    model = linearize(vehicle, trim)
+    held = {name for name, _ in vehicle.trim_held}
+    moved = [i for i, name in enumerate(vehicle.input_names) if name not in held]
+    if along is None or spans is None:
+        along = np.eye(len(vehicle.input_names))[:, moved]
+        spans = np.array([high - low for low, high in vehicle.input_limits])[moved]
+    B = model.B @ along
+    weights = np.array([1.0 / _ALLOWED[name] ** 2 if name in _ALLOWED else 0.0 for name in model.states])
+    if trim.speed or trim.lateral or trim.climb or trim.turn:
+        weights[:3] = 1e-6  # the place moves on
+    try:
+        cost = scipy.linalg.solve_continuous_are(
+            model.A - 1e-6 * np.eye(len(weights)),
+            B,
+            np.diag(weights),
+            np.diag(1.0 / (effort * spans) ** 2),
+        )
+    except np.linalg.LinAlgError:
+        raise SwashError(
+            "no state feedback holds this trim.", where=vehicle.name, hint="Check its controls with `swash linearize`."
+        ) from None
+    K = along @ (((effort * spans) ** 2)[:, None] * B.T @ cost)
+    if trim.speed or trim.lateral or trim.climb or trim.turn:
+        K[:, :2] = 0.0
+    step = partial(state_hold_step, inputs=len(vehicle.input_names), states=len(weights))
+    return StateHold(rate, np.zeros(1), np.concatenate([K.ravel(), trim.inputs, trim.state]), _hashable(step))
+
+
+def _hashable(step: Step) -> Step:
+    """One function per size, so that other gains compile nothing anew."""
+    keywords = step.keywords  # type: ignore[attr-defined]
+    return _STEPS.setdefault((keywords["inputs"], keywords["states"]), step)
+
+
+_STEPS: dict[tuple[int, int], Step] = {}
+
+
+def state_hold_step(
+    memory: Any, time: Any, measured: Any, reference: Any, gains: Any, *, inputs: int, states: int
+) -> tuple[Any, Any]:
+    """Inputs for a measured state row: the trim's, less the gains times the deviation in heading axes."""
+    K = gains[: inputs * states].reshape(inputs, states)
+    commanded, rest = gains[inputs * states : inputs * states + inputs], gains[inputs * states + inputs :]
+    body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
+    turned = body.psi - reference[3]
+    turned = jnp.arctan2(jnp.sin(turned), jnp.cos(turned))
+    c, s = jnp.cos(reference[3]), jnp.sin(reference[3])
+    north, east = body.x - reference[0], body.y - reference[1]
+    # The gains belong to a heading of zero: the place error is turned into the wanted heading's axes, and cut.
+    ahead = jnp.clip(c * north + s * east, -3.0, 3.0)
+    right = jnp.clip(-s * north + c * east, -3.0, 3.0)
+    below = jnp.clip(body.z - reference[2], -2.0, 2.0)
+    deviation = (measured[:states] - rest).at[0].set(ahead).at[1].set(right).at[2].set(below).at[8].set(turned)
+    return memory, commanded - K @ deviation

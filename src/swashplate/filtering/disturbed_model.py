@@ -1,0 +1,315 @@
+"""A vehicle in disturbed air, seen by sensors: the model whose one-step predictions prediction error compares.
+
+The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
+it fades) and a drift (random walk: trims, battery, servo zeros). Where asked, a horizontal wind (Ornstein-Uhlenbeck
+too) acts through the equations themselves: what moving air does to the rotors depends on the very parameters that are
+sought. All are held over a sample. The measurement update has a constant gain from the Riccati equation around hover,
+or around the mean flight of a helicopter that is faster (Jategaonkar 2015, sec. 5.4); horizontal position errors are
+turned into the heading first, so that the gain does not depend on where the nose points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
+from swashplate.filtering.filter_loop import filtered
+from swashplate.filtering.riccati import kalman_gain
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
+from swashplate.simulation.discretisation import held_series
+from swashplate.simulation.dynamics import (
+    CONSTANTS,
+    Equations,
+    equations_of,
+    jax_backend,
+    row_rates,
+)
+from swashplate.simulation.runge_kutta import rk4_step
+
+N_DISTURBANCES = len(DISTURBED)
+
+
+class Nuisance(NamedTuple):
+    """What belongs to one record and not to the vehicle.
+
+    `delay_*`: time by which the motion lags the logged commands [s]; `trim_*`: zeros of the commands; `lever_*`: from
+    the centre of gravity to the tracked point in body axes [m]; `level_phi`, `level_theta`: error of the tracked body's
+    level, `level_psi`: its heading against the nose [rad].
+    """
+
+    delay_servo: Any = 0.0
+    delay_motor: Any = 0.0
+    trim_motor_lower: Any = 0.0
+    trim_motor_upper: Any = 0.0
+    trim_servo_roll: Any = 0.0
+    trim_servo_pitch: Any = 0.0
+    lever_x: Any = 0.0
+    lever_y: Any = 0.0
+    lever_z: Any = 0.0
+    level_phi: Any = 0.0
+    level_theta: Any = 0.0
+    level_psi: Any = 0.0
+
+
+def mean_nuisance(nuisances: Nuisance) -> Nuisance:
+    """Delays and lever arms averaged over the records; trims belong to their flight and are left at zero."""
+    means = {name: float(np.mean(np.asarray(value))) for name, value in nuisances._asdict().items()}
+    return Nuisance(**{name: 0.0 if name.startswith("trim") else value for name, value in means.items()})
+
+
+class Gain(NamedTuple):
+    """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance."""
+
+    state: Any
+    gust: Any
+    drift: Any
+    covariance: Any
+
+
+Advance = Callable[[Any, Any, Any], Any]
+"""A state row one sample later, from the row, the disturbances that act and what holds at this sample."""
+
+
+class FilterState(NamedTuple):
+    """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts."""
+
+    x: Any
+    gust: Any
+    drift: Any
+
+
+@dataclass(frozen=True)
+class StochasticModel:
+    """A vehicle's equations with disturbances and sensors, as functions of flat rows.
+
+    Two models of the same equations, outputs and rate are equal, so that compiled code serves every card.
+
+    Attributes:
+        equations: whose equations.
+        output_names: measured channels.
+        dt: sample time [s].
+        windy: a horizontal wind is among the disturbances.
+    """
+
+    equations: Equations
+    output_names: tuple[str, ...]
+    dt: float
+    windy: bool = False
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """For names only: its card is any card of these equations."""
+        return self.equations.vehicle
+
+    @property
+    def n_gusts(self) -> int:
+        """What fades: a gust on each disturbed acceleration, and perhaps the wind to north and east."""
+        return N_DISTURBANCES + 2 * self.windy
+
+    # ---- one sample --------------------------------------------------------------------------------------------
+    def step(self, x: Any, gust: Any, u: Any, parameters: Any, voltage: Any) -> Any:
+        """The state one sample later, with commands and disturbances held.
+
+        Disturbances are accelerations as in `DISTURBED`, and perhaps the wind.
+        """
+        rates, push = self._rates(parameters), self._push(gust)
+        driving = self._driving(gust, u, voltage)
+        return rk4_step(lambda x, w: rates(x, w) + push, x, lambda _: driving, self.dt, looped=True)
+
+    def _rates(self, parameters: Any) -> Any:
+        rates = row_rates(self.equations, padded=False)
+        constants = [getattr(Environment(), name) for name in CONSTANTS]
+        numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
+        return lambda x, w: rates(x, w, numbers)
+
+    def _push(self, gust: Any) -> Any:
+        """The accelerations of a gust as rates of a whole state row."""
+        units = np.eye(len(self.vehicle.state_names))[self._disturbed]
+        return sum(gust[i] * unit for i, unit in enumerate(units))
+
+    def _driving(self, gust: Any, u: Any, voltage: Any) -> Any:
+        """Inputs, wind and voltage side by side."""
+        return jnp.concatenate([u, gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy), voltage[None]])
+
+    def measure(self, x: Any, nuisance: Nuisance) -> Any:
+        """The measured channels of a state row."""
+        xp = jax_backend()
+        here = {name: x[self.vehicle.index(name)] for name in self.output_names}
+        attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
+        lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
+        tracked = turned_about_z(attitude, nuisance.level_psi, xp)
+        seen = {
+            "x": x[self.vehicle.index("x")] + lever.x,
+            "y": x[self.vehicle.index("y")] + lever.y,
+            "z": x[self.vehicle.index("z")] + lever.z,
+            "phi": tracked.phi + nuisance.level_phi,
+            "theta": tracked.theta + nuisance.level_theta,
+            "psi": tracked.psi,
+        }
+        return jnp.stack([seen.get(name, here[name]) for name in self.output_names])
+
+    @property
+    def _disturbed(self) -> list[int]:
+        return [self.vehicle.index(name) for name in DISTURBED]
+
+    # ---- the filter --------------------------------------------------------------------------------------------
+    def linear(
+        self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance
+    ) -> tuple[Any, Any, Any, Any]:
+        """A, C, Q, R of the joined system (states, gusts, drifts) around an equilibrium with the nose north.
+
+        Wind acts through terms that grow with the square of the speed and have no slope at rest; with wind, slopes are
+        averaged over a normal distribution of the horizontal air speed by four points (statistical linearisation,
+        Gelb 1974, sec. 6.2; cubature of the third degree).
+        """
+        n, g, d = x.shape[0], self.n_gusts, N_DISTURBANCES
+        places = x[None]
+        if self.windy:
+            sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
+            along = jnp.sqrt(2.0) * sigma * np.eye(n)[self._disturbed[:2]]
+            places = jnp.concatenate([x + along, x - along])
+        rates = self._rates(parameters)
+
+        def slopes(x: Any) -> Any:
+            return jax.jacfwd(lambda x, w: rates(x, self._driving(w, u, voltage)) + self._push(w), argnums=(0, 1))(
+                x, jnp.zeros(g)
+            )
+
+        by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(slopes)(places))
+        by_x, held = held_series(by_x, self.dt, jnp.eye(n))  # as `step` makes it of a linear system
+        by_gust = self.dt * held @ by_gust
+        by_push = by_gust[:, :d]
+        A = jnp.block(
+            [
+                [by_x, by_gust, by_push],
+                [jnp.zeros((g, n)), jnp.diag(self._fade(noise)), jnp.zeros((g, d))],
+                [jnp.zeros((d, n + g)), jnp.eye(d)],
+            ]
+        )
+        by_state = jax.jacfwd(lambda x: self.measure(x, nuisance))(x)
+        C = jnp.concatenate([by_state, jnp.zeros((self.n_outputs, g + d))], 1)
+        tilt, yaw, horizontal, vertical = noise[:4]
+        white = jnp.stack(on_axes(horizontal, vertical, tilt, yaw))
+        tilt, yaw, horizontal, vertical = noise[4:8]
+        gust = jnp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind])[:g]
+        drift = jnp.stack(on_axes(noise.drift_force, noise.drift_force, noise.drift_moment, noise.drift_moment))
+        # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
+        spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T
+        Q = jax.scipy.linalg.block_diag(
+            spread + self._floor(n), jnp.diag(gust**2 * self.dt), jnp.diag(drift**2 * self.dt)
+        )
+        return A, C, Q, jnp.diag(self._sensor_variances(noise))
+
+    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> Gain:
+        """Steady gain at an equilibrium with the nose north."""
+        n, g = x.shape[0], self.n_gusts
+        K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
+        return Gain(K[:n], K[n : n + g], K[n + g :], S)
+
+    def _fade(self, noise: Noise) -> Any:
+        """What is left of each gust after one sample."""
+        force, moment = noise.tau_gust_force, noise.tau_gust_moment
+        taus = [*on_axes(force, force, moment, moment), noise.tau_wind, noise.tau_wind]
+        return jnp.exp(-self.dt / jnp.stack(taus[: self.n_gusts]))
+
+    def _floor(self, n: int) -> Any:
+        """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
+        speeds = [name.startswith("omega") for name in self.vehicle.state_names]
+        return jnp.diag(jnp.where(jnp.array(speeds), 1e-4, 1e-10)[:n])
+
+    def _sensor_variances(self, noise: Noise) -> Any:
+        sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
+        return jnp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names])
+
+    @property
+    def n_outputs(self) -> int:
+        return len(self.output_names)
+
+    def correct(self, state: FilterState, y: Any, gain: Gain, nuisance: Nuisance) -> tuple[FilterState, Any]:
+        """The state after a measurement, and the innovation with its horizontal part in heading axes."""
+        psi = state.x[self.vehicle.index("psi")]
+        innovation = _turn(y - self.measure(state.x, nuisance), self.output_names, -psi)
+        x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
+        x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift), innovation
+
+    def acting(self, state: FilterState) -> Any:
+        """The disturbances that act: gusts and drifts together, and perhaps the wind."""
+        return state.gust + jnp.concatenate([state.drift, jnp.zeros(2 * self.windy)])
+
+    def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
+        """The state one sample later."""
+        return FilterState(advance(state.x, self.acting(state), now), self._fade(noise) * state.gust, state.drift)
+
+    def run(
+        self, start: FilterState, y: Any, advance: Advance, along: Any, noise: Noise, nuisance: Nuisance, gain: Gain
+    ) -> tuple[Any, FilterState]:
+        """Innovations (n, n_outputs) and the states after each measurement.
+
+        Args:
+            start: predicted state at the first sample.
+            y: measurements (n, n_outputs).
+            advance: a state row one sample later.
+            along: what `advance` is told, by sample.
+            noise, nuisance, gain: of this record.
+        """
+
+        return filtered(
+            start,
+            y,
+            along,
+            correct=lambda state, measured, _: self.correct(state, measured, gain, nuisance),
+            predict=lambda state, now: self.predict(state, noise, advance, now),
+        )
+
+
+_GUST_NAMES = (*DISTURBED, "x", "y")
+"""The gusts, the wind by the axes that it blows along."""
+
+
+def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
+    """The part of a row that lies along x and y, turned by an angle about the vertical.
+
+    Sums of unit rows instead of setting entries: a loop that scatters is not compiled as one function.
+    """
+    if "x" not in names or "y" not in names:
+        return row
+    i, j = names.index("x"), names.index("y")
+    along, across = np.eye(len(names))[[i, j]]
+    c, s = jnp.cos(angle) - 1.0, jnp.sin(angle)
+    return row + along * (c * row[i] - s * row[j]) + across * (s * row[i] + c * row[j])
+
+
+def stochastic_model(
+    vehicle: Vehicle, output_names: tuple[str, ...], dt: float, *, windy: bool = False
+) -> StochasticModel:
+    """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds."""
+    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9), windy)
+
+
+def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> Any:
+    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged (n, n_inputs).
+
+    A smooth curve through the samples; before the first and after the last sample the nearest one holds.
+    """
+    n = inputs.shape[0]
+    trims = jnp.stack(
+        [jnp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names]
+    )
+    motor = [name.startswith("motor") for name in vehicle.input_names]
+    delay = jnp.where(jnp.array(motor), nuisance.delay_motor, nuisance.delay_servo)
+    trimmed = inputs + trims
+    place = jnp.clip(jnp.arange(n)[:, None] - delay[None, :] / dt, 0.0, n - 1.0)
+    below = jnp.clip(jnp.floor(place), 0, n - 2).astype(int)
+    a, b, c, d = (jnp.take_along_axis(trimmed, jnp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+    t = place - below
+    # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
+    return b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))

@@ -1,0 +1,89 @@
+"""The few matrix operations of the observer, for JAX here and for CasADi in `swashplate.export`.
+
+The observer is written once, on columns (n, 1) and matrices with `@`, `.T`, `*`, `+` and slices, which both have; what
+they write differently is here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from swashplate.physics.backend import Backend
+from swashplate.simulation.dynamics import jax_backend
+from swashplate.simulation.runge_kutta import rk4_change
+
+Scalars = Callable[[Sequence[Any], Sequence[Any]], Sequence[Any]]
+"""A function of two rows of scalars; scalars back."""
+
+
+class Matrices(Protocol):
+    """Operations beyond `@`, `.T`, `*`, `+` and slices."""
+
+    looped: bool
+    """Whether the stages of a Runge-Kutta step are a loop, compiled once."""
+
+    @property
+    def xp(self) -> Backend: ...
+    def column(self, scalars: Sequence[Any], /) -> Any: ...
+    def scalars(self, column: Any, /) -> list[Any]: ...
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any: ...
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]: ...
+    def stacked(self, parts: Sequence[Any], /) -> Any: ...
+    def diagonal(self, values: Any, /) -> Any: ...
+
+
+def change(rates: Scalars, x: Any, w: Any, dt: float, M: Matrices) -> Any:
+    """How far a Runge-Kutta step of length `dt` [s] takes a column `x` under a column `w` that stays."""
+    return rk4_change(lambda x, w: M.value(rates, x, w), x, lambda _: w, dt, looped=M.looped)
+
+
+class JaxMatrices:
+    """Columns are arrays (n, 1)."""
+
+    looped = True
+
+    def __init__(self) -> None:
+        self.xp: Backend = jax_backend()
+
+    def column(self, scalars: Sequence[Any], /) -> Any:
+        return jnp.stack([jnp.reshape(jnp.asarray(s, dtype=float), ()) for s in scalars])[:, None]
+
+    def scalars(self, column: Any, /) -> list[Any]:
+        return [column[i, 0] for i in range(column.shape[0])]
+
+    def value(self, f: Scalars, x: Any, w: Any, /) -> Any:
+        return self.column(f(self.scalars(x), self.scalars(w)))
+
+    def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
+        """Value (m, 1) and Jacobian by x (m, n)."""
+        rest = self.scalars(w)
+
+        def both(row: Any) -> tuple[Any, Any]:
+            found = self.column(f([row[i] for i in range(x.shape[0])], rest))[:, 0]
+            return found, found
+
+        J, found = jax.jacfwd(both, has_aux=True)(x[:, 0])
+        return found[:, None], J
+
+    def row(self, scalars: Sequence[Any], /) -> Any:
+        """Scalars side by side."""
+        return self.column(scalars)[:, 0]
+
+    def matrix(self, row: Any, rows: int, columns: int, /) -> Any:
+        """A matrix from a row of its entries, row after row; `flat` is the way back."""
+        return row.reshape(rows, columns)
+
+    def flat(self, matrix: Any, /) -> Any:
+        return matrix.ravel()
+
+    def stacked(self, parts: Sequence[Any], /) -> Any:
+        """One above the other."""
+        return jnp.concatenate(parts, axis=0)
+
+    def diagonal(self, values: Any, /) -> Any:
+        """A matrix of a row's values."""
+        return jnp.eye(len(values)) * values

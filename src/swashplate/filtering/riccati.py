@@ -1,0 +1,107 @@
+"""The steady Kalman gain of a discrete linear system, or of a cycle of them: one Riccati solver, by doubling.
+
+How a covariance goes through some samples, P -> H + A P (I + G P)^-1 A', is a map of that form again when two follow
+each other (Anderson 1978, Int. J. Control 28, 295-306; Chu, Fan and Lin 2005). A map that follows itself doubles the
+horizon: with JAX a fixed number of times, so that the gain can be differentiated; with NumPy until it has settled.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.simulation.discretisation import summed
+
+Map = tuple[Any, Any, Any]
+"""A, G and H of some samples."""
+
+_DOUBLINGS = 16
+"""Each doubles the horizon: 2^16 samples are eleven minutes at 100 Hz, longer than any flight of ours."""
+_MOST_DOUBLINGS, _SETTLED, _NEARLY = 40, 1e-13, 1e-6
+
+
+def through(A: Any, C: Any, Q: Any, R: Any, xp: Any) -> Map:
+    """The map of one sample: a reading C x with noise R, then x+ = A x with noise Q; `xp` is `numpy` or `jax.numpy`."""
+    return A, C.T @ xp.linalg.solve(R, C), Q
+
+
+def followed(first: Map, second: Map, xp: Any) -> Map:
+    """The map of some samples and those after them."""
+    (A1, G1, H1), (A2, G2, H2) = first, second
+    n = A1.shape[0]
+    both = xp.linalg.solve(xp.eye(n) + G2 @ H1, xp.concatenate([A2.T, G2], axis=1))
+    by_A, by_G = both[:, :n], both[:, n:]
+    return (A1.T @ by_A).T, G1 + A1.T @ by_G @ A1, H2 + A2 @ H1 @ by_A
+
+
+def settled_covariance(whole: Map) -> Any:
+    """The covariance that a map leaves as it is, by NumPy.
+
+    Raises:
+        numpy.linalg.LinAlgError: where it does not settle (something that lasts is not seen).
+    """
+    P, change = whole[2], np.inf
+    for _ in range(_MOST_DOUBLINGS):
+        A, G, H = followed(whole, whole, np)
+        whole = A, 0.5 * (G + G.T), 0.5 * (H + H.T)
+        change = float(np.max(np.abs(whole[2] - P))) / max(float(np.max(np.abs(whole[2]))), 1e-300)
+        P = whole[2]
+        if not np.all(np.isfinite(P)) or change < _SETTLED:
+            break
+    if not np.all(np.isfinite(P)) or change > _NEARLY:
+        raise np.linalg.LinAlgError("the covariance does not settle")
+    return P
+
+
+def gain_at(P: Any, C: Any, R: Any, xp: Any) -> Any:
+    """Kalman gain (n, m) of a reading C x with noise R where the state has the covariance P."""
+    return xp.linalg.solve(C @ P @ C.T + R, C @ P).T
+
+
+@jax.custom_jvp
+def predicted_covariance(A: Any, C: Any, Q: Any, R: Any) -> Any:
+    """Steady covariance P of the one-step-ahead state error: P = A P A' - A P C'(C P C' + R)^-1 C P A' + Q.
+
+    Slowly drifting states that the outputs see only weakly are given the covariance of a filter that has run for 2^16
+    samples.
+
+    Args:
+        A: state transition, shape (n, n).
+        C: outputs, shape (m, n).
+        Q: process noise covariance per sample, shape (n, n).
+        R: measurement noise covariance, shape (m, m).
+    """
+    (_, _, P), _ = jax.lax.scan(
+        lambda whole, _: (followed(whole, whole, jnp), None), through(A, C, Q, R, jnp), None, length=_DOUBLINGS
+    )
+    return 0.5 * (P + P.T)
+
+
+@predicted_covariance.defjvp
+def _covariance_moved(here: tuple[Any, Any, Any, Any], moved: tuple[Any, Any, Any, Any]) -> tuple[Any, Any]:
+    """The change of the covariance, from the equation that it solves rather than through every doubling.
+
+    With P+ = (P^-1 + C' R^-1 C)^-1, the covariance after a measurement, P = A P+ A' + Q. Hence dP = F dP F' + W with
+    F = A (I - K C): a Lyapunov equation, solved by doubling its sum (Smith 1968, SIAM J. Appl. Math. 16, 198-201).
+    Exact for a filter that has settled within 2^16 samples.
+    """
+    A, C, _, R = here
+    dA, dC, dQ, dR = moved
+    P = predicted_covariance(*here)
+    K = gain_at(P, C, R, jnp)
+    after = P - K @ C @ P
+    AK = A @ K
+    half = (dA - AK @ dC) @ after @ A.T
+    W = half + half.T + AK @ dR @ AK.T + dQ
+    return P, summed(A - AK @ C, W, _DOUBLINGS)[1]
+
+
+def kalman_gain(A: Any, C: Any, Q: Any, R: Any) -> tuple[Any, Any]:
+    """Gain K (n, m) of the measurement update x + K (y - C x) and the innovations' covariance S (m, m)."""
+    P = predicted_covariance(A, C, Q, R)
+    S = C @ P @ C.T + R
+    S = 0.5 * (S + S.T)
+    return jnp.linalg.solve(S, C @ P).T, S

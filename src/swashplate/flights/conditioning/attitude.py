@@ -1,0 +1,93 @@
+"""Attitude: quaternions without sign flips, Euler angles ZYX, and interpolation on the sphere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation, Slerp
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import ATTITUDE, QUATERNION
+
+_TOO_SHORT = 1e-6  # a quaternion shorter than this has no direction left to normalise
+
+
+def continuous(quaternion: ArrayLike) -> Array:
+    """Unit quaternions whose sign never flips from one sample to the next (q and -q are the same attitude).
+
+    Args:
+        quaternion: scalar first, shape (n, 4), any length but zero.
+
+    Raises:
+        FlightError: where a quaternion is zero or not a number.
+    """
+    q = np.asarray(quaternion, dtype=np.float64)
+    length = np.linalg.norm(q, axis=1)
+    bad = ~(length > _TOO_SHORT) | ~np.isfinite(length)
+    if bad.any():
+        raise FlightError(
+            f"sample {int(np.argmax(bad))} is {q[np.argmax(bad)].tolist()}, expected a quaternion of length 1.",
+            channel="qw",
+            hint="Drop the samples without tracking first (remove_outliers does).",
+        )
+    q = q / length[:, None]
+    flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
+    return np.asarray(q * np.concatenate([[1.0], np.cumprod(flips)])[:, None], dtype=np.float64)
+
+
+def rotation(quaternion: ArrayLike) -> Rotation:
+    """SciPy rotation (body to local) of scalar-first quaternions, shape (n, 4) or (4,)."""
+    return Rotation.from_quat(np.roll(np.asarray(quaternion, dtype=np.float64), -1, axis=-1))
+
+
+def euler_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Roll, pitch and unwrapped yaw [rad], shape (n, 3), of scalar-first quaternions (n, 4), order ZYX."""
+    psi, theta, phi = rotation(quaternion).as_euler("ZYX").T
+    return np.stack([phi, theta, np.unwrap(psi)], axis=-1)
+
+
+def quaternion_from_euler(euler: ArrayLike) -> Array:
+    """Scalar-first quaternions (n, 4), free of sign flips, of phi, theta, psi [rad], shape (n, 3)."""
+    angles = np.atleast_2d(np.asarray(euler, dtype=np.float64))
+    return continuous(np.roll(Rotation.from_euler("ZYX", angles[:, ::-1]).as_quat(), 1, axis=-1))
+
+
+def interpolate(time: ArrayLike, quaternion: ArrayLike, new_time: ArrayLike) -> Array:
+    """Attitude at `new_time` [s] by spherical linear interpolation (Shoemake 1985), shape (m, 4).
+
+    Times outside `time` take the nearest end.
+    """
+    stamps = np.asarray(time, dtype=np.float64)
+    wanted = np.clip(np.asarray(new_time, dtype=np.float64), stamps[0], stamps[-1])
+    if stamps.size == 1:
+        return np.repeat(continuous(quaternion), wanted.size, axis=0)
+    between = Slerp(stamps, rotation(continuous(quaternion)))(wanted)
+    return continuous(np.roll(between.as_quat(), 1, axis=-1))
+
+
+def attitude_of(flight: Flight) -> Array:
+    """The flight's attitude as continuous quaternions (n, 4), from its quaternion or else its Euler angles.
+
+    Raises:
+        FlightError: where the flight has neither.
+    """
+    if all(name in flight for name in QUATERNION):
+        return continuous(flight.array(QUATERNION))
+    if all(name in flight for name in ATTITUDE):
+        return quaternion_from_euler(flight.array(ATTITUDE))
+    raise FlightError(
+        f"the flight has no attitude: neither {', '.join(QUATERNION)} nor {', '.join(ATTITUDE)}; "
+        f"it has {', '.join(flight.channels) or 'nothing'}.",
+        where=flight.provenance.source or None,
+    )
+
+
+def with_euler(flight: Flight) -> Flight:
+    """The flight with phi, theta and unwrapped psi beside its quaternion."""
+    angles = euler_from_quaternion(attitude_of(flight))
+    like = QUATERNION[0] if QUATERNION[0] in flight else ATTITUDE[0]
+    for name, values in zip(ATTITUDE, angles.T, strict=True):
+        flight = flight.with_channel(name, values, like=like)
+    return flight

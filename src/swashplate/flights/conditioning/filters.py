@@ -1,0 +1,128 @@
+"""Zero-phase Butterworth low-pass and band-pass, the same for every channel, segment by segment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.conditioning.attitude import continuous
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import QUATERNION
+
+
+def shortest(order: int, *, band: bool = False) -> int:
+    """Fewest samples that a filter of this order takes (the padding of `sosfiltfilt` plus one)."""
+    sections = order if band else (order + 1) // 2
+    at_origin = 0 if band or order % 2 == 0 else 1
+    return 3 * (2 * sections + 1 - at_origin) + 1
+
+
+def filtered(
+    values: Array, *, rate: float, cutoff: float | tuple[float, float], order: int = 4, zero_phase: bool = True
+) -> Array:
+    """A uniform record after a Butterworth filter run forwards and backwards: no phase, twice the order's slope.
+
+    Args:
+        values: shape (n,) or (n, m), filtered along the first axis.
+        rate: sample rate [Hz].
+        cutoff: corner of a low-pass, or the two corners of a band-pass [Hz] (-6 dB there, as it runs twice).
+        order: of one pass.
+        zero_phase: False runs it forwards only, from a state at rest at the first value (-3 dB at the corner).
+
+    Raises:
+        FlightError: the corner is not below half the rate, or the record is too short.
+    """
+    band = isinstance(cutoff, tuple)
+    corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
+    if not (np.all(corners > 0) and np.all(corners < rate / 2) and np.all(np.diff(corners) > 0)):
+        raise FlightError(
+            f"a filter corner of {corners.tolist()} Hz does not fit a rate of {rate:g} Hz: expected 0 < corner < "
+            f"{rate / 2:g} Hz.",
+            hint="Lower the cutoff or raise the rate.",
+        )
+    needed = shortest(order, band=band)
+    if values.shape[0] < needed:
+        raise FlightError(
+            f"{values.shape[0]} samples ({values.shape[0] / rate:.3f} s) are too short for the filter, which needs "
+            f"{needed} samples ({needed / rate:.3f} s) at {rate:g} Hz.",
+            hint="Use a longer record, or condition with cutoff=0 (no filter).",
+        )
+    sos = butter(order, cutoff, btype="bandpass" if band else "lowpass", fs=rate, output="sos")
+    if not zero_phase:
+        rest = sosfilt_zi(sos).reshape(sos.shape[0], 2, *(1,) * (values.ndim - 1)) * values[0]
+        return np.asarray(sosfilt(sos, values, axis=0, zi=rest)[0], dtype=np.float64)
+    return np.asarray(sosfiltfilt(sos, values, axis=0), dtype=np.float64)
+
+
+def by_segment(flight: Flight, values: Array, apply: Callable[[Array], Array]) -> Array:
+    """`apply` to each unbroken part of `values` (first axis: the one uniform stream's time), put together again."""
+    (data,) = flight.streams.values()
+    time = np.asarray(data["time"].values, dtype=np.float64)
+    pieces = flight.segments or ((float(time[0]), float(time[-1])),)
+    out = np.array(values, dtype=np.float64)
+    for start, stop in pieces:
+        # Half a microsecond: segment ends are stamps, but may have gone through a file.
+        inside = (time >= start - 5e-7) & (time <= stop + 5e-7)
+        out[inside] = apply(out[inside])
+    return out
+
+
+def uniform_rate(flight: Flight) -> float:
+    """Rate [Hz] of a flight that is one uniform stream.
+
+    Raises:
+        FlightError: it has several streams, or fewer than two samples.
+    """
+    if len(flight.streams) != 1:
+        raise FlightError(
+            f"the flight has {len(flight.streams)} streams ({', '.join(flight.streams)}), expected one uniform stream.",
+            where=flight.provenance.source or None,
+            hint="Bring it to one rate with resample(flight, rate=...) first.",
+        )
+    return flight.rate(flight.channels[0])
+
+
+def lowpass(flight: Flight, *, cutoff: float, order: int = 4, zero_phase: bool = True) -> Flight:
+    """Every channel alike, inputs too, through the same Butterworth low-pass, by default without phase.
+
+    The same filter on inputs and outputs cancels in their relation: no parameter is shifted by it.
+
+    Args:
+        flight: one uniform stream.
+        cutoff: corner [Hz].
+        order: of one pass; it runs twice.
+        zero_phase: False runs it once, forwards, as a recorder's own filter would.
+
+    Raises:
+        FlightError: a segment is shorter than the filter needs, or than one period of its corner.
+    """
+    rate = uniform_rate(flight)
+    ((name, data),) = flight.streams.items()
+    briefest = min(stop - start for start, stop in flight.segments or ((flight.start, flight.stop),))
+    if cutoff > 0 and briefest < 1.0 / cutoff:
+        raise FlightError(
+            f"a piece of {briefest:.3f} s is too short for a filter of {cutoff:g} Hz, expected at least one period "
+            f"({1.0 / cutoff:.3f} s).",
+            where=flight.provenance.source or None,
+            hint="Raise the cutoff, use a longer record, or condition with cutoff=0 (no filter).",
+        )
+    values = {str(n): np.asarray(v.values, dtype=np.float64) for n, v in data.data_vars.items()}
+    try:
+        smooth = {
+            n: by_segment(
+                flight, v, lambda part: filtered(part, rate=rate, cutoff=cutoff, order=order, zero_phase=zero_phase)
+            )
+            for n, v in values.items()
+        }
+    except FlightError as error:
+        raise FlightError(error.problem, where=flight.provenance.source or None, hint=error.hint) from None
+    if all(n in smooth for n in QUATERNION):
+        # Components are filtered one by one; at the few degrees per filter time of a flight only their length suffers.
+        unit = continuous(np.stack([smooth[n] for n in QUATERNION], axis=-1))
+        smooth.update(zip(QUATERNION, unit.T, strict=True))
+    made = data.assign({n: data[n].copy(data=v) for n, v in smooth.items()})
+    return flight.with_streams({name: made}).done("lowpass", cutoff=cutoff, order=order, zero_phase=zero_phase)

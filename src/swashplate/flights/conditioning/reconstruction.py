@@ -1,0 +1,217 @@
+"""Flight-path reconstruction: do rates, accelerations, attitude and position tell the same flight?
+
+Measured rates and specific forces are integrated and held against attitude and position (Klein and Morelli 2006,
+ch. 10; Jategaonkar 2015, ch. 10). With measured = (1 + scale) * true + bias the integrals are linear in 1 / (1 + scale)
+and bias / (1 + scale), and the noise stays in the response: one regression, over windows with free initial values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.conditioning.attitude import attitude_of, euler_from_quaternion, rotation
+from swashplate.flights.conditioning.derive import GRAVITY
+from swashplate.flights.conditioning.filters import uniform_rate
+from swashplate.flights.conditioning.lever_arm import LeverArm, lever_arm
+from swashplate.flights.conditioning.regression import regress
+from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
+from swashplate.flights.flight import Flight
+from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES
+
+_FORCES = ("ax", "ay", "az")
+_DRIVES = (("servo_roll", "p"), ("servo_pitch", "q"), ("motor_lower", "r"), ("motor_upper", "r"))
+_SIGNIFICANT = 3.0
+
+
+@dataclass(frozen=True)
+class SensorErrorEstimate:
+    """A number with its standard error."""
+
+    value: float
+    sigma: float
+
+    @property
+    def t(self) -> float:
+        return self.value / self.sigma
+
+    @property
+    def significant(self) -> bool:
+        return abs(self.t) > _SIGNIFICANT
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """What flight-path reconstruction found.
+
+    Attributes:
+        biases: per measured channel, in its unit.
+        scales: per measured channel, dimensionless (0 is perfect).
+        time_shifts: of the inputs.
+        lever: from the centre of gravity to the tracked point, None where it cannot be told.
+        notes: in words what could not be told and why.
+    """
+
+    biases: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
+    scales: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
+    time_shifts: tuple[TimeShift, ...] = ()
+    lever: LeverArm | None = None
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        lines = []
+        for name in self.biases:
+            b, s = self.biases[name], self.scales[name]
+            lines.append(f"{name}: bias {b.value:+.4g} ± {b.sigma:.2g}, scale {s.value:+.4g} ± {s.sigma:.2g}")
+        lines += [str(shift) for shift in self.time_shifts]
+        if self.lever is not None:
+            lines.append(str(self.lever))
+        return "\n".join([*lines, *self.notes])
+
+
+def _windows(flight: Flight, length: float) -> list[Flight]:
+    """The segments cut into windows of about `length` seconds."""
+    pieces: list[Flight] = []
+    for part in flight.split():
+        count = max(1, int(part.duration // length))
+        edges = np.linspace(part.start, part.stop, count + 1)
+        pieces += [part.between(a, b) for a, b in pairwise(edges.tolist())]
+    return [piece for piece in pieces if piece.duration > 0.5 * length or len(pieces) == 1]
+
+
+def _integral(values: Array, rate: float) -> Array:
+    return np.asarray(cumulative_trapezoid(values, dx=1.0 / rate, axis=0, initial=0.0), dtype=np.float64)
+
+
+def _euler_matrix(euler: Array) -> Array:
+    """Body rates to Euler-angle rates, shape (n, 3, 3) (Stevens and Lewis 2003, eq. 1.3-22)."""
+    phi, theta, _ = euler.T
+    s, c, tan, sec = np.sin(phi), np.cos(phi), np.tan(theta), 1.0 / np.cos(theta)
+    one, zero = np.ones_like(phi), np.zeros_like(phi)
+    rows = ((one, s * tan, c * tan), (zero, c, -s), (zero, s * sec, c * sec))
+    return np.stack([np.stack(row, -1) for row in rows], axis=-2)
+
+
+def _estimates(
+    pieces: list[tuple[Array, Array, Array]], names: Iterable[str], rate: float
+) -> tuple[dict[str, SensorErrorEstimate], dict[str, SensorErrorEstimate]]:
+    """Biases and scales from (integrals (n, 3, 6), initial-value columns (n, 3, k), response (n, 3)) per window.
+
+    The initial values of a window are regressed out of it first (Frisch and Waugh 1933).
+    """
+    data = []
+    for integrals, initial, response in pieces:
+        x = integrals.reshape(-1, 6)
+        free = initial.reshape(-1, initial.shape[-1])
+        both = np.column_stack([x, response.reshape(-1)])
+        rest = both - free @ np.linalg.lstsq(free, both, rcond=None)[0]
+        data.append((rest[:, :6], rest[:, 6]))
+    fit = regress(data, lag=round(3 * rate))  # the three axes lie next to each other: one second of samples
+    biases, scales = {}, {}
+    for k, name in enumerate(names):
+        gain, offset = fit.values[k], fit.values[3 + k]
+        block = fit.covariance[np.ix_([k, 3 + k], [k, 3 + k])]
+        slope = np.array([-offset / gain**2, 1.0 / gain])  # bias = offset / gain
+        biases[name] = SensorErrorEstimate(float(offset / gain), float(np.sqrt(slope @ block @ slope)))
+        scales[name] = SensorErrorEstimate(float(1.0 / gain - 1.0), float(np.sqrt(block[0, 0]) / gain**2))
+    return biases, scales
+
+
+def rate_errors(
+    flight: Flight, *, window: float = 10.0
+) -> tuple[dict[str, SensorErrorEstimate], dict[str, SensorErrorEstimate]]:
+    """Biases [rad/s] and scale factors of measured p q r against the attitude.
+
+    Args:
+        flight: one uniform stream with measured rates and attitude.
+        window: length [s] over which rates are integrated with free initial attitude.
+    """
+    rate = uniform_rate(flight)
+    pieces = []
+    for part in _windows(flight, window):
+        euler = euler_from_quaternion(attitude_of(part))
+        matrix = _euler_matrix(euler)
+        integrals = np.concatenate(
+            [_integral(matrix * part.array(RATES)[:, None, :], rate), -_integral(matrix, rate)], axis=-1
+        )
+        initial = np.broadcast_to(np.eye(3), (euler.shape[0], 3, 3))
+        pieces.append((integrals, np.array(initial), euler))
+    return _estimates(pieces, RATES, rate)
+
+
+def acceleration_errors(
+    flight: Flight, *, window: float = 5.0, gravity: float = GRAVITY
+) -> tuple[dict[str, SensorErrorEstimate], dict[str, SensorErrorEstimate]]:
+    """Biases [m/s^2] and scale factors of measured specific force ax ay az against position and attitude.
+
+    Args:
+        flight: one uniform stream with measured specific force at the tracked point, position and attitude.
+        window: length [s] over which forces are integrated twice with free initial position and velocity.
+        gravity: [m/s^2].
+    """
+    rate = uniform_rate(flight)
+    pieces = []
+    for part in _windows(flight, window):
+        matrix = rotation(attitude_of(part)).as_matrix()
+        twice = np.concatenate([matrix * part.array(_FORCES)[:, None, :], -matrix], axis=-1)
+        time = part.time(POSITION[0]) - part.start
+        integrals = _integral(_integral(twice, rate), rate)
+        fall = np.zeros((time.size, 3))
+        fall[:, 2] = 0.5 * gravity * time**2
+        initial = np.concatenate(
+            [np.broadcast_to(np.eye(3), (time.size, 3, 3)), time[:, None, None] * np.eye(3)], axis=-1
+        )
+        pieces.append((integrals, initial, part.array(POSITION) - fall))
+    return _estimates(pieces, _FORCES, rate)
+
+
+def _derived(flight: Flight) -> set[str]:
+    """Channels that conditioning made, which therefore tell nothing about sensors."""
+    return {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
+
+
+def reconstruct(flight: Flight, *, band: tuple[float, float] = (0.3, 6.0), percussion: float = 0.0) -> Reconstruction:
+    """Everything that the flight can tell about its own sensors: each estimate with its bound, each gap in words.
+
+    Args:
+        flight: conditioned.
+        band: of time shifts and lever arm [Hz].
+        percussion: `percussion_offset` of the vehicle [m], 0 where unknown.
+    """
+    made = _derived(flight)
+    notes: list[str] = []
+    biases: dict[str, SensorErrorEstimate] = {}
+    scales: dict[str, SensorErrorEstimate] = {}
+    has_attitude = any(all(name in flight for name in names) for names in (QUATERNION, ATTITUDE))
+    for names, label, needs, estimate in (
+        (RATES, "rates", has_attitude, rate_errors),
+        (_FORCES, "accelerations", has_attitude and all(n in flight for n in POSITION), acceleration_errors),
+    ):
+        measured = all(name in flight and name not in made for name in names)
+        if not measured:
+            notes.append(f"{label}: not measured in this flight, so they have no bias or scale factor to find")
+        elif not needs:
+            notes.append(f"{label}: nothing in this flight to hold them against")
+        else:
+            b, s = estimate(flight)
+            biases.update(b)
+            scales.update(s)
+    shifts: list[TimeShift] = []
+    for source, response in _DRIVES:
+        if source in flight and response in flight:
+            try:
+                shifts.append(time_shift(flight, source, response=response, band=band))
+            except FlightError as error:
+                notes.append(f"time shift {source} -> {response}: {error}")
+    lever: LeverArm | None = None
+    try:
+        lever = lever_arm(flight, band=band, percussion=percussion)
+    except FlightError as error:
+        notes.append(f"lever arm: {error}")
+    return Reconstruction(biases, scales, tuple(shifts), lever, tuple(notes))

@@ -1,0 +1,90 @@
+"""Times near zero, and the epoch beside them: float64 seconds since 1970 step by 0.24 microseconds, too coarse a step.
+
+A flight's stamps are small numbers; `Provenance.epoch` says where their zero lies on the log's own clock. Two logs that
+were stamped by one clock lie together at `flight.epoch + flight.time(name)`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from decimal import Decimal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.flights.flight import Flight
+
+Array = NDArray[np.float64]
+
+LARGE = 1e6
+"""First stamp [s] from which a clock is moved: 12 days, where float64 steps by 0.1 ns. No log runs for so long."""
+
+_ISO = re.compile(
+    r"(?P<day>\d{4}-\d{2}-\d{2})[T ](?P<time>\d{2}:\d{2}(?::\d{2})?)(?P<fraction>[.,]\d+)?"
+    r"\s*(?P<zone>Z|[+-]\d{2}:?\d{2})?"
+)
+
+
+def zero_of(first: float | Decimal) -> int:
+    """The whole second [s] that becomes time zero where the first stamp is large, else 0."""
+    return math.floor(first) if abs(float(first)) >= LARGE else 0
+
+
+def rebased(flight: Flight) -> Flight:
+    """The flight with small stamps: every stream and event earlier by the same whole seconds, which `epoch` keeps."""
+    starts = [float(data["time"].values[0]) for data in flight.streams.values() if data.sizes["time"]]
+    shift = zero_of(min(starts)) if starts and math.isfinite(min(starts)) else 0
+    if shift:
+        streams = {
+            name: data.assign_coords(time=("time", data["time"].values - shift, data["time"].attrs))
+            for name, data in flight.streams.items()
+        }
+        found = flight.provenance
+        events = tuple(replace(event, time=event.time - shift) for event in found.events)
+        flight = replace(
+            flight,
+            streams=streams,
+            provenance=replace(found, events=events, epoch=found.epoch + shift),
+            segments=tuple((start - shift, stop - shift) for start, stop in flight.segments),
+        )
+    return flight
+
+
+def note(epoch: float) -> str:
+    """Where time zero lies, in words."""
+    plain = f"{epoch:.9f}".rstrip("0").rstrip(".")
+    return f"time zero is {plain} s of the log's clock ({iso(epoch)} if it counts from 1970)"
+
+
+def iso(epoch: float) -> str:
+    """Seconds since 1970 as ISO 8601 in UTC, with every digit of the number."""
+    exact = Decimal(repr(float(epoch)))
+    whole = math.floor(exact)
+    fraction = f"{exact - whole:f}".partition(".")[2].rstrip("0")
+    try:
+        day = datetime.fromtimestamp(whole, UTC)
+    except (ValueError, OverflowError, OSError):
+        return "no date"
+    return f"{day:%Y-%m-%dT%H:%M:%S}{'.' if fraction else ''}{fraction}Z"
+
+
+def from_iso(text: str) -> Decimal | None:
+    """Seconds since 1970 of a date and time in ISO 8601 (UTC where it names no zone); None where it is none."""
+    found = _ISO.fullmatch(text.strip())
+    if found is None:
+        return None
+    try:
+        day = datetime.fromisoformat(f"{found['day']}T{found['time']}{(found['zone'] or 'Z')}")
+    except ValueError:
+        return None
+    return int(day.timestamp()) + Decimal("0." + found["fraction"][1:] if found["fraction"] else 0)
+
+
+def small(stamps: Sequence[Decimal]) -> tuple[Array, int]:
+    """Exact stamps [s] as float64 times, shape (n,), and the second that became their zero."""
+    zero = zero_of(stamps[0]) if stamps else 0
+    return np.array([float(stamp - zero) for stamp in stamps], dtype=np.float64), zero

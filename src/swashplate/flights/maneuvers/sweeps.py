@@ -1,0 +1,249 @@
+"""The frequency sweeps in a flight: where the log says so, and where a signal's frequency rises steadily.
+
+In a signal a sweep is a ridge of its scalogram that only ever rises. The ridge is found by dynamic programming over
+the share of the local power that each frequency holds (Carmona, Hwang and Torresani, 1998, ch. 7, with the constraint
+that a path rises), so that noise and feedback beside the sweep count against it only as far as they are there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import detrend
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import Event
+from swashplate.flights.schema import is_known
+
+_CYCLES = 6.0  # of a wavelet: resolves a third of an octave
+_PER_OCTAVE = 8
+_FRAMES = 8.0  # Hz: how often the ridge is looked at
+_FASTEST = 60.0  # Hz: sampled faster, nothing is gained; helicopters are swept to 20 Hz
+_HIGHEST = 0.45  # of the sample rate
+_SHARE = 0.35  # of the local power that a ridge must hold on average
+_LEAST_RATIO = 2.5  # highest over lowest frequency
+_LEAST_PERIODS = 8.0
+_LEAST_SECONDS = 4.0
+_SEEN_WITHIN = 0.2  # of the median amplitude: the sweep's ends
+_COMMANDS = ("mixer_", "servo_", "motor_", "stick_", "sid_target", "rcin_")
+_AXES = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "collective": "collective"}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that was flown.
+
+    Attributes:
+        start, stop: [s], on the flight's clock.
+        axis: what it moves ("roll mixer", "roll"; a channel's name where that is all that is known).
+        low, high: the band [Hz].
+        channel: the signal it was seen in, or the one that carries it.
+        source: "log" (the autopilot says so) or "signal" (seen as a rising frequency; its ends are about right).
+        complete: False where the log says that it was not flown to its end.
+    """
+
+    start: float
+    stop: float
+    axis: str
+    low: float
+    high: float
+    channel: str
+    source: str
+    complete: bool = True
+
+    def __str__(self) -> str:
+        seen = "as the log says" if self.source == "log" else f"seen in {self.channel}"
+        cut = "" if self.complete else ", not flown to its end"
+        return f"{self.axis}: {self.start:.2f} to {self.stop:.2f} s, {self.low:.3g} to {self.high:.3g} Hz ({seen}{cut})"
+
+
+def sweeps(flight: Flight) -> tuple[Sweep, ...]:
+    """The sweeps in a flight, in order of time; those that the log tells of need not be seen in a signal."""
+    told = tuple(_told(flight))
+    found = _seen(flight, [(sweep.start, sweep.stop) for sweep in told])
+    return tuple(sorted((*told, *found), key=lambda sweep: sweep.start))
+
+
+def _told(flight: Flight) -> list[Sweep]:
+    found = []
+    for event in flight.provenance.events:
+        if event.kind != "sweep":
+            continue
+        d = {key: _number(flight, event, key) for key in ("seen", "start", "stop", "start_hz", "stop_hz")}
+        stop, channel = min(d["seen"], flight.stop), "sid_target" if "sid_target" in flight else ""
+        if stop > flight.start and d["start"] < flight.stop:
+            axis = event.text.partition(",")[0]
+            complete = stop > d["stop"] - 0.1
+            found.append(Sweep(d["start"], stop, axis, d["start_hz"], d["stop_hz"], channel, "log", complete))
+    return found
+
+
+def _number(flight: Flight, event: Event, key: str) -> float:
+    value = event.details.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise FlightError(
+            f"the sweep at {event.time:g} s has {value!r} for '{key}', expected a number.",
+            where=flight.provenance.source or None,
+            channel="events",
+            hint="The file is damaged: read the log itself again.",
+        )
+    return float(value)
+
+
+def _candidates(flight: Flight) -> list[str]:
+    """Commands; where no channel is known as one, every channel that the schema does not know."""
+    commands = [name for name in flight.channels if name.startswith(_COMMANDS)]
+    return commands or [name for name in flight.channels if not is_known(name)]
+
+
+def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
+    """Sweeps in the signals beside the `told` ones; of several channels that show one, the one that moves most."""
+    found: list[tuple[float, Sweep]] = []
+    for name in _candidates(flight):
+        time, values = flight.time(name), flight.values(name)
+        for start, stop in _unbroken(time):
+            inside = (time >= start) & (time <= stop)
+            for ridge in _all_rising(time[inside], values[inside]):
+                axis = _AXES.get(name.rpartition("_")[2], name)
+                amplitude = ridge[4] / (1e-3 if name.startswith("rcin_") else 1.0)  # pulses move by 0.5 ms
+                found.append((amplitude, Sweep(ridge[0], ridge[1], axis, ridge[2], ridge[3], name, "signal")))
+    kept: list[Sweep] = []
+    for _, sweep in sorted(found, key=lambda item: -item[0]):
+        others = (*told, *((other.start, other.stop) for other in kept))
+        if not any(sweep.start < stop and start < sweep.stop for start, stop in others):
+            kept.append(sweep)
+    return kept
+
+
+def _unbroken(time: Array) -> list[tuple[float, float]]:
+    if time.size < 2:
+        return []
+    step = np.diff(time)
+    breaks = np.flatnonzero(step > max(10.0 * float(np.median(step)), 0.5))
+    edges = [0, *(breaks + 1).tolist(), time.size]
+    return [(float(time[a]), float(time[b - 1])) for a, b in pairwise(edges) if b - a > 1]
+
+
+def _all_rising(time: Array, values: Array) -> list[tuple[float, float, float, float, float]]:
+    """The strongest sweep in a signal, and those before and after it."""
+    ridge = rising(time, values)
+    if ridge is None:
+        return []
+    before, after = time < ridge[0], time > ridge[1]
+    return [
+        *_all_rising(time[before], values[before]),
+        ridge,
+        *_all_rising(time[after], values[after]),
+    ]
+
+
+def rising(time: Array, values: Array) -> tuple[float, float, float, float, float] | None:
+    """The strongest ridge of steadily rising frequency in a signal.
+
+    Args:
+        time: strictly increasing stamps [s], shape (n,); values: shape (n,).
+
+    Returns:
+        Start and stop [s], lowest and highest frequency [Hz], amplitude; None where there is no sweep.
+    """
+    length = float(time[-1] - time[0]) if time.size > 1 else 0.0
+    if length < _LEAST_SECONDS or not np.ptp(values) > 0.0:
+        return None
+    rate = min((time.size - 1) / length, _FASTEST)
+    grid = np.arange(int(length * rate) + 1) / rate
+    signal = np.asarray(detrend(np.interp(grid + time[0], time, _thinned(time, values, rate))), dtype=np.float64)
+    low, high = max(2.0 / length, 0.05), _HIGHEST * rate
+    if high < _LEAST_RATIO * low:
+        return None
+    frequency = low * 2.0 ** (np.arange(int(_PER_OCTAVE * np.log2(high / low)) + 1) / _PER_OCTAVE)
+    hop = max(1, round(rate / _FRAMES))
+    amplitude, power = _scalogram(signal, frequency, rate=rate, hop=hop)
+    floor = 1e-6 * float(np.max(power))
+    if not floor > np.finfo(np.float64).tiny:  # its squares are no numbers any more
+        return None
+    share = np.minimum(0.5 * amplitude**2 / np.maximum(power, floor), 1.0)
+    share[0.5 * amplitude**2 < 1e-3 * float(np.max(0.5 * amplitude**2))] = 0.0
+    path = _best_path(share - _SHARE)
+    if path is None:
+        return None
+    first, rows = path
+    frames = first + np.arange(rows.size)
+    strength = amplitude[rows, frames]
+    loud = np.flatnonzero(strength > _SEEN_WITHIN * np.median(strength))
+    heard = slice(int(loud[0]), int(loud[-1]) + 1)
+    frames, rows, strength = frames[heard], rows[heard], strength[heard]
+    band = frequency[rows]
+    seconds = frames.size * hop / rate
+    periods = float(np.sum(band)) * hop / rate
+    if band[-1] < _LEAST_RATIO * band[0] or seconds < _LEAST_SECONDS or periods < _LEAST_PERIODS:
+        return None
+    # A sudden jump between two tones is no sweep: it must spend time on the way.
+    if np.unique(rows).size < 0.6 * (rows[-1] - rows[0]):
+        return None
+    start, stop = (float(time[0] + grid[min(i * hop, grid.size - 1)]) for i in (frames[0], frames[-1]))
+    return start, stop, float(band[0]), float(band[-1]), float(np.median(strength))
+
+
+def _thinned(time: Array, values: Array, rate: float) -> Array:
+    """The signal averaged over the steps of a slower rate, so that nothing folds back into the band."""
+    width = round((time.size - 1) / float(time[-1] - time[0]) / rate)
+    return np.convolve(values, np.full(width, 1.0 / width), mode="same") if width > 1 else values
+
+
+def _scalogram(signal: Array, frequency: Array, *, rate: float, hop: int) -> tuple[Array, Array]:
+    """Amplitude at each frequency and power around it in time, both of shape (frequencies, frames).
+
+    The power is that of the whole signal within the wavelet's own window, slow drift (below half the lowest frequency)
+    apart: a pure tone holds all of it.
+    """
+    n = signal.size
+    size = int(2 ** np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.fft(signal, size)
+    bins = np.fft.fftfreq(size, 1.0 / rate)
+    spectrum[np.abs(bins) < 0.5 * frequency[0]] = 0.0
+    squared = np.fft.fft(np.real(np.fft.ifft(spectrum))[:n] ** 2, size)
+    amplitude = np.empty((frequency.size, -(-n // hop)))
+    power = np.empty_like(amplitude)
+    for i, f in enumerate(frequency):
+        spread = _CYCLES / (2.0 * np.pi * f)  # standard deviation of the Gaussian window [s]
+        window = 2.0 * np.exp(-0.5 * (2.0 * np.pi * (bins - f) * spread) ** 2)
+        amplitude[i] = np.abs(np.fft.ifft(spectrum * window))[:n:hop]
+        gauss = np.exp(-0.5 * (2.0 * np.pi * bins * spread / np.sqrt(2.0)) ** 2)
+        power[i] = np.real(np.fft.ifft(squared * gauss))[:n:hop]
+    return amplitude, np.maximum(power, 0.0)
+
+
+def _best_path(gain: Array) -> tuple[int, NDArray[np.int64]] | None:
+    """First frame and rows of the path with the largest sum of gains that never falls in frequency (Viterbi)."""
+    rows, frames = gain.shape
+    reach = 3  # rows a frame: 3 octaves a second
+    best = np.full(rows, 0.0)
+    came = np.full((rows, frames), -1, dtype=np.int64)
+    score, end = 0.0, None
+    for k in range(frames):
+        stacked = np.full((reach + 1, rows), -np.inf)
+        for step in range(reach + 1):
+            stacked[step, step:] = best[: rows - step]
+        choice = np.argmax(stacked, axis=0)
+        before = np.take_along_axis(stacked, choice[None, :], axis=0)[0]
+        on = before > 0.0
+        came[on, k] = (np.arange(rows) - choice)[on]
+        best = np.where(on, before, 0.0) + gain[:, k]
+        top = int(np.argmax(best))
+        if best[top] > score:
+            score, end = float(best[top]), (top, k)
+    if end is None:
+        return None
+    row, k = end
+    path = [row]
+    while came[row, k] >= 0:
+        row = int(came[row, k])
+        k -= 1
+        path.append(row)
+    return k, np.asarray(path[::-1], dtype=np.int64)

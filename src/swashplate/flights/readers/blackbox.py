@@ -1,0 +1,204 @@
+"""Blackbox logs of Rotorflight and Betaflight (`.bbl`, `.bfl`, `.txt`): the firmware that small helicopters fly.
+
+One stream of the main frames, one of GPS frames where there are any; slow frames and events become events. Times are
+the autopilot's own: seconds since its start. What fields are is said in `blackbox_fields`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import Event
+from swashplate.flights.readers import blackbox_header, checks, clocked
+from swashplate.flights.readers.blackbox_encodings import Whole
+from swashplate.flights.readers.blackbox_fields import Fields, gps_place
+from swashplate.flights.readers.blackbox_frames import FoundFrames, find_frames
+from swashplate.flights.readers.blackbox_header import Header, as_number, read_header
+from swashplate.flights.readers.blackbox_values import Main, main_frames
+from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.source import Source
+
+NAME = "blackbox"
+VERSION = "1"
+_KINDS = {14: "message", 15: "disarmed", 30: "mode"}
+
+
+def recognises(source: Source) -> bool:
+    """A file that holds the line with which every Blackbox log begins."""
+    return blackbox_header.MARKER in source.content
+
+
+def read(source: Source, options: Options) -> Flight:
+    """A Blackbox log as a flight; of several in the file the largest, or the one that is asked for.
+
+    What is damaged is left out and said: see `Provenance.damage`.
+
+    Raises:
+        FlightError: where the header says what cannot be, or nothing in the log can be used, or units or a mapping are
+            given.
+    """
+    if options.units or options.mapping:
+        raise FlightError(
+            "units and mappings have no meaning for a Blackbox log: its units are known.",
+            where=source.name,
+            hint="Leave them out.",
+        )
+    start, stop, number, note = _chosen(source, options.log)
+    header = read_header(source.content, start, stop, where=source.name)
+    found = find_frames(source.content, header, stop=stop, where=source.name)
+    main = main_frames(found, header)
+    fields = Fields(header, header.layouts["I"].names)
+    columns = fields.columns(main.columns)
+    notes = list(note)
+    streams: dict[str, xr.Dataset] = {}
+    made = clocked.made_stream("blackbox", main.time, columns, notes=notes)
+    if made is None:
+        raise FlightError(
+            f"holds no flight: {len(main.time)} main frames of {found.intra.size} can be used, and two are needed.",
+            where=source.name,
+            hint="Copy the log again; a log of nothing but a header was never written to.",
+        )
+    streams["blackbox"] = made
+    gps = _gps(found, header, main, notes)
+    if gps is not None:
+        streams["gps"] = gps
+    inputs = {
+        str(n): np.asarray(v.values, np.float64) for n, v in made.data_vars.items() if str(n).startswith("mixer_")
+    }
+    notes += [*main.notes, *_unfinished(found), *fields.remarks(columns), *checks.constant_notes(inputs)]
+    provenance = source.provenance(
+        NAME,
+        VERSION,
+        vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
+        notes=tuple(notes),
+        damage=(*_lost(found), *main.damage),
+        parameters=_parameters(header),
+        events=_events(found, header, main),
+    )
+    if note:
+        provenance = replace(provenance, source=f"{source.path.name}#{number}")
+    return Flight(streams, provenance)
+
+
+def _chosen(source: Source, wanted: int | None) -> tuple[int, int, int, tuple[str, ...]]:
+    """Where the log that is read begins and ends [bytes], its number, and a note where there are several."""
+    starts = blackbox_header.starts(source.content)
+    stops = (*starts[1:], source.size)
+    if wanted is not None and not 1 <= wanted <= len(starts):
+        raise FlightError(
+            f"log {wanted} is asked for; the file holds {len(starts)}.", where=source.name, hint="Count from 1."
+        )
+    sizes = [stop - start for start, stop in zip(starts, stops, strict=True)]
+    index = int(np.argmax(sizes)) if wanted is None else wanted - 1
+    if len(starts) == 1:
+        return starts[0], stops[0], 1, ()
+    listed = ", ".join(f"{size:,}" for size in sizes[:12]) + (" ..." if len(sizes) > 12 else "")
+    why = "the longest" if wanted is None else "as asked"
+    note = (
+        f"the file holds {len(starts)} logs ({listed} bytes); number {index + 1} was read, {why}: FILE#N (in Python "
+        "log=N) takes another"
+    )
+    return starts[index], stops[index], index + 1, (note,)
+
+
+def _unfinished(found: FoundFrames) -> list[str]:
+    if found.unfinished:
+        return [f"the last {found.unfinished} bytes are an unfinished frame: not read"]
+    return [] if found.ended else ["the log has no end mark: it was cut off, or the power was"]
+
+
+def _lost(found: FoundFrames) -> list[str]:
+    if not found.lost and not found.waiting:
+        return []
+    places = "place" if found.places == 1 else "places"
+    return [
+        f"{found.lost} bytes at {found.places} {places} belong to no frame, and {found.waiting} P frames have no I "
+        "frame before them: they were skipped"
+    ]
+
+
+def _parameters(header: Header) -> dict[str, float]:
+    """Numbers of the header by name; of a row of numbers `rollPID_0`, `rollPID_1`, ..."""
+    found = {}
+    for name, text in header.values.items():
+        plain = re.sub(r"\W+", "_", name).strip("_")
+        parts = text.split(",")
+        for i, part in enumerate(parts[:32]):
+            value = as_number(part.strip(), np.nan)
+            if plain and np.isfinite(value):
+                found[plain if len(parts) == 1 else f"{plain}_{i}"] = value
+    return found
+
+
+def _when(after: int, main: Main) -> float:
+    """The time [s] of the main frame before an event."""
+    return float(main.clock[min(max(after - 1, 0), main.clock.size - 1)]) if main.clock.size else 0.0
+
+
+def _events(found: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]:
+    events = []
+    for told in found.events:
+        time = _when(told.after, main)
+        if told.kind == 14:  # a pause lies behind it
+            time = _when(told.after + 1, main)
+        numbers = {f"number_{i}": value for i, value in enumerate(told.numbers)}
+        shown = " ".join(f"{value:g}" for value in told.numbers)
+        events.append(Event(time, _KINDS.get(told.kind, "message"), f"{told.text} {shown}".strip(), numbers))
+    if "S" in found.others:
+        written, after = found.others["S"]
+        for row, name in zip(written, header.layouts["S"].names, strict=True):
+            changed = np.flatnonzero(np.diff(row, prepend=row[0] - 1)).tolist()
+            for i in changed:
+                kind = "mode" if name == "flightModeFlags" else "message"
+                events.append(Event(_when(int(after[i]), main), kind, f"{name} {row[i]}", {"number": float(row[i])}))
+    return tuple(sorted(events, key=lambda event: event.time))
+
+
+def _gps(found: FoundFrames, header: Header, main: Main, notes: list[str]) -> xr.Dataset | None:
+    """GPS frames: places count from the home before them, times from the main frame before them."""
+    if "G" not in found.others or not main.clock.size:
+        return None
+    written, after = found.others["G"]
+    layout = header.layouts["G"]
+    base = np.array([_when(int(count), main) for count in after])
+    time = np.asarray(base)
+    columns: dict[str, tuple[Array, str]] = {}
+    for row, name, predictor in zip(written, layout.names, layout.predictors, strict=True):
+        values = row.astype(np.float64)
+        if name == "time":
+            time = base + values / 1e6 if predictor == 10 else values / 1e6
+            continue
+        if predictor == 7:
+            values = values + _home(found, header, name, after)
+        channel, unit, factor = gps_place(name)
+        columns[channel] = (values * factor, unit)
+    return clocked.made_stream("gps", time, _unlike(columns), notes=notes)
+
+
+def _unlike(columns: Mapping[str, tuple[Array, str]]) -> dict[str, tuple[Array, str]]:
+    """The columns without those that the main frames may hold."""
+    return {name: column for name, column in columns.items() if name.lower().startswith(("gps", "lat", "lon"))}
+
+
+def _home(found: FoundFrames, header: Header, name: str, after: Whole) -> Array:
+    """The home coordinate that stands before each GPS frame; NaN where none does."""
+    home = np.full(after.size, np.nan)
+    if "H" not in found.others:
+        return home
+    written, stands = found.others["H"]
+    wanted = name.replace("coord", "home")
+    names = header.layouts["H"].names
+    if wanted not in names:
+        return home
+    index = np.searchsorted(stands, after, side="right") - 1
+    there = index >= 0
+    home[there] = written[names.index(wanted)][index[there]]
+    return home

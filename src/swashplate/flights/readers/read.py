@@ -1,0 +1,122 @@
+"""`read`: the file's content decides which reader it gets, not its name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from swashplate.errors import FlightError
+from swashplate.flights.epoch import rebased
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers import analogue, blackbox
+from swashplate.flights.readers.options import Options, load_mapping
+from swashplate.flights.readers.source import Source, open_source
+from swashplate.registry import Registry
+
+
+class Reader(Protocol):
+    """What a reader module offers."""
+
+    NAME: str
+    VERSION: str
+
+    def recognises(self, source: Source) -> bool: ...
+
+    def read(self, source: Source, options: Options) -> Flight: ...
+
+
+_OURS = (
+    "ardupilot",
+    "px4log",
+    "blackbox",
+    "ulog",
+    "rosbag",
+    "coax56",
+    "nanobench",
+    "netcdf",
+    "growing",
+    "optitrack",
+    "vicon",
+    "delimited",
+)
+_LAST = "delimited"  # nearly any text looks like a plain table
+READERS: Registry[Reader] = Registry(
+    "readers",
+    what="reader of flight logs",
+    own={name: f"swashplate.flights.readers.{name}" for name in _OURS},
+)
+"""Asked in this order, other packages' readers (entry points) before the plain table, which is asked last."""
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    units: Mapping[str, str] | None = None,
+    mapping: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    body: str | None = None,
+    rotation: str | None = None,
+    body_axes: str | None = None,
+    world_axes: str | None = None,
+    bad_stamps: str = "error",
+    log: int | None = None,
+) -> Flight:
+    """Reads a flight log: ArduPilot DataFlash (`.bin`, `.log`), PX4 ULog (`.ulg`) or `.px4log`, Blackbox of Rotorflight
+    and Betaflight (`.bbl`, `.bfl`), a ROS bag (1 or 2), a CoaX-56 `.mat` record, a NanoBench CSV file, a swashplate
+    netCDF or CSV file, a Vicon or OptiTrack CSV export.
+
+    ULog files and ROS bags need `pip install swashplate[logs]`.
+
+    Args:
+        path: the file, or the folder of a rosbag2.
+        units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
+            or the wrong ones.
+        mapping: a TOML file, or its content as a dictionary, that says which columns of a CSV file are which channels
+            (`readers/delimited.py`); its table `[mocap]` may hold the next four. With a table `[recorder]` it is the
+            calibration of an analogue recorder (`readers/analogue.py`).
+        body: the tracked body, where a motion capture file has several.
+        rotation: how three logged angles are meant: "helical" or "euler_xyz", where the file does not say.
+        body_axes: where the tracked body's logged axes point, for example "forward-left-up" (a bag's default).
+        world_axes: where the room's logged axes point, for example "north-west-up" (a bag's default: "east-north-up").
+        bad_stamps: "error", or "drop" to leave out samples whose time repeats or goes backwards.
+        log: which of the logs in a Blackbox file, from 1; the longest if not given.
+
+    Returns:
+        The flight in SI units, radians, NED and FRD, at its native rates, not repaired in any way. Where stamps are
+        large (Unix time) all streams begin in the first second, and `Flight.epoch` says what was taken off.
+
+    Raises:
+        FlightError, UnitError: naming the file, the channel, what was found, what was expected and what to do.
+    """
+    source = open_source(path)
+    options = Options(
+        units=units or {},
+        mapping=load_mapping(mapping),
+        mapping_file="" if mapping is None or isinstance(mapping, Mapping) else os.fspath(mapping),
+        body=body,
+        rotation=rotation,
+        body_axes=body_axes,
+        world_axes=world_axes,
+        bad_stamps=bad_stamps,
+        log=log,
+    )
+    if log is not None and not blackbox.recognises(source):
+        raise FlightError(
+            "holds one log only.",
+            where=source.path,
+            channel="log",
+            hint="Only Blackbox files hold several: leave it out.",
+        )
+    if analogue.is_calibration(options.mapping):
+        return rebased(analogue.read(source, options))
+    for name in (*(name for name in READERS if name != _LAST), _LAST):
+        reader = READERS[name]
+        if reader.recognises(source):
+            return rebased(reader.read(source, options))
+    raise FlightError(
+        f"is no flight log that is known; it starts with {source.content[:8]!r}.",
+        where=source.path,
+        hint="Known are ArduPilot (.bin, .log), PX4 (.ulg, .px4log), Blackbox (.bbl), ROS bags, CoaX-56 .mat, "
+        "NanoBench CSV, swashplate netCDF (.nc), CSV (columns parted by comma, semicolon or tab), and the exports of "
+        "Vicon and OptiTrack.",
+    )

@@ -1,0 +1,152 @@
+"""How sure an estimate is: Cramér-Rao bounds, plain and corrected for coloured residuals, and blind directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
+from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.result import Direction
+
+_BLIND = 1.0
+"""A direction whose standard deviation exceeds this many scales is named as one that the data hardly see."""
+
+_NO_INFORMATION = 1e-9
+"""Data information per squared scale below which a parameter without a prior cannot be estimated at all."""
+
+
+def refuse_unseen(row: Row, information: Array, *, where: str) -> None:
+    """Raise where a free parameter without a prior leaves no trace in the data.
+
+    Raises:
+        IdentificationError: naming the parameters.
+    """
+    unseen = [
+        entry.name
+        for i, entry in enumerate(row.entries)
+        if entry.group == "parameter" and not np.isfinite(entry.sigma) and information[i, i] < _NO_INFORMATION
+    ]
+    if unseen:
+        raise IdentificationError(
+            "the flight carries no information about it.",
+            where=where,
+            channel=", ".join(unseen),
+            hint="Fix it, give it a prior, or fly what moves it.",
+        )
+
+
+def covariance(row: Row, information: Array, prior: Array) -> Array:
+    """Cramér-Rao bound of the scaled row: the inverse of data and prior information together."""
+    total = information + prior
+    d = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    return np.asarray(np.linalg.pinv(total / np.outer(d, d), hermitian=True) / np.outer(d, d))
+
+
+def corrected_covariance(
+    plain: Array, rest: Array, whitened: Sequence[Array], sensitivities: Sequence[Array], *, lags: int
+) -> Array:
+    """Bound that allows for coloured residuals (Morelli and Klein 1997; Klein and Morelli 2006, sec. 6.1).
+
+        Sigma = M^-1 [ sum_i sum_j S_i' R^-1 Rvv(i-j) R^-1 S_j ] M^-1
+
+    in whitened form, with one autocorrelation for all records. Residuals are the errors less what the fit took out of
+    them, `v = (1 - S M^-1 S') e`, so their products fall short of the errors'; what a white error loses is added back
+    (without it windows with their own initial states look less correlated than they are). The autocorrelation is
+    tapered linearly (Bartlett), which keeps the result positive; the double sum is taken in the frequency domain.
+
+    Args:
+        plain: M^-1, scaled, shape (p, p).
+        rest: information that no residual carries (priors, the covariance's own), shape (p, p); it is not coloured.
+        whitened: per record, residuals (n, m) divided by their standard deviation.
+        sensitivities: per record, their derivatives (p, n, m).
+        lags: how many samples of correlation to allow for.
+    """
+    moved = [np.flatnonzero(np.any(sensitivity, axis=(1, 2))) for sensitivity in sensitivities]
+    pieces = [sensitivity[own] for sensitivity, own in zip(sensitivities, moved, strict=True)]
+    products = [
+        _products(residual, residual, lags) + _products(*_taken(piece, plain[np.ix_(own, own)]), lags)
+        for residual, piece, own in zip(whitened, pieces, moved, strict=True)
+    ]
+    taper = 1.0 - np.arange(lags + 1) / (lags + 1.0)
+    correlation = taper[:, None, None] * np.sum(products, axis=0) / sum(len(residual) for residual in whitened)
+    middle = np.array(rest, dtype=np.float64)
+    for piece, own in zip(pieces, moved, strict=True):  # a window's residuals know nothing of other windows
+        middle[np.ix_(own, own)] += _spread(correlation, piece)
+    return np.asarray(plain @ middle @ plain)
+
+
+def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
+    """Two rows of which the products over time are what the fit takes out of a white error, each (n, m, p)."""
+    seen = sensitivity.transpose(1, 2, 0)
+    return seen @ plain, seen
+
+
+def _products(left: Array, right: Array, lags: int) -> Array:
+    """sum_t left(t) right(t + lag)' for lags 0 to `lags`, over a last axis too where there is one; (lags + 1, m, m)."""
+    n = len(left)
+    size = next_fast_len(n + lags, real=True)  # long enough for the sums not to wrap round
+    a, b = (rfft(x.reshape(n, x.shape[1], -1), size, axis=0) for x in (left, right))
+    return np.asarray(irfft(a.conj() @ b.transpose(0, 2, 1), size, axis=0)[: lags + 1])
+
+
+def _spread(correlation: Array, sensitivity: Array) -> Array:
+    """Covariance of sum_t S_t' v_t for errors v with a one-sided autocorrelation (lags + 1, m, m), shape (p, p)."""
+    n, lags, m = sensitivity.shape[1], len(correlation) - 1, correlation.shape[1]
+    size = next_fast_len(n + lags, real=True)
+    both = np.zeros((size, m, m))
+    both[: lags + 1] = correlation.transpose(0, 2, 1)
+    both[size - lags :] = correlation[:0:-1]
+    spectrum = rfft(both, axis=0)
+    moved = rfft(sensitivity, size, axis=1).transpose(1, 2, 0)
+    share = np.full(len(spectrum), 2.0 / size)  # of both signs of a frequency (Parseval)
+    share[0] = 1.0 / size
+    if size % 2 == 0:
+        share[-1] = 1.0 / size
+    left = (moved.conj() * share[:, None, None]).reshape(-1, moved.shape[2])
+    return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
+
+
+def marginal_information(information: Array, prior: Array, places: Array) -> Array:
+    """What the data say about some entries when all others are unknown (Schur complement), scaled.
+
+    The others keep their priors, so that a nuisance nobody can see does not make the rest blind.
+    """
+    others = np.setdiff1d(np.arange(information.shape[0]), places)
+    within = information[np.ix_(places, places)]
+    if not others.size:
+        return np.asarray(within)
+    across = information[np.ix_(places, others)]
+    rest = information[np.ix_(others, others)] + prior[np.ix_(others, others)]
+    return np.asarray(within - across @ np.linalg.pinv(rest, hermitian=True) @ across.T)
+
+
+def blind_directions(names: Sequence[str], information: Array) -> tuple[Direction, ...]:
+    """Combinations of parameters that the data hardly see, worst first.
+
+    Args:
+        names: the parameters.
+        information: of the scaled parameters, nuisances marginalised, priors left out.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    directions = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        sigma = float(1.0 / np.sqrt(max(value, 1e-18)))
+        if sigma < _BLIND:
+            continue
+        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
+        weights = {name: float(w) for name, w in zip(names, vector, strict=True)}
+        directions.append(Direction(weights, sigma, _in_words(weights, sigma)))
+    return tuple(directions)
+
+
+def _in_words(weights: dict[str, float], sigma: float) -> str:
+    main = sorted(((abs(w), name) for name, w in weights.items() if abs(w) > 0.3), reverse=True)
+    parts = [f"{name} {'up' if weights[name] > 0 else 'down'}" for _, name in main]
+    size = "without limit" if sigma > 1e6 else f"by {sigma:.2g} times the usual size"
+    if len(parts) == 1:
+        return f"{main[0][1]} can move {size} before the data object"
+    return f"{' with '.join(parts)} can move {size} before the data object"

@@ -1,0 +1,155 @@
+"""A conditioned flight as the arrays that estimators work on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight, did_you_mean
+from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+
+POSE = (*POSITION, *ATTITUDE)
+"""What motion capture measures."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One unbroken piece of a flight on a uniform time grid.
+
+    Attributes:
+        name: the flight's source and the piece's interval.
+        time: stamps [s], shape (n,).
+        inputs: commands in the order of the vehicle's inputs, shape (n, n_inputs).
+        outputs: measured channels in the order of `output_names`, shape (n, n_outputs).
+        voltage: battery voltage [V], shape (n,).
+        output_names: names of the measured channels.
+        voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
+        log: the flight it is a piece of; the pieces of one log share their delays, trims and lever arm.
+    """
+
+    name: str
+    time: Array
+    inputs: Array
+    outputs: Array
+    voltage: Array
+    output_names: tuple[str, ...]
+    voltage_known: bool
+    log: str = ""
+
+    @property
+    def dt(self) -> float:
+        return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
+
+
+def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Sequence[str] = POSE) -> list[Record]:
+    """The unbroken pieces of one or more conditioned flights.
+
+    Raises:
+        FlightError: where a flight lacks a channel, is not on a uniform grid or holds NaN, or where no input moves.
+    """
+    pieces: list[Record] = []
+    for flight in [flights] if isinstance(flights, Flight) else list(flights):
+        source = flight.provenance.source or "flight"
+        again = sum(1 for name in logs(pieces)[0] if name.split(" #")[0] == source)
+        log = f"{source} #{again + 1}" if again else source
+        for piece in flight.split():
+            pieces.append(_record(piece, vehicle, tuple(outputs), log=log))
+    if not pieces:
+        raise FlightError("there is no flight to work on.")
+    steps = {round(piece.dt, 9) for piece in pieces}
+    if len(steps) > 1:
+        raise FlightError(
+            f"the flights have different rates (steps of {sorted(steps)} s).",
+            hint="Condition all of them to the same rate.",
+        )
+    if not any((np.ptp(piece.inputs, axis=0) > _STILL).any() for piece in pieces):
+        raise FlightError(
+            "no input ever moves, so nothing can be learnt about what they do.",
+            where=pieces[0].name,
+            channel=", ".join(vehicle.input_names),
+            hint="Check that the commands were logged (swash inspect), or fly a sweep or a multisine.",
+        )
+    return pieces
+
+
+def logs(pieces: Sequence[Record]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Names of the logs, in order, and which of them each piece comes from."""
+    names = tuple(dict.fromkeys(piece.log for piece in pieces))
+    return names, np.array([names.index(piece.log) for piece in pieces], dtype=np.intp)
+
+
+def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[Array, Array]:
+    """Time (n,) and channels (n, len(wanted)) of an unbroken flight on a uniform grid.
+
+    Args:
+        flight: one unbroken piece.
+        wanted: channels, in order.
+        who: what needs them, for the message.
+
+    Raises:
+        FlightError: where a channel is missing, on another time base, not finite, or the grid is not uniform.
+    """
+    source = flight.provenance.source or "flight"
+    missing = [name for name in wanted if name not in flight]
+    if missing:
+        raise FlightError(
+            f"lacks what {who} needs; it has {', '.join(flight.channels) or 'nothing'}.",
+            where=source,
+            channel=", ".join(missing),
+            hint=did_you_mean(missing[0], flight.channels)
+            or "Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
+        )
+    table = flight.array(wanted)
+    time = flight.time(wanted[0])
+    if time.size < 3:
+        raise FlightError(f"has {time.size} samples, expected at least 3.", where=source)
+    steps = np.diff(time)
+    if np.ptp(steps) > 1e-6 * float(np.mean(steps)) + 1e-9:
+        raise FlightError(
+            f"time steps vary from {steps.min():.6f} to {steps.max():.6f} s.",
+            where=source,
+            hint="Bring the flight to a uniform rate with flight.condition(rate=100).",
+        )
+    for column, name in enumerate(wanted):
+        if not np.all(np.isfinite(table[:, column])):
+            raise FlightError("holds values that are not finite.", where=source, channel=name)
+    return time, table
+
+
+def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: str) -> Record:
+    wanted = (*vehicle.input_names, *outputs)
+    time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
+    source = flight.provenance.source or "flight"
+    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
+    known = "voltage" in flight
+    n_inputs = len(vehicle.input_names)
+    return Record(
+        name=f"{source} {time[0]:.2f}-{time[-1]:.2f} s",
+        time=time,
+        inputs=table[:, :n_inputs],
+        outputs=table[:, n_inputs:],
+        voltage=_slow(flight.values("voltage"), float(np.mean(np.diff(time))), vehicle.traits.voltage_seconds)
+        if known
+        else np.full(time.size, nominal),
+        output_names=outputs,
+        voltage_known=known,
+        log=log,
+    )
+
+
+_STILL = 1e-6
+"""Change of a command that is no change: what interpolation leaves of a constant."""
+
+
+def _slow(voltage: Array, dt: float, seconds: float) -> Array:
+    """A logged voltage without its noise: straight lines over some seconds each way (Savitzky and Golay 1964)."""
+    window = min(2 * round(seconds / dt) + 1, voltage.size - (voltage.size + 1) % 2)
+    return np.asarray(savgol_filter(voltage, window, 1), dtype=np.float64)

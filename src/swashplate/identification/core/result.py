@@ -1,0 +1,360 @@
+"""`Result`: what any identification found, how sure it is, what it could not see, and models that fit as well."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.identification.core.comparison import Compared, Comparison
+from swashplate.identification.core.draws import normal_within
+from swashplate.identification.core.sources import Source
+from swashplate.public import resolve
+
+APART = 3.0
+"""Sigmas beyond which a prior and a flight disagree."""
+
+NAN = float("nan")
+
+Model = TypeVar("Model")
+Details = TypeVar("Details")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One number of a model, estimated or not.
+
+    Attributes:
+        name, unit: as in the model.
+        start: the model's value before the fit.
+        value: the estimate.
+        sigma: Cramér-Rao bound sqrt(inv(H)_ii), prior included [same unit].
+        sigma_corrected: the bound corrected for coloured residuals (Morelli and Klein 1997), NaN where the method has
+            none.
+        insensitivity: 1/sqrt(H_ii), were all others known [same unit].
+        prior_mean, prior_sigma: the prior, None where the data alone decided.
+        prior_share: part of the information that came from the prior, 0 (data alone) to 1 (prior alone).
+        at_bound: True where the fit ended on a bound of physics.
+        tie: the expression that ties it to others ("" where it was free).
+        fixed: True where it did not move.
+        prior_source: where the prior comes from ("" where there is none).
+        alone: what the flight alone would have said, NaN where it says nothing.
+        disagreement: flight alone less prior, in standard deviations of that difference (NaN: none).
+    """
+
+    name: str
+    unit: str
+    start: float
+    value: float
+    sigma: float = NAN
+    sigma_corrected: float = NAN
+    insensitivity: float = NAN
+    prior_mean: float | None = None
+    prior_sigma: float | None = None
+    prior_share: float = 0.0
+    at_bound: bool = False
+    tie: str = ""
+    fixed: bool = False
+    prior_source: str = ""
+    alone: float = NAN
+    disagreement: float = NAN
+
+    @property
+    def free(self) -> bool:
+        return not self.fixed and not self.tie
+
+    @property
+    def best_sigma(self) -> float:
+        """The corrected bound where there is one, otherwise the plain one."""
+        return self.sigma_corrected if np.isfinite(self.sigma_corrected) else self.sigma
+
+    @property
+    def sigma_percent(self) -> float:
+        return 100.0 * self.sigma / abs(self.value) if self.value else float("inf")
+
+    @property
+    def insensitivity_percent(self) -> float:
+        return 100.0 * self.insensitivity / abs(self.value) if self.value else float("inf")
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number of the records and not of the model: a delay [s], a trim [1], a start state, a noise, a filter's gain.
+
+    `record` is "" where all records share it.
+    """
+
+    record: str
+    name: str
+    unit: str
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A combination of parameters that the data hardly see.
+
+    Attributes:
+        weights: by parameter, in units of its scale, of length one.
+        sigma: uncertainty along it, in the same units (1 means: of the order of the parameters' scales).
+        words: the same in words.
+    """
+
+    weights: Mapping[str, float]
+    sigma: float
+    words: str
+
+
+class Drawable(Protocol):
+    """What a model must be for other numbers of it to be drawn."""
+
+    def with_values(self, values: Mapping[str, float]) -> Any: ...
+
+
+@dataclass(frozen=True, repr=False)
+class Result(Generic[Model, Details]):
+    """What an identification found.
+
+    Attributes:
+        method: name of the estimator.
+        model: what was identified. start: the same before the fit.
+        estimates: the model's numbers, free ones in the order of `names`, then (or among them) tied and fixed ones.
+        names: free parameters in the order of the matrices below.
+        covariance, covariance_corrected: of the free parameters in their units (p, p); the second allows for coloured
+            residuals and is NaN where the method has none.
+        correlation: of the free parameters (p, p).
+        history: cost after each iteration.
+        converged: False where the iterations ran out.
+        problems: what is wrong with the fit, in words; a fit with values that physics forbids is a failed fit.
+        failed: True where the numbers must not be used.
+        warnings: what a reader must know.
+        directions: what the data hardly see, worst first.
+        constants: what belongs to the records and not to the model.
+        noise, nuisance: of the stochastic model and the records' mean, what a prediction on another flight uses; None
+            where the method has none.
+        comparisons: data against model, per record or per response.
+        data: what it was fitted to: names, SHA-256 and what was done to it.
+        settings: what was asked.
+        details: what only this method has.
+        seconds: wall time; it is no part of the document.
+    """
+
+    method: str
+    model: Model
+    start: Model
+    estimates: tuple[Estimate, ...]
+    names: tuple[str, ...]
+    covariance: Array
+    covariance_corrected: Array
+    correlation: Array
+    details: Details
+    history: tuple[float, ...] = ()
+    converged: bool = True
+    problems: tuple[str, ...] = ()
+    failed: bool = False
+    warnings: tuple[str, ...] = ()
+    directions: tuple[Direction, ...] = ()
+    constants: tuple[Constant, ...] = ()
+    noise: Noise | None = None
+    nuisance: Nuisance | None = None
+    comparisons: tuple[Compared, ...] = ()
+    data: tuple[Source, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @cached_property
+    def _by_name(self) -> dict[str, Estimate]:
+        return {estimate.name: estimate for estimate in self.estimates}
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name.
+
+        Raises:
+            KeyError: where there is none.
+        """
+        return self._by_name[name]
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the data."""
+        return tuple(source.name for source in self.data)
+
+    @property
+    def in_time(self) -> tuple[Comparison, ...]:
+        """Records beside the model, for a fit to records; empty for others."""
+        return tuple(c for c in self.comparisons if isinstance(c, Comparison))
+
+    @property
+    def targets(self) -> tuple[Any, ...]:
+        """The responses of a fit to frequency responses; empty for others."""
+        return tuple(found for c in self.comparisons if (found := getattr(c, "target", None)) is not None)
+
+    @property
+    def costs(self) -> tuple[float, ...]:
+        """J of each response, for a fit to frequency responses; empty for others."""
+        return tuple(cost for c in self.comparisons if (cost := getattr(c, "cost", None)) is not None)
+
+    @property
+    def cost(self) -> float:
+        """Mean J of a fit to frequency responses; the last cost of others."""
+        if self.costs:
+            return float(np.mean(self.costs))
+        return self.history[-1] if self.history else NAN
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+        return str(getattr(self.model, "name", "transfer functions"))
+
+    # ---- models that the data cannot tell apart ----------------------------------------------------------------
+    def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
+        """Parameters of models that the data cannot tell from the identified one, shape (count,) each.
+
+        Normal about the estimates, from their covariance; a draw outside a bound of physics is drawn again. Ties are
+        kept where they equate two parameters.
+
+        Args:
+            count: how many. seed: of the draws.
+            corrected: True takes the covariance that is corrected for coloured residuals, where the method has one.
+            within: a model whose bounds hold (None: the identified one).
+
+        Raises:
+            IdentificationError: for a fit that has failed, that knows no spread, or whose spread lies mostly outside
+                the bounds of physics.
+        """
+        where = f"the fit of {self.name}"
+        if self.failed:
+            raise IdentificationError("has failed: nothing can be drawn from it.", where=where, hint="Fit it again.")
+        covariance = self.covariance_corrected if corrected else self.covariance
+        if not np.all(np.isfinite(covariance)):
+            covariance = self.covariance
+        vague = [n for n, v in zip(self.names, np.diag(covariance), strict=True) if not 0.0 < v < np.inf]
+        if vague or not self.names or not np.all(np.isfinite(covariance)):
+            told = "has no standard deviation." if vague else "knows no spread: nothing was free."
+            raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
+        low, high = bounds_of(self.model if within is None else within, self.names)
+        mean = np.array([self[name].value for name in self.names])
+        found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
+        drawn = {name: found[:, i] for i, name in enumerate(self.names)}
+        return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
+
+    def draw(self, count: int, *, seed: int) -> tuple[Model, ...]:
+        """Models that the data cannot tell from the identified one (see `draw_values`, which it takes).
+
+        Raises:
+            IdentificationError: as `draw_values`; or for a model whose numbers cannot be changed.
+        """
+        if not hasattr(self.model, "with_values"):
+            raise IdentificationError("numbers of it cannot be drawn.", where=self.name)
+        made: Drawable = self.model
+        drawn = self.draw_values(count, seed=seed)
+        return tuple(made.with_values({name: float(v[k]) for name, v in drawn.items()}) for k in range(count))
+
+    # ---- files -------------------------------------------------------------------------------------------------
+    def to_document(self, *, comparisons: bool = True) -> dict[str, Any]:
+        """All of it as JSON types, but for the wall time; `from_document` is the way back.
+
+        Args:
+            comparisons: False leaves the time histories and responses out, which are most of it.
+        """
+        document: dict[str, Any] = resolve("result_to_document")(self, comparisons=comparisons)
+        return document
+
+    @staticmethod
+    def from_document(document: Mapping[str, Any], *, where: str = "", equations: Any = None) -> Result[Any, Any]:
+        """The result of a document (see `swashplate.load`, whose errors it raises)."""
+        result: Result[Any, Any] = resolve("result_from_document")(document, where=where, equations=equations)
+        return result
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the document as a file that `swashplate.load` reads."""
+        written: Path = resolve("save_result")(self, path)
+        return written
+
+    # ---- words -------------------------------------------------------------------------------------------------
+    @property
+    def state(self) -> str:
+        return "FAILED" if self.failed else "converged" if self.converged else "not converged"
+
+    def __repr__(self) -> str:
+        responses = f", J_ave = {self.cost:.1f} over {len(self.costs)} responses" if self.costs else ""
+        lines = [f"{self.name} by {self.method}: {self.state}{responses}"]
+        told = getattr(self.details, "lines", None)
+        lines += told(self) if told is not None else []
+        columns = [(head, cells) for head, cells in self._columns() if any(cells)]
+        widths = [max(len(cell) for cell in (head, *cells)) for head, cells in columns]
+        for row in range(-1, len(self.estimates)):
+            cells = []
+            for (head, column), width in zip(columns, widths, strict=True):
+                cell = head if row < 0 else column[row]
+                cells.append(cell.ljust(width) if head in ("parameter", "unit", "remarks") else cell.rjust(width))
+            lines.append(("  " + "  ".join(cells)).rstrip())
+        return "\n".join([*lines, *(f"! {text}" for text in (*self.problems, *self.warnings))])
+
+    def _columns(self) -> list[tuple[str, list[str]]]:
+        every = self.estimates
+        return [
+            ("parameter", [e.name for e in every]),
+            ("start", [f"{e.start:.5g}" for e in every]),
+            ("value", [f"{e.value:.5g}" for e in every]),
+            ("sigma", [_number(e.best_sigma) if not e.fixed else "" for e in every]),
+            ("sigma %", [_percent(e.best_sigma, e.value) if e.free else "" for e in every]),
+            ("I %", [percent(e.insensitivity_percent).strip() if np.isfinite(e.insensitivity) else "" for e in every]),
+            ("unit", [e.unit for e in every]),
+            ("remarks", [remark(e) for e in every]),
+        ]
+
+    def _repr_html_(self) -> str:
+        heads, columns = zip(*((head, cells) for head, cells in self._columns() if any(cells)), strict=True)
+        rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in zip(*columns, strict=True)]
+        told = "".join(f"<p>{html.escape(text)}</p>" for text in (*self.problems, *self.warnings))
+        title = html.escape(f"{self.name} by {self.method}: {self.state}")
+        head = "".join(f"<th>{h}</th>" for h in heads)
+        return f"<p>{title}</p><table><tr>{head}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>{told}"
+
+
+def remark(e: Estimate) -> str:
+    """What a table says beside an estimate."""
+    return f"= {e.tie}" if e.tie else "fixed" if e.fixed else "at its bound" if e.at_bound else ""
+
+
+def percent(value: float, *, width: int = 8) -> str:
+    """A figure in percent for a table; what is beyond all use keeps its column."""
+    return f"{value:>{width}.1f}" if value < 1e4 else f"{'>9999':>{width}}"
+
+
+def _percent(sigma: float, value: float) -> str:
+    return percent(100.0 * sigma / abs(value)).strip() if value and np.isfinite(sigma) else ""
+
+
+def _number(value: float) -> str:
+    return f"{value:.2g}" if np.isfinite(value) else ""
+
+
+def bounds_of(model: Any, names: Sequence[str]) -> tuple[Array, Array]:
+    """What physics allows of a model's parameters, (p,) each; infinite where nothing is said."""
+    card = getattr(model, "card", None)
+    table: Mapping[str, Any] = (card if card is not None else model).parameters
+    low, high = (
+        np.array([usual if (bound := getattr(table[n], side)) is None else bound for n in names], dtype=np.float64)
+        for side, usual in (("lower", -np.inf), ("upper", np.inf))
+    )
+    return low, high
+
+
+def correlation_of(covariance: Array) -> Array:
+    """Correlation (p, p) of a covariance."""
+    d = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    with np.errstate(invalid="ignore"):  # infinite over infinite: parameters that leave no trace
+        return np.asarray(covariance / np.outer(d, d))

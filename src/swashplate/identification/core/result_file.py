@@ -1,0 +1,178 @@
+"""Results as documents and files: written whole, read back whole, checked on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from swashplate import documents
+from swashplate.arrays import Array
+from swashplate.errors import DocumentError
+from swashplate.identification.core.document_codec import decode, encode, part
+from swashplate.identification.core.result import Result
+from swashplate.models.card import card_from
+from swashplate.models.catalogue import from_card
+from swashplate.models.linear import state_space_file
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.transfer_function import TransferFunction
+from swashplate.models.vehicle import Vehicle
+
+KIND, SCHEMA = "result", 1
+_HINT = "`swash identify --out DIR` (or fit-ss, fit-tf, fit-time) writes DIR/fit.json."
+_SPECIAL = ("model", "start", "details", "seconds")
+_TOLD = {"kind", "schema", "costs"}
+"""Entries that are no field: what it is, and J of each response for readers who leave the comparisons out."""
+
+
+def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[str, Any]:
+    """A result as JSON types; its wall time is no part of it, so that equal results are equal documents.
+
+    Args:
+        result: any.
+        comparisons: False leaves the time histories and responses out, which are most of it.
+    """
+    left_out = {*_SPECIAL, *(() if comparisons else ("comparisons",))}
+    return {
+        "kind": KIND,
+        "schema": SCHEMA,
+        **{f.name: encode(getattr(result, f.name)) for f in fields(result) if f.name not in left_out},
+        "model": _of_model(result.model),
+        "start": _of_model(result.start),
+        "details": encode(result.details),
+        "costs": {c.name: encode(cost) for c, cost in zip(result.comparisons, result.costs, strict=False)},
+    }
+
+
+def from_document(
+    document: Mapping[str, Any], *, where: str = "", equations: Vehicle | None = None
+) -> Result[Any, Any]:
+    """The result of a document.
+
+    Args:
+        document: of `to_document`.
+        where: its file, for messages.
+        equations: the vehicle whose equations it is of, for equations that are no part of the package and of no entry
+            point.
+
+    Raises:
+        DocumentError: naming the entry that is missing, unknown or impossible.
+        CardError: for a model that cannot be made again.
+    """
+    if document.get("kind") != KIND:
+        raise DocumentError(f"is {document.get('kind')!r}, expected '{KIND}'.", where=where, channel="kind", hint=_HINT)
+    if document.get("schema") != SCHEMA:
+        raise DocumentError(
+            f"is {document.get('schema')!r}, expected {SCHEMA}.", where=where, channel="schema", hint="Fit again."
+        )
+    hints = typing.get_type_hints(Result)
+    table: dict[str, Any] = {}
+    names = {f.name for f in fields(Result)} - {"seconds"}
+    for name in names - {"comparisons"} | (set(document) - _TOLD):
+        if name not in names:
+            raise DocumentError("is not known here.", where=where, channel=name[:60])
+        if name not in document:
+            raise DocumentError("is missing.", where=where, channel=name, hint=_HINT)
+        if name not in _SPECIAL:
+            table[name] = decode(hints[name], document[name], where=where, at=name)
+    details = document["details"]
+    made: Result[Any, Any] = Result(
+        **table,
+        model=_model_of(document["model"], where=where, at="model", equations=equations),
+        start=_model_of(document["start"], where=where, at="start", equations=equations),
+        details=None if details is None else part(details, where=where, at="details"),
+    )
+    _check(made, where)
+    return made
+
+
+def save(result: Result[Any, Any], path: str | os.PathLike[str]) -> Path:
+    """Write a result as a JSON file, which appears when it is complete."""
+    from swashplate.atomic import write_text
+
+    text = json.dumps(to_document(result), indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(Path(path), text + "\n")
+    return Path(path)
+
+
+def load(path: str | os.PathLike[str], *, equations: Vehicle | None = None) -> Result[Any, Any]:
+    """A saved result, whole: estimates, matrices, comparisons with the data, and the model.
+
+    Args:
+        path: the file.
+        equations: the vehicle whose equations it is of, for equations that are no part of the package and of no entry
+            point of the group `swashplate.models`.
+
+    Raises:
+        DocumentError: for a file that is none, or is damaged, naming the entry.
+        CardError: for a model that cannot be made again.
+    """
+    found = documents.read_document(os.fspath(path), form="json", hint=_HINT)
+    return from_document(found, where=os.fspath(path), equations=equations)
+
+
+# ---- models ----------------------------------------------------------------------------------------------------------
+def _of_model(model: Any) -> Any:
+    if isinstance(model, Vehicle):
+        return {**encode(model.card.to_document()), "path": model.card.path}
+    if isinstance(model, StateSpaceModel):
+        return encode(tomllib.loads(state_space_file.to_toml(model)))
+    return {"kind": "transfer-functions", "functions": [encode(one) for one in model]}
+
+
+def _model_of(found: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+    kind = found.get("kind") if isinstance(found, dict) else None
+    if kind == "vehicle":
+        path = found.get("path", "")
+        card = card_from({k: v for k, v in found.items() if k != "path"}, path=where)
+        card = replace(card, path=path if isinstance(path, str) else "")
+        if equations is not None and equations.name == card.vehicle:
+            return equations.with_card(card)
+        return from_card(card)
+    if kind == "state-space":
+        try:
+            text = tomli_w.dumps(found)
+        except (TypeError, ValueError):  # nothing is no value of a model's file
+            raise DocumentError("has an entry that is nothing.", where=where, channel=at) from None
+        return state_space_file.parse(text, path=where)
+    if kind == "transfer-functions":
+        return decode(tuple[TransferFunction, ...], found.get("functions"), where=where, at=f"{at}.functions")
+    raise DocumentError(f"is {kind!r}, expected a kind of model.", where=where, channel=f"{at}.kind")
+
+
+# ---- checks ----------------------------------------------------------------------------------------------------------
+def _check(result: Result[Any, Any], where: str) -> None:
+    known = [e.name for e in result.estimates]
+    for key, names in (("estimates", known), ("names", result.names)):
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise DocumentError(f"names {', '.join(twice)} twice.", where=where, channel=key)
+    for name in result.names:
+        if name not in known:
+            raise DocumentError(f"has '{name}', of which there is no estimate.", where=where, channel="names")
+        if not np.isfinite(result[name].value):
+            raise DocumentError("is no number.", where=where, channel=f"estimates, {name}")
+    for key in ("covariance", "covariance_corrected", "correlation"):
+        _check_covariance(getattr(result, key), result.names, key=key, where=where)
+
+
+def _check_covariance(found: Array, names: Sequence[str], *, key: str, where: str) -> None:
+    size = len(names)
+    if found.shape != (size, size) and not (size == found.size == 0):
+        raise DocumentError(f"is no matrix of {size} by {size} numbers.", where=where, channel=key)
+    finite = found[np.isfinite(found)]
+    if finite.size < found.size:  # a method without it, or parameters that leave no trace
+        return
+    scale = np.sqrt(np.abs(np.diag(found)))
+    if not np.all(np.diag(found) >= 0.0) or np.any(np.abs(found - found.T) > 1e-6 * np.outer(scale, scale)):
+        raise DocumentError("is no covariance: expected symmetry and a positive diagonal.", where=where, channel=key)
+    if np.any(np.abs(found) > (1.0 + 1e-6) * np.outer(scale, scale)):
+        raise DocumentError("is no covariance: a correlation lies beyond 1.", where=where, channel=key)

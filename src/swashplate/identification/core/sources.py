@@ -1,0 +1,76 @@
+"""What a result was made from: names and hashes of flights, and what was done to them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.flights.flight import Flight
+from swashplate.flights.provenance import ProcessingStep
+
+
+@dataclass(frozen=True)
+class Source:
+    """A flight, or a piece of one, without its signals.
+
+    Attributes:
+        name: of its file or of the simulated vehicle ("" where nothing is said).
+        sha256: hash of the file's bytes ("" where there is no file).
+        signals: SHA-256 of the conditioned signals themselves ("" where it is not known).
+        reader, reader_version: what read it.
+        simulated: True where no aircraft flew.
+        notes: what the reader found.
+        history: what was done to it, in order.
+        segments: unbroken pieces, from and to [s].
+        rate: of its first channel [Hz].
+    """
+
+    name: str
+    sha256: str = ""
+    signals: str = ""
+    reader: str = ""
+    reader_version: str = ""
+    simulated: bool = False
+    notes: tuple[str, ...] = ()
+    history: tuple[ProcessingStep, ...] = ()
+    segments: tuple[tuple[float, float], ...] = ()
+    rate: float = float("nan")
+
+    def same_log(self, other: Source) -> bool:
+        """True for two parts of one log: equal hashes of the file, or equal signals where there is no file."""
+        if self.sha256 or other.sha256:
+            return self.sha256 == other.sha256
+        return self.signals == other.signals != ""
+
+
+def source_of(flight: Flight) -> Source:
+    """What a result keeps of a flight."""
+    said = flight.provenance
+    return Source(
+        name=said.source,
+        sha256=said.sha256,
+        signals=_signals(flight),
+        reader=said.reader,
+        reader_version=said.reader_version,
+        simulated=said.simulated,
+        notes=tuple(said.notes),
+        history=tuple(flight.history),
+        segments=tuple((float(a), float(b)) for a, b in flight.segments or ((flight.start, flight.stop),)),
+        rate=float(flight.rate(flight.channels[0])),
+    )
+
+
+def sources_of(flights: Iterable[Flight]) -> tuple[Source, ...]:
+    return tuple(source_of(flight) for flight in flights)
+
+
+def _signals(flight: Flight) -> str:
+    found = hashlib.sha256()
+    for name in flight.channels:
+        found.update(name.encode())
+        for values in (flight.time(name), flight.values(name)):
+            found.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return found.hexdigest()

@@ -1,0 +1,188 @@
+"""How the likelihood of any model's records in time becomes a `Result`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
+from swashplate.identification.core import accuracy
+from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.records import Record
+from swashplate.identification.core.result import Constant, Estimate, Result, correlation_of
+from swashplate.identification.core.scoring import Optimum, Progress, minimise
+from swashplate.identification.core.sources import Source
+from swashplate.identification.core.time_likelihood import TimeErrors
+
+METHODS = ("output-error", "filter-error", "prediction-error")
+
+VAGUE = 50.0
+"""Percent of a value that a standard deviation may have before it is said."""
+
+LAGS = 1.0
+"""Seconds of residual correlation that the corrected bound allows for."""
+
+Model = TypeVar("Model")
+
+
+@dataclass(frozen=True)
+class TimeDetails:
+    """What a fit to records in time adds to a result.
+
+    Attributes:
+        covariance: of the output errors, or of the innovations (n_outputs, n_outputs).
+    """
+
+    kind: ClassVar[str] = "records in time"
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Where a likelihood has its optimum.
+
+    Attributes:
+        numbers: of the model, by name.
+        likelihood, optimum: what was minimised, and where the search ended.
+        plain, corrected: covariances of the whole row in the entries' units (p, p).
+    """
+
+    numbers: Mapping[str, float]
+    likelihood: TimeErrors
+    optimum: Optimum
+    plain: Array
+    corrected: Array
+
+
+def solve(likelihood: TimeErrors, *, iterations: int, progress: Progress | None) -> Solved:
+    """The optimum of a likelihood whose first entries are the model's parameters.
+
+    Args:
+        likelihood: of errors or innovations.
+        iterations: at most this many.
+        progress: told about every iteration.
+    """
+    row = likelihood.row
+    optimum = minimise(likelihood, iterations=iterations, tolerance=0.02, progress=progress)
+    plain = np.asarray(np.linalg.pinv(optimum.information, hermitian=True), dtype=np.float64)
+    lags = round(LAGS / likelihood.records[0].dt)
+    white, sensitivities, rest = likelihood.whitened(optimum.row)
+    corrected = accuracy.corrected_covariance(plain, rest, white, sensitivities, lags=lags)
+    units = np.outer(row.scale, row.scale)
+    named = dict(zip(row.names, map(float, _numbers(row, optimum.row)), strict=True))
+    return Solved(named, likelihood, optimum, plain * units, corrected * units)
+
+
+def result_of(
+    solved: Solved,
+    *,
+    model: Callable[[Mapping[str, Estimate]], Model],
+    start: Model,
+    units: Sequence[str],
+    method: str,
+    data: Sequence[Source],
+    settings: Mapping[str, Any],
+    seconds: float,
+    ties: Sequence[Estimate] = (),
+) -> Result[Model, TimeDetails]:
+    """A solved likelihood as what every identification returns.
+
+    Args:
+        solved: of `solve`.
+        model: makes the identified model of the estimates by name.
+        start: the model before the fit.
+        units: of the free parameters.
+        method, data, settings, seconds: see `Result`.
+        ties: estimates that follow from the free ones.
+    """
+    likelihood, optimum = solved.likelihood, solved.optimum
+    row, k = likelihood.row, len(units)
+    spread, wider = (np.sqrt(np.maximum(np.diag(c), 0.0)) for c in (solved.plain, solved.corrected))
+    free = tuple(
+        Estimate(
+            name=entry.name,
+            unit=unit,
+            start=entry.start,
+            value=solved.numbers[entry.name],
+            sigma=float(spread[i]),
+            sigma_corrected=float(wider[i]),
+            insensitivity=1.0 / float(np.sqrt(optimum.information[i, i])) * float(row.scale[i]),
+            prior_mean=entry.mean if np.isfinite(entry.sigma) else None,
+            prior_sigma=entry.sigma if np.isfinite(entry.sigma) else None,
+            at_bound=entry.name in optimum.at_bound,
+        )
+        for i, (entry, unit) in enumerate(zip(row.entries, units, strict=False))
+    )
+    estimates = (*free, *ties)
+    problems = _problems(row, optimum, k)
+    covariance = solved.plain[:k, :k]
+    marginal = accuracy.marginal_information(optimum.information, row.prior(optimum.row)[2], row.places("parameter"))
+    return Result(
+        method=method,
+        model=model({e.name: e for e in estimates}),
+        start=start,
+        estimates=estimates,
+        names=row.names[:k],
+        covariance=covariance,
+        covariance_corrected=solved.corrected[:k, :k],
+        correlation=correlation_of(covariance),
+        details=TimeDetails(likelihood.covariance),
+        history=optimum.history,
+        converged=optimum.converged,
+        problems=problems,
+        failed=bool(problems),
+        warnings=_words(free, optimum),
+        directions=accuracy.blind_directions(row.names[:k], marginal),
+        constants=tuple(_constants(solved, likelihood.records, spread, k)),
+        comparisons=likelihood.comparisons(optimum.row),
+        data=tuple(data),
+        settings=dict(settings),
+        seconds=seconds,
+    )
+
+
+def check_method(method: str) -> None:
+    """That there is such a method."""
+    if method not in METHODS:
+        raise IdentificationError(f"'{method}' is no method; there are {', '.join(METHODS)}.", channel="method")
+
+
+def _numbers(row: Row, scaled: Array) -> Array:
+    plain = scaled * row.scale
+    logarithmic = row.column("logarithmic") > 0.0
+    return np.where(logarithmic, np.exp(np.where(logarithmic, plain, 0.0)), plain)
+
+
+def _constants(solved: Solved, records: Sequence[Record], spread: Array, first: int) -> list[Constant]:
+    """Start states, shifts, biases, gusts and gains by record."""
+    made = []
+    for i, entry in list(enumerate(solved.likelihood.row.entries))[first:]:
+        name, _, number = entry.name.partition("[")
+        value = solved.numbers[entry.name]
+        record = records[int(number[:-1])].name if number else ""
+        made.append(Constant(record, name, "", value, float(spread[i]) * (value if entry.logarithmic else 1.0)))
+    return made
+
+
+def _problems(row: Row, optimum: Optimum, k: int) -> tuple[str, ...]:
+    values = _numbers(row, optimum.row)[:k]
+    problems = [] if np.isfinite(optimum.cost) else ["the cost is not finite"]
+    for entry, value in zip(row.entries, values, strict=False):
+        if not (np.isfinite(value) and entry.lower - 1e-12 <= value <= entry.upper + 1e-12):
+            problems.append(f"{entry.name} = {value:.4g} is not physical (allowed: {entry.lower:g} to {entry.upper:g})")
+    return tuple(problems)
+
+
+def _words(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
+    words = [] if optimum.converged else ["the iterations ran out."]
+    vague = [p.name for p in parameters if not p.sigma_percent <= VAGUE]
+    if vague:
+        words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")
+    stopped = [p.name for p in parameters if p.at_bound]
+    if stopped:
+        words.append(f"ended on a bound: {', '.join(stopped)}.")
+    return tuple(words)

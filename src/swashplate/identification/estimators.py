@@ -1,0 +1,97 @@
+"""Estimators: ways from data to a `Result`, of which `identify` takes the one that suits model and data.
+
+A new one is a file with an object of the protocol `Estimator` and a line in `ESTIMATORS` (or an entry point of the
+group `swashplate.estimators` in another package).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.result import Result
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.card import Card
+from swashplate.models.choices import Free
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.registry import Registry
+
+Data = tuple[Flight, ...] | FrequencyResponse
+
+
+@dataclass(frozen=True)
+class Question:
+    """What an identification is asked beside the model and the data; None and empty: nothing was said.
+
+    Attributes:
+        free: a ready choice or the names of what may move.
+        ties, fixed, priors, prior_card: what holds parameters.
+        outputs: measured channels to fit.
+        iterations: at most this many.
+        keep_unexcited, wind: see `identify`.
+        environment: wind, density and gravity.
+        shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
+        progress: told the iteration and the cost.
+    """
+
+    free: str | Sequence[str | Free] | None = None
+    ties: Sequence[str] = ()
+    fixed: Mapping[str, float] | None = None
+    priors: Mapping[str, tuple[float, float]] | None = None
+    prior_card: Card | None = None
+    outputs: Sequence[str] | None = None
+    iterations: int | None = None
+    keep_unexcited: bool = False
+    wind: bool = False
+    environment: Environment | None = None
+    shifts: bool | None = None
+    biases: Sequence[str] = ()
+    progress: Callable[[int, float], None] | None = None
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What was said, by name."""
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {
+            name: value for name, value in every.items() if value is not None and value is not False and value != ()
+        }
+
+
+class Estimator(Protocol):
+    """One way from data to a result."""
+
+    @property
+    def takes(self) -> frozenset[str]:
+        """Names of the parts of a `Question` that it heeds; others are refused before it is asked."""
+        ...
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        """Why it cannot serve for this model and these data, in words; "" where it can."""
+        ...
+
+    def estimate(self, model: Any, data: Any, question: Question) -> Result[Any, Any]:
+        """The result."""
+        ...
+
+
+ESTIMATORS: Registry[Estimator] = Registry(
+    "estimators",
+    what="method of identification",
+    own={
+        "prediction-error": "swashplate.identification.time.identify:PREDICTION_ERROR",
+        "output-error": "swashplate.identification.time.identify:OUTPUT_ERROR",
+        "nelder-mead": "swashplate.identification.time.identify:NELDER_MEAD",
+        "filter-error/vehicle": "swashplate.identification.time.vehicle_time_fit:FILTER_ERROR",
+        "prediction-error/vehicle": "swashplate.identification.time.vehicle_time_fit:PREDICTION_ERROR",
+        "output-error/vehicle": "swashplate.identification.time.vehicle_time_fit:OUTPUT_ERROR",
+        "output-error/linear": "swashplate.identification.time.linear_time_fit:OUTPUT_ERROR",
+        "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
+        "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
+        "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
+    },
+)
+"""By "METHOD", or "METHOD/KIND" where a method has forms for several kinds of model: the first that suits is taken."""

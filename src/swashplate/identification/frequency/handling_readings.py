@@ -1,0 +1,158 @@
+"""Handling qualities and margins of flights and of the models fitted to them, side by side, each with its error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import IdentificationError
+from swashplate.identification.frequency.handling import (
+    Handling,
+    Margins,
+    Reading,
+    attitude_of,
+    handling_qualities,
+    margins,
+)
+from swashplate.identification.frequency.reading_accuracy import Fitted, has_pair, spread
+from swashplate.identification.frequency.response_cost import Target
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+
+ANGLES = {"p": "phi", "q": "theta", "r": "psi"}
+"""The attitude behind each rate."""
+
+OWN = 0.25
+"""Share of an output's power that an input must have made for the output's axis to be its own."""
+
+_WIDE = np.geomspace(0.3, 300.0, 800)
+_Kind = TypeVar("_Kind", Handling, Margins)
+
+
+@dataclass(frozen=True)
+class Line:
+    """What was read off one response.
+
+    Attributes:
+        response: "phi / mixer_roll". source: "flight" or "model".
+        read: the numbers; None where there are none.
+        problem: why.
+    """
+
+    response: str
+    source: str
+    read: Handling | Margins | None
+    problem: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers and words as JSON types: each number with its error."""
+        numbers = {f.name: list(astuple(getattr(self.read, f.name))) for f in fields(self.read)} if self.read else {}
+        return {"response": self.response, "from": self.source, **numbers, "problem": self.problem}
+
+    def __repr__(self) -> str:
+        head, r = f"{self.response} ({self.source}): ", self.read
+        if isinstance(r, Margins):
+            head += f"crossover {r.crossover!r} rad/s, phase margin {r.phase_margin!r} deg, "
+            return head + f"gain margin {r.gain_margin!r} dB at {r.omega_180!r} rad/s"
+        if r is None:
+            return head + self.problem
+        return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s"
+
+
+def own_input(responses: FrequencyResponse, output: str) -> str | None:
+    """The input that moved an output most where it was coherent; None where others, not named, moved it more."""
+    o = responses.outputs.index(output)
+    reached: dict[str, float] = {}
+    for i, name in enumerate(responses.inputs):
+        band = responses.band(output, name)
+        if band is not None:
+            inside = (responses.omega >= band[0]) & (responses.omega <= band[1])
+            gain = np.abs(responses.response[inside, o, i]) ** 2
+            power, whole = responses.input_power[inside, i], responses.output_power[inside, o]
+            # Responses from elsewhere (control.FRD) know no powers; then the gain decides.
+            known = np.isfinite(power).any() and np.isfinite(whole).any()
+            share = np.nansum(gain * power) / np.nansum(whole) if known else 1.0 + np.nanmean(gain)
+            reached[name] = float(share)
+    best = max(reached, key=lambda name: reached[name], default=None)
+    return best if best is not None and reached[best] > OWN else None
+
+
+def handling_lines(responses: FrequencyResponse, fits: Sequence[Fitted] = ()) -> list[Line]:
+    """Bandwidth and phase delay of the attitude behind every rate, by its own input, of flight and models."""
+    lines = []
+    for rate, angle in ANGLES.items():
+        name = own_input(responses, rate) if rate in responses.outputs else None
+        if name is None:
+            continue
+        title = f"{angle} / {name}"
+        try:
+            omega, attitude, error, coherence = attitude_of(responses, rate, name)
+            flown = handling_qualities(omega, _pilots(attitude), error=error, coherence=coherence)
+            lines.append(Line(title, "flight", flown))
+        except IdentificationError as problem:
+            lines.append(Line(title, "flight", None, problem.problem))
+
+        def by_model(h: Complex) -> Handling:
+            return handling_qualities(_WIDE, _pilots(h / (1j * _WIDE)))
+
+        lines += [
+            _of_model(title, fit, rate, name, _WIDE, by_model, Handling) for fit in fits if has_pair(fit, rate, name)
+        ]
+    return lines
+
+
+def margin_lines(responses: FrequencyResponse, fit: Fitted, targets: Sequence[Target]) -> list[Line]:
+    """Crossover and margins of responses that are taken as broken loops, of the flight and of the model."""
+    lines = []
+    for wanted in targets:
+        h, _, error = responses.pair(wanted.output, wanted.input)
+        inside = (responses.omega >= wanted.omega[0]) & (responses.omega <= wanted.omega[-1]) & np.isfinite(h)
+        omega = responses.omega[inside]
+        lines.append(Line(wanted.name, "flight", margins(omega, h[inside], error=error[inside])))
+        wide = np.geomspace(omega[0] / 10.0, omega[-1] * 10.0, 800)
+
+        def by_model(h: Complex, wide: Array = wide) -> Margins:
+            return margins(wide, h)
+
+        lines.append(_of_model(wanted.name, fit, wanted.output, wanted.input, wide, by_model, Margins))
+    return lines
+
+
+def model_margins(fit: Fitted, output: str, input: str, omega: Array, controller: Complex) -> Margins:
+    """Margins of controller and fitted model in one loop, with what the model's bounds make of them."""
+    found = _of_model("", fit, output, input, omega, lambda h: margins(omega, controller * h), Margins).read
+    assert isinstance(found, Margins)
+    return found
+
+
+def _of_model(
+    title: str,
+    fit: Fitted,
+    output: str,
+    input: str,
+    omega: Array,
+    read: Callable[[Complex], _Kind],
+    kind: type[_Kind],
+) -> Line:
+    names = [f.name for f in fields(kind)]
+
+    def numbers(h: Complex) -> Array:
+        try:
+            found = read(h)
+        except IdentificationError:
+            return np.full(len(names), np.nan)
+        return np.array([getattr(found, name).value for name in names])
+
+    value, sigma = spread(fit, output, input, omega, numbers)
+    if not np.isfinite(value).any() and kind is Handling:
+        return Line(title, "model", None, "the phase does not fall through -180 degrees")
+    return Line(title, "model", kind(*(Reading(float(v), float(s)) for v, s in zip(value, sigma, strict=True))))
+
+
+def _pilots(attitude: Complex) -> Complex:
+    """The response with the sign that a pilot expects: a positive command turns the aircraft positively."""
+    middle = attitude[len(attitude) // 4]
+    return -attitude if (1j * middle).real < 0.0 else attitude

@@ -1,0 +1,205 @@
+"""Start values that need none: the equations of motion as regressions on measured responses.
+
+Where outputs and kinematics give the responses of all states, M jw X = F X + G U e^(-jw tau) is linear in the entries
+of F and G, row by row (equation error in the frequency domain: Klein and Morelli 2006, sec. 7.3; as starting values:
+Tischler and Remple 2012, ch. 13). Where some states are hidden (a rotor), only the controls' columns are matched in
+sign and size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.identification.frequency.response_cost import Target
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space import Element, StateSpaceModel
+
+LINES = 40
+"""Frequencies of the regression, evenly in log frequency."""
+
+DELAYS = np.linspace(0.0, 0.12, 13)
+"""Delays tried for each input [s]."""
+
+_WORST = 1e4
+_ROUNDS, _FLOOR = 5, 0.03
+
+
+def other_starts(
+    model: StateSpaceModel,
+    responses: FrequencyResponse,
+    targets: Sequence[Target],
+    *,
+    band: tuple[float, float] | None = None,
+) -> dict[str, StateSpaceModel]:
+    """Starts that the responses themselves suggest, by where they come from."""
+    found = {
+        "regression on the responses": by_regression(model, responses, band=band),
+        "controls matched to the responses": by_controls(model, targets),
+    }
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def by_regression(
+    model: StateSpaceModel, responses: FrequencyResponse, *, band: tuple[float, float] | None = None
+) -> StateSpaceModel | None:
+    """The model with every free entry of F and G that is one parameter taken from the responses.
+
+    Returns:
+        None where the responses do not hold all outputs that the states need, or an entry cannot be told.
+    """
+    if any(name not in responses.inputs for name in model.inputs):
+        return None
+    seen = [o for o in model.outputs if o in responses.outputs]
+    part = responses.select(tuple(seen), model.inputs) if seen else None
+    if part is None or model.free == ():
+        return None
+    low, high = (0.0, np.inf) if band is None else (2.0 * np.pi * band[0], 2.0 * np.pi * band[1])
+    usable = np.flatnonzero(
+        np.all(np.isfinite(part.response), axis=(1, 2)) & (part.omega >= low) & (part.omega <= high)
+    )
+    if usable.size < LINES // 2:
+        return None
+    usable = usable[np.unique(np.linspace(0, usable.size - 1, LINES).astype(int))]
+    states, spread = _states(model, part, usable, [model.outputs.index(o) for o in seen])
+    if states is None:
+        return None
+    omega = part.omega[usable]
+    rows = [k for k in range(len(model.states)) if _entries(model, k)]
+    lag = dict.fromkeys(model.inputs, 0.0)
+    for _ in range(2):
+        for name in model.inputs:
+            if name in model.delays:
+                cost = [_regressed(model, rows, omega, states, spread, {**lag, name: float(d)})[1] for d in DELAYS]
+                lag[name] = float(DELAYS[int(np.argmin(cost))])
+    values, _ = _regressed(model, rows, omega, states, spread, lag)
+    if values is None:
+        return None
+    for name, expression in model.delays.items():
+        if expression.text in model.free and name in lag:
+            values[expression.text] = lag[name]
+    return model.with_values(_bounded(model, values))
+
+
+def _states(
+    model: StateSpaceModel, part: FrequencyResponse, at: Array, rows: Sequence[int]
+) -> tuple[Complex | None, Array]:
+    """Responses of all states and their errors, (n_f, n_states, n_inputs), by outputs and parameter-free equations."""
+    m = model.matrices()
+    fixed = [k for k in range(len(model.states)) if not _entries(model, k)]
+    found = np.zeros((at.size, len(model.states), len(model.inputs)), dtype=np.complex128)
+    spread = np.zeros(found.shape)
+    for n, f in enumerate(at):
+        s = 1j * part.omega[f]
+        left = np.concatenate([m["H0"][rows] + s * m["H1"][rows], s * m["M"][fixed] - m["F"][fixed]])
+        error = part.error[f] * np.abs(part.response[f])
+        right = np.concatenate([part.response[f] - m["D"][rows], m["G"][fixed].astype(np.complex128)])
+        sure = np.concatenate([np.maximum(error, 1e-12), np.full((len(fixed), len(model.inputs)), 1e-7)])
+        for i in range(len(model.inputs)):
+            scaled = left / sure[:, i, None]
+            size = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
+            if np.linalg.matrix_rank(scaled / size, tol=1e-10) < len(model.states):
+                return None, spread
+            inverse = np.linalg.pinv(scaled / size, rcond=1e-13) / size[:, None]
+            found[n, :, i] = inverse @ (right[:, i] / sure[:, i])
+            spread[n, :, i] = np.linalg.norm(inverse, axis=1)
+    return found, spread
+
+
+def _entries(model: StateSpaceModel, row: int) -> list[tuple[Element, str, float]]:
+    """Entries of a row that are a free parameter, or minus one, with the sign."""
+    found = []
+    for e in model.elements:
+        text = e.expression.text.replace(" ", "")
+        name = text.lstrip("-")
+        if e.matrix in ("F", "G") and e.row == row and name in model.free:
+            found.append((e, name, -1.0 if text.startswith("-") else 1.0))
+    return found
+
+
+def _regressed(
+    model: StateSpaceModel, rows: Sequence[int], omega: Array, states: Complex, spread: Array, lag: dict[str, float]
+) -> tuple[dict[str, float] | None, float]:
+    m, s = model.matrices(), 1j * omega[:, None]
+    drive = np.exp(-s[:, :, None] * np.array([lag[name] for name in model.inputs])) * np.ones((omega.size, 1, 1))
+    values: dict[str, float] = {}
+    total = 0.0
+    for k in rows:
+        entries = _entries(model, k)
+        free = {(e.matrix, e.column) for e, _, _ in entries}
+        # Known entries go to the left: M jw X - F X - G U.
+        f_known = np.array([0.0 if ("F", j) in free else m["F"][k, j] for j in range(len(model.states))])
+        g_known = np.array([0.0 if ("G", j) in free else m["G"][k, j] for j in range(len(model.inputs))])
+        left = s * np.einsum("j,fji->fi", m["M"][k], states) - np.einsum("j,fji->fi", f_known, states)
+        left = left - g_known * drive[:, 0, :]
+        columns = []
+        for e, _, sign in entries:
+            column = np.zeros(left.shape, dtype=np.complex128)
+            if e.matrix == "F":
+                column = sign * states[:, e.column, :]
+            else:
+                column[:, e.column] = sign * drive[:, 0, e.column]
+            columns.append(column.ravel())
+        table, right = np.stack(columns, axis=1), left.ravel()
+        # Forces that cancel to a small acceleration: errors of every term count, by what the last round made of it.
+        noise = np.full(left.size, np.median(np.abs(left)))
+        solved = np.zeros(len(entries))
+        for _ in range(_ROUNDS):
+            solved, rank = _weighted(table, right, noise)
+            if rank == 0:
+                return None, float("inf")
+            row = f_known.copy()
+            for (e, _, sign), value in zip(entries, solved, strict=True):
+                row[e.column] += sign * value if e.matrix == "F" else 0.0
+            errors = np.einsum("j,fji->fi", row**2, spread**2) + (np.abs(s) * spread[:, k, :]) ** 2
+            noise = np.sqrt(errors + (_FLOOR * np.abs(left)) ** 2).ravel() + 1e-9
+        miss = (table @ solved - right) / noise
+        total += float(np.vdot(miss, miss).real + 2.0 * np.sum(np.log(noise)))
+        values |= {name: float(v) for (_, name, _), v in zip(entries, solved, strict=True)}
+    return values, total
+
+
+def _weighted(table: Complex, right: Complex, noise: Array) -> tuple[Array, int]:
+    """Real least squares of complex equations with their noise: numbers, and how many of them were told."""
+    scaled, target = table / noise[:, None], right / noise
+    size = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
+    stacked = np.concatenate([scaled.real, scaled.imag]) / size
+    found, _, rank, _ = np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=1e-6)
+    return np.asarray(found / size), int(rank)
+
+
+def by_controls(model: StateSpaceModel, targets: Sequence[Target]) -> StateSpaceModel | None:
+    """The model with each control's column turned and scaled to the strongest response that it has.
+
+    Returns:
+        None where a column cannot be matched.
+    """
+    changes: dict[str, float] = {}
+    for i, name in enumerate(model.inputs):
+        own = [t for t in targets if t.input == name]
+        column = {
+            e.expression.text.replace(" ", "").lstrip("-")
+            for e in model.elements
+            if e.matrix in ("G", "D") and e.column == i
+        } & set(model.free)
+        ratios = []
+        for t in own:
+            h = model.response(t.omega)[:, model.outputs.index(t.output), i]
+            if np.all(np.isfinite(h)) and np.all(np.abs(h) > 0.0):
+                ratio = t.measured / h
+                strength = float(np.sum(t.coherence)) * np.log(t.omega[-1] / t.omega[0])
+                steady = abs(np.mean(ratio / np.abs(ratio)))
+                ratios.append((strength * steady, ratio))
+        if not ratios or not column:
+            continue
+        _, ratio = max(ratios, key=lambda pair: pair[0])
+        size = float(np.clip(np.exp(np.median(np.log(np.abs(ratio)))), 1.0 / _WORST, _WORST))
+        sign = -1.0 if np.mean((ratio / np.abs(ratio)).real) < 0.0 else 1.0
+        changes |= {n: sign * size * model.parameters[n].value for n in column}
+    return model.with_values(_bounded(model, changes)) if changes else None
+
+
+def _bounded(model: StateSpaceModel, values: dict[str, float]) -> dict[str, float]:
+    return {n: float(np.clip(v, model.parameters[n].lower, model.parameters[n].upper)) for n, v in values.items()}

@@ -1,0 +1,273 @@
+"""The cost of a model's frequency responses, and what its Hessian says about the parameters.
+
+J of one response = 20/n sum W_gamma [ W_g (dB error)^2 + W_p (phase error in deg)^2 ], W_gamma = [1.58 (1 - e^-g)]^2
+with the coherence g (Tischler and Remple 2012, eqs 11.2 and 11.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import IdentificationError
+from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+
+POINTS = 20
+"""Frequencies per response, spread evenly in log frequency."""
+
+PHASE_WEIGHT = 0.01745
+"""W_p: 7.57 degrees weigh as much as 1 dB."""
+
+ACCEPTABLE, INDISTINGUISHABLE = 100.0, 50.0
+"""J of a response up to which a model is acceptable, and hardly to be told from the flight."""
+
+SIGMAS = 3.0
+"""Errors by which a response that was not seen may exceed its estimate."""
+
+_DB = 20.0 / np.log(10.0)
+_DEG = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Target:
+    """One measured response at the frequencies that the cost looks at.
+
+    Attributes:
+        output, input: its channels.
+        omega: frequencies [rad/s], shape (n,).
+        measured: the response there, shape (n,).
+        coherence: partial coherence there, shape (n,).
+        ceiling: True where nothing coherent was seen, and `measured` is what the response cannot exceed.
+        error: relative random error there, shape (n,); None where it is not known.
+    """
+
+    output: str
+    input: str
+    omega: Array
+    measured: Complex
+    coherence: Array
+    ceiling: bool = False
+    error: Array | None = None
+
+    @property
+    def name(self) -> str:
+        return f"{self.output} / {self.input}"
+
+    def above(self, omega: float) -> Target:
+        """The part from a frequency [rad/s] on."""
+        k = self.omega >= omega
+        error = None if self.error is None else self.error[k]
+        return replace(self, omega=self.omega[k], measured=self.measured[k], coherence=self.coherence[k], error=error)
+
+    @property
+    def weights(self) -> tuple[Array, Array]:
+        """Square roots of what multiplies the squared dB and degree errors, shape (n,) each."""
+        w = 20.0 / self.omega.size * (1.58 * (1.0 - np.exp(-self.coherence))) ** 2
+        return np.sqrt(w), np.sqrt(w * PHASE_WEIGHT)
+
+
+@dataclass(frozen=True)
+class ResponseComparison:
+    """A measured response beside the model's.
+
+    Attributes:
+        target: measured. model: response of the model there, shape (n,).
+        cost: J.
+    """
+
+    kind: ClassVar[str] = "response"
+    target: Target
+    model: Complex
+    cost: float
+
+    @property
+    def name(self) -> str:
+        return self.target.name
+
+    @property
+    def residuals(self) -> Array:
+        """Measured less model [dB, deg], shape (n, 2)."""
+        error = -log_error(self.model, self.target.measured)
+        return np.stack([_DB * error.real, _DEG * error.imag], axis=1)
+
+
+def target(
+    responses: FrequencyResponse,
+    output: str,
+    input: str,
+    *,
+    band: tuple[float, float] | None = None,
+    points: int = POINTS,
+    least: float = LEAST_COHERENCE,
+) -> Target | None:
+    """A pair of measured channels as something to fit; None where the coherence leaves no band.
+
+    Args:
+        responses: from `respond`.
+        output, input: the pair.
+        band: narrower limits [Hz].
+        points: frequencies, evenly in log frequency.
+        least: coherence from which on the response is used.
+    """
+    h, coherence, error = responses.pair(output, input)
+    found = responses.band(output, input, least=least)
+    if found is None:
+        return None
+    low, high = found
+    if band is not None:
+        low, high = max(low, TWO_PI * band[0]), min(high, TWO_PI * band[1])
+    known = np.isfinite(h) & (responses.omega >= low * (1 - 1e-9)) & (responses.omega <= high * (1 + 1e-9))
+    if known.sum() < 4:
+        return None
+    omega, log = responses.omega[known], np.log(np.abs(h[known])) + 1j * np.unwrap(np.angle(h[known]))
+    at = np.geomspace(omega[0], omega[-1], points)
+    log_at = np.interp(np.log(at), np.log(omega), log.real) + 1j * np.interp(np.log(at), np.log(omega), log.imag)
+    seen, sure = (np.interp(np.log(at), np.log(omega), column[known]) for column in (coherence, error))
+    return Target(output, input, at, np.exp(log_at), seen, error=sure)
+
+
+def ceiling(
+    responses: FrequencyResponse,
+    output: str,
+    input: str,
+    *,
+    band: tuple[float, float] | None = None,
+    points: int = POINTS,
+) -> Target | None:
+    """What a pair without coherence still tells: a response above its estimate and three errors would have been seen.
+
+    Without it a fit is free to invent a large response to an input where there was none to see. None where the input
+    told nothing either.
+
+    Args:
+        responses: from `respond`.
+        output, input: the pair.
+        band: narrower limits [Hz].
+        points: frequencies, evenly in log frequency.
+    """
+    h, _, error = responses.pair(output, input)
+    low, high = (0.0, np.inf) if band is None else (TWO_PI * band[0], TWO_PI * band[1])
+    known = (
+        np.isfinite(h) & np.isfinite(error) & (np.abs(h) > 0.0) & (responses.omega >= low) & (responses.omega <= high)
+    )
+    if known.sum() < 4:
+        return None
+    omega = responses.omega[known]
+    at = np.geomspace(omega[0], omega[-1], points)
+    bound = np.interp(np.log(at), np.log(omega), np.log(np.abs(h[known]) * (1.0 + SIGMAS * error[known])))
+    return Target(output, input, at, np.exp(bound).astype(np.complex128), np.ones(points), ceiling=True)
+
+
+def log_error(model: Complex, measured: Complex) -> Complex:
+    """log(model / measured) with the phase difference wrapped to half a turn either way."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = model / measured
+        return np.asarray(np.log(np.abs(ratio)) + 1j * np.angle(ratio))
+
+
+def cost_of(model: Complex, wanted: Target) -> float:
+    """J of one response; of a ceiling, what stands above it."""
+    gain, phase = wanted.weights
+    if wanted.ceiling:
+        return float(np.sum((gain * _DB * _excess(model, wanted)) ** 2))
+    error = log_error(model, wanted.measured)
+    return float(np.sum((gain * _DB * error.real) ** 2) + np.sum((phase * _DEG * error.imag) ** 2))
+
+
+def _excess(model: Complex, wanted: Target) -> Array:
+    """Logarithm of how far a model stands above a ceiling, zero below it."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.maximum(np.log(np.abs(model)) - np.log(np.abs(wanted.measured)), 0.0))
+
+
+Evaluate = Callable[[Array], tuple[list[Complex], list[Complex]]]
+"""Parameters to the model's responses per target (n,) and the derivatives of their logarithms (n, n_parameters)."""
+
+
+class ResponseCost:
+    """Half the sum of J over all targets and ceilings, in the form that `scoring.minimise` wants (Gauss-Newton).
+
+    Args:
+        row: the parameters that move.
+        targets: what to fit.
+        evaluate: the model.
+    """
+
+    def __init__(self, row: Row, targets: Sequence[Target], evaluate: Evaluate) -> None:
+        if not targets:
+            raise IdentificationError(
+                "there is no response to fit: none keeps a coherence of 0.6 over a band.",
+                hint="Look at the responses; fly a better sweep, or lower --coherence and do not trust the result.",
+            )
+        self._row, self.targets, self._evaluate = row, tuple(targets), evaluate
+
+    @property
+    def row(self) -> Row:
+        return self._row
+
+    def refresh(self, row: Array) -> None:
+        """Nothing is held during an iteration."""
+
+    def cost(self, row: Array) -> float:
+        return 0.5 * float(sum(self.each(row)))
+
+    def evaluate(self, row: Array) -> tuple[list[Complex], list[Complex]]:
+        """The model's responses, targets then ceilings, and the slopes of their logarithms."""
+        return self._evaluate(np.asarray(row * self.row.scale))
+
+    def each(self, row: Array) -> list[float]:
+        """J of each target."""
+        models, _ = self._evaluate(np.asarray(row * self.row.scale))
+        return [
+            cost_of(model, wanted) if np.all(np.isfinite(model)) else np.inf
+            for model, wanted in zip(models, self.targets, strict=True)
+        ]
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        residual, slopes = self.residuals(row)
+        return 0.5 * float(residual @ residual), slopes.T @ residual, slopes.T @ slopes
+
+    def residuals(self, row: Array) -> tuple[Array, Array]:
+        """Weighted errors of all targets, dB then degrees, and their slopes over the scaled row."""
+        models, slopes = self._evaluate(np.asarray(row * self.row.scale))
+        rows, derivatives = [], []
+        for model, slope, wanted in zip(models, slopes, self.targets, strict=True):
+            gain, phase = wanted.weights
+            if wanted.ceiling:
+                excess = _excess(model, wanted)
+                above = np.where(excess > 0.0, gain * _DB, 0.0)
+                rows.append(gain * _DB * excess)
+                derivatives.append(above[:, None] * np.where(excess[:, None] > 0.0, slope.real, 0.0))
+                continue
+            error = log_error(model, wanted.measured)
+            rows += [gain * _DB * error.real, phase * _DEG * error.imag]
+            derivatives += [(gain * _DB)[:, None] * slope.real, (phase * _DEG)[:, None] * slope.imag]
+        return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
+
+
+def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:
+    """Cramér-Rao bounds, insensitivities and correlation from the residuals' slopes.
+
+    With the Hessian H = 2 S'S of J (Gauss-Newton): CR_i = sqrt(inv(H)_ii), I_i = 1/sqrt(H_ii) (Tischler and Remple
+    2012, ch. 12; the plain value, CIFER prints twice of it). A parameter that leaves no trace gets infinite figures.
+
+    Args:
+        slopes: derivatives of the weighted errors, shape (n, n_parameters), in the parameters' units.
+    """
+    hessian = 2.0 * slopes.T @ slopes
+    diagonal = np.diag(hessian)
+    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    with np.errstate(divide="ignore"):
+        insensitivity = np.where(diagonal > 0.0, 1.0 / size, np.inf)
+    normal = hessian / np.outer(size, size)
+    values, vectors = np.linalg.eigh(normal)
+    inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T
+    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    cramer_rao = np.where(diagonal > 0.0, spread / size, np.inf)
+    correlation = inverse / np.outer(np.maximum(spread, 1e-300), np.maximum(spread, 1e-300))
+    return cramer_rao, insensitivity, correlation

@@ -1,0 +1,282 @@
+"""State-space models fitted to frequency responses: what is fitted, how well it is told, J per response."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.core.sources import Source
+from swashplate.identification.estimators import Data, Question
+from swashplate.identification.frequency.linear_start import other_starts
+from swashplate.identification.frequency.mode_accuracy import mode_accuracy
+from swashplate.identification.frequency.response_cost import (
+    ACCEPTABLE,
+    ResponseComparison,
+    Target,
+    accuracy_of,
+    ceiling,
+    target,
+)
+from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
+from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
+from swashplate.identification.frequency.state_space_words import words
+from swashplate.identification.frequency.structure_misfit import misfit_words
+from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+from swashplate.models.linear.linear_vehicle import structure_of
+from swashplate.models.linear.model_units import unit_words
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+
+FAST_GROWTH = 1.0
+"""1/s: a start model with a mode that grows faster is no helicopter, but a wrong sign."""
+
+
+def fit_state_space(
+    model: Vehicle | StateSpaceModel,
+    responses: FrequencyResponse,
+    *,
+    band: tuple[float, float] | None = None,
+    bands: Mapping[str, tuple[float, float]] | None = None,
+    least_coherence: float = LEAST_COHERENCE,
+    starts: int = STARTED,
+    iterations: int = 100,
+    seed: int = 0,
+    progress: Callable[[int, float], None] | None = None,
+) -> StateSpaceFit:
+    """Fit a model's free parameters to every coherent response that the model and the flight share.
+
+    Args:
+        model: structure and start values: a vehicle of `swashplate.structure`, or what it is made of.
+        responses: from `respond`, with channels named as in the model.
+        band: limits [Hz] for all pairs. bands: by "output/input" or input.
+        least_coherence: from which a response is used.
+        starts: how many of the screened starting points are followed (1: the given start alone).
+        iterations: at most this many for the best of them.
+        seed: of the starting points.
+        progress: called with the iteration and the cost.
+
+    Raises:
+        IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
+    """
+    began = time.perf_counter()
+    model = structure_of(model)
+    if not model.free:
+        raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
+    targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
+    others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
+    return fit_targets(
+        model,
+        targets,
+        others=others,
+        ceilings=ceilings,
+        left_out=left_out,
+        starts=starts,
+        iterations=iterations,
+        seed=seed,
+        progress=progress,
+        began=began,
+        data=[Source(name) for name in responses.sources],
+        settings={
+            "sources": list(responses.sources),
+            "method": responses.method,
+            "least_coherence": least_coherence,
+            "band_hz": list(band) if band else None,
+            "starts": starts,
+            "seed": seed,
+        },
+    )
+
+
+def _targets(
+    model: StateSpaceModel,
+    responses: FrequencyResponse,
+    band: tuple[float, float] | None,
+    bands: Mapping[str, tuple[float, float]],
+    least: float,
+) -> tuple[list[Target], list[Target], tuple[str, ...]]:
+    shared_in = [name for name in model.inputs if name in responses.inputs]
+    shared_out = [name for name in model.outputs if name in responses.outputs]
+    if not shared_in or not shared_out:
+        raise IdentificationError(
+            f"the model has inputs {', '.join(model.inputs)} and outputs {', '.join(model.outputs)}; the responses "
+            f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
+            where=f"model '{model.name}'"
+            + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
+            hint="Name the channels as the model does (swash respond --inputs NAME=CHANNEL), or take another model.",
+        )
+    found, ceilings, missing = [], [], []
+    for output in shared_out:
+        for name in shared_in:
+            own = bands.get(f"{output}/{name}", bands.get(name, band))
+            one = target(responses, output, name, band=own, least=least)
+            if one is None:
+                missing.append(f"{output} / {name}")
+                limit = ceiling(responses, output, name, band=own)
+                ceilings += [] if limit is None else [limit]
+            else:
+                found.append(one)
+    if not found:
+        raise IdentificationError(
+            f"no response keeps a coherence of {least:g} over a band: {', '.join(missing)}.",
+            hint="Nothing can be fitted; look at the responses and fly a better sweep.",
+        )
+    return found, ceilings, tuple(missing)
+
+
+def fit_targets(
+    model: StateSpaceModel,
+    targets: Sequence[Target],
+    *,
+    others: Mapping[str, StateSpaceModel] | None = None,
+    ceilings: Sequence[Target] = (),
+    left_out: tuple[str, ...] = (),
+    starts: int = STARTED,
+    iterations: int = 100,
+    seed: int = 0,
+    progress: Callable[[int, float], None] | None = None,
+    began: float | None = None,
+    data: Sequence[Source] = (),
+    settings: Mapping[str, Any] | None = None,
+) -> StateSpaceFit:
+    """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
+    began = time.perf_counter() if began is None else began
+    warnings, problems = [], _start_problems(model)
+    traceless = _traceless(model, targets)
+    if traceless:
+        warnings.append(f"no fitted response sees {', '.join(traceless)}: held at the start values.")
+        model = model.with_values({n: model.parameters[n].value for n in traceless}, free=False)
+    if not model.free:
+        raise IdentificationError(
+            f"no fitted response sees a free parameter of '{model.name}'.",
+            hint="Fit other responses or free parameters.",
+        )
+    start, source = better_start(model, others or {}, (*targets, *ceilings))
+    optimum, cost, kept = best_below(
+        start, targets, ceilings, starts=starts, iterations=iterations, seed=seed, progress=progress
+    )
+    numbers = optimum.row * cost.row.scale
+    _, slopes = cost.residuals(optimum.row)
+    cramer_rao, insensitivity, correlation = accuracy_of(slopes / cost.row.scale)
+    found = model.with_values(dict(zip(model.free, map(float, numbers), strict=True)))
+    found = replace(
+        found,
+        parameters={
+            name: replace(
+                p,
+                cramer_rao=float(cramer_rao[model.free.index(name)]),
+                insensitivity=float(insensitivity[model.free.index(name)]),
+            )
+            if name in model.free
+            else p
+            for name, p in found.parameters.items()
+        },
+    )
+    every = cost.each(optimum.row)
+    costs = tuple(every[: len(targets)])
+    place = {name: i for i, name in enumerate(model.free)}
+    estimates = tuple(
+        Estimate(
+            name=name,
+            unit=p.unit,
+            start=model.parameters[name].value,
+            value=p.value,
+            sigma=p.cramer_rao if name in place else np.nan,
+            insensitivity=p.insensitivity if name in place else np.nan,
+            tie=p.tie.text if p.tie is not None else "",
+            fixed=not p.free and p.tie is None,
+            at_bound=name in optimum.at_bound,
+        )
+        for name, p in found.parameters.items()
+    )
+    warnings += unit_words(model)
+    warnings += misfit_words(found, targets)
+    warnings += words(targets, costs, estimates, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
+    below = {c.name for c, above in zip(kept, every[len(targets) :], strict=True) if above <= ACCEPTABLE}
+    over = [c.name for c in ceilings if c.name not in below]
+    if over:
+        warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
+    answers, _ = cost.evaluate(optimum.row)
+    covariance = correlation * np.outer(cramer_rao, cramer_rao)
+    return Result(
+        method="frequency responses",
+        model=found,
+        start=model,
+        estimates=estimates,
+        names=model.free,
+        covariance=covariance,
+        covariance_corrected=np.full_like(covariance, np.nan),
+        correlation=correlation,
+        details=StateSpaceDetails(
+            left_out=left_out,
+            ceilings=tuple(ceilings),
+            modes=mode_accuracy(
+                found,
+                dict(zip(model.free, map(float, cramer_rao), strict=True)),
+                correlation,
+                lowest=min(float(t.omega[0]) for t in targets),
+            ),
+        ),
+        history=optimum.history,
+        converged=optimum.converged,
+        warnings=tuple(warnings),
+        problems=tuple(problems),
+        comparisons=tuple(
+            ResponseComparison(t, np.asarray(h), j) for t, h, j in zip(targets, answers, costs, strict=False)
+        ),
+        data=tuple(data),
+        settings={**dict(settings or {}), "started_from": source or "given values"},
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, ...]:
+    """Free parameters that leave no trace in any fitted response, at the start and at a shaken one."""
+    random = np.random.default_rng(1)
+    seen = np.zeros(len(model.free))
+    for shake in (0.0, 0.1):
+        values = np.array([model.parameters[n].value for n in model.free])
+        values = values * (1.0 + shake * random.standard_normal(values.size)) + (values == 0.0) * shake * 0.1
+        _, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
+        seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
+    return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12)
+
+
+def _start_problems(model: StateSpaceModel) -> list[str]:
+    growing = [v for v in model.eigenvalues() if v.real > FAST_GROWTH]
+    if not growing:
+        return []
+    worst = max(growing, key=lambda v: v.real)
+    return [
+        f"the start model '{model.name}' is unstable: a mode at {worst.real:+.2f}{worst.imag:+.2f}j 1/s doubles every "
+        f"{np.log(2) / worst.real:.2f} s, which no helicopter does. Check the signs of the start values."
+    ]
+
+
+def frequencies(targets: Sequence[Target]) -> tuple[float, float]:
+    """Lowest and highest fitted frequency [Hz]."""
+    return min(t.omega[0] for t in targets) / TWO_PI, max(t.omega[-1] for t in targets) / TWO_PI
+
+
+@dataclass(frozen=True)
+class ResponseEstimator:
+    """`fit_state_space` as an estimator."""
+
+    takes: frozenset[str] = frozenset({"iterations", "progress"})
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        if not isinstance(data, FrequencyResponse):
+            return "it fits frequency responses"
+        return "" if isinstance(model, StateSpaceModel) else "it fits state-space models"
+
+    def estimate(self, model: StateSpaceModel, data: FrequencyResponse, question: Question) -> StateSpaceFit:
+        iterations = 100 if question.iterations is None else question.iterations
+        return fit_state_space(model, data, iterations=iterations, progress=question.progress)
+
+
+FREQUENCY_RESPONSES = ResponseEstimator()

@@ -1,0 +1,67 @@
+"""Inputs that are a controller's answer to the outputs: their responses are minus its inverse (Ljung 1999, ch. 13).
+
+The test of `docs/explanation/flights-under-feedback.md` on channels instead of a vehicle's axes: what share of an
+input do the present and the past 0.3 s of the outputs explain, and do they explain it better than what follows?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.identification.responses.spectra import Signals
+
+_SPAN, _STEP = 0.3, 0.025  # s: of the outputs that a controller answers to, and between the samples of them
+_ANSWER = 0.99  # explained share from which an input is an answer
+_LATER = 1.5  # times as much left unexplained by the past as by what follows: then the outputs follow the input
+
+
+def answer_words(pieces: Sequence[Signals], inputs: Sequence[str], outputs: Sequence[str]) -> list[str]:
+    """A problem for every input that the outputs before it explain.
+
+    Args:
+        pieces: records that hold inputs, then outputs.
+        inputs, outputs: names.
+    """
+    words = []
+    for i, name in enumerate(inputs):
+        shares = [_shares(piece, i, len(inputs), len(outputs)) for piece in pieces]
+        told = [share for share in shares if share is not None]
+        if told and all(past >= _ANSWER and 1.0 - past <= _LATER * (1.0 - later) for past, later in told):
+            least = 100.0 * min(past for past, _ in told)
+            where = ", ".join(dict.fromkeys(piece.name for piece in pieces))
+            words.append(
+                f"{where}: input '{name}' is a controller's answer: {_SPAN:g} s of {', '.join(outputs)} explain "
+                f"{least:.1f} % of it. Its responses are minus the controller's inverse, not the aircraft's, however "
+                "coherent. Fly a sweep, or move the sticks and name the set-point with --references."
+            )
+    return words
+
+
+def _shares(piece: Signals, which: int, n_in: int, n_out: int) -> tuple[float, float] | None:
+    """Shares of an input's variance that the outputs until then and from then on explain; None where it is still."""
+    step = max(1, round(_STEP / piece.dt))
+    reach = step * round(_SPAN / _STEP)
+    values = np.asarray(piece.values[:, : n_in + n_out], dtype=np.float64)
+    if len(values) < 20 * reach:
+        return None
+    target = values[reach:-reach, which]
+    if np.ptp(target) == 0.0:
+        return None
+
+    def shifted(shifts: Sequence[int]) -> Array:
+        last = len(values) - reach
+        return np.concatenate([values[reach + k : last + k, n_in:] for k in shifts], axis=1)
+
+    past = _explained(target, shifted(range(-reach, 1, step)))
+    later = _explained(target, shifted(range(step, reach + 1, step)))
+    return past, later
+
+
+def _explained(target: Array, by: Array) -> float:
+    by = by - by.mean(axis=0)
+    off = target - target.mean()
+    rest = off - by @ np.linalg.lstsq(by, off, rcond=None)[0]
+    return 1.0 - float(rest @ rest) / float(off @ off)

@@ -1,0 +1,168 @@
+"""Multi-input conditioning: what each input does to each output when all other inputs are accounted for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+
+SINGULAR = 5e-3
+"""Share of an input's power that no other input explains, below which it cannot be told from the others."""
+
+C_EPSILON = float(np.sqrt(0.55))
+"""Constant of the random error for Hann windows that overlap by half (Tischler and Remple 2012, ch. 7)."""
+
+
+@dataclass(frozen=True)
+class Conditioned:
+    """Responses and conditioned spectra of one spectral matrix; NaN where the inputs cannot be told apart.
+
+    Attributes:
+        response: H, shape (n_f, n_outputs, n_inputs).
+        coherence: partial coherence, same shape.
+        multiple: multiple coherence of each output, shape (n_f, n_outputs).
+        input_power: spectrum of each input that no other input explains, shape (n_f, n_inputs).
+        output_power: spectrum of each output that no other input explains, shape (n_f, n_outputs, n_inputs).
+        cross: conditioned cross spectrum, same shape.
+        own_share: share of each input's power that no other input explains, shape (n_f, n_inputs).
+        error: random error of the magnitude (relative) and of the phase [rad], shape as `response`.
+    """
+
+    response: Complex
+    coherence: Array
+    multiple: Array
+    input_power: Array
+    output_power: Array
+    cross: Complex
+    own_share: Array
+    error: Array
+
+
+def condition_spectra(
+    spectra: Complex,
+    inputs: int,
+    *,
+    averages: float,
+    removed: Complex | None = None,
+    whole: Array | None = None,
+    share: Array | None = None,
+) -> Conditioned:
+    """H = Gxx^-1 Gxy with partial and multiple coherence (Tischler and Remple 2012, ch. 9; Bendat and Piersol 2010).
+
+    With A = Gxx^-1 and the noise spectrum Gvv = Gyy - Gyx A Gxy, the inverse of the full matrix gives the partial
+    coherence |H_i|^2 / (A_ii Gvv + |H_i|^2); 1/A_ii is what no other input explains of input i.
+
+    Args:
+        spectra: shape (n_f, n, n), inputs first, `[f, i, j]` = average of conj(Z_i) Z_j.
+        inputs: how many of the channels are inputs.
+        averages: number of independent windows.
+        removed: responses that were taken out of the outputs beforehand and are added here, shape
+            (n_f, n_outputs, n_inputs). whole: spectra of the whole outputs then, shape (n_f, n_outputs).
+        share: of each input's power that is its own, where it is known better than by these spectra (`own_shares`).
+    """
+    gxx, gxy = spectra[:, :inputs, :inputs], spectra[:, :inputs, inputs:]
+    gyy = np.diagonal(spectra[:, inputs:, inputs:], axis1=1, axis2=2).real
+    auto = np.diagonal(gxx, axis1=1, axis2=2).real
+    scale = np.sqrt(np.where(auto > 0.0, auto, 1.0))
+    normal = gxx / (scale[:, :, None] * scale[:, None, :])
+    own, inverse = _inverse(normal)
+    own = own if share is None else share
+    inverse = inverse / (scale[:, :, None] * scale[:, None, :])
+    h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
+    explained = np.einsum("fio,fio->fo", gxy.conj(), h).real
+    noise = np.maximum(gyy - explained, 0.0)
+    found = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
+    response = np.where(own[:, None, :] > SINGULAR, found, np.nan)
+    a = np.diagonal(inverse, axis1=1, axis2=2).real
+    power = np.abs(response) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = power / (a[:, None, :] * noise[:, :, None] + power)
+        multiple = explained / gyy if whole is None else 1.0 - noise / whole
+        input_power = np.where(a > 0.0, 1.0 / np.where(a > 0.0, a, 1.0), np.nan)
+        cross = response * input_power[:, None, :]
+    return Conditioned(
+        response=response,
+        coherence=coherence,
+        multiple=np.clip(multiple, 0.0, 1.0),
+        input_power=input_power,
+        output_power=noise[:, :, None] + power * input_power[:, None, :],
+        cross=np.asarray(cross, dtype=np.complex128),
+        own_share=own,
+        error=random_error(coherence, averages - (inputs - 1)),
+    )
+
+
+def _inverse(normal: Complex) -> tuple[Array, Complex]:
+    """Each input's own share and the inverse of coherency matrices, by pseudo-inverse where they are singular.
+
+    An input that no null vector touches is conditioned rightly by the pseudo-inverse; the others have no own share.
+    """
+    n_f, n = normal.shape[:2]
+    own = np.full((n_f, n), np.nan)
+    inverse = np.full_like(normal, np.nan)
+    finite = np.all(np.isfinite(normal), axis=(1, 2))
+    lowest = np.full(n_f, np.nan)
+    lowest[finite] = np.linalg.eigvalsh(normal[finite])[:, 0]
+    well = finite & (lowest > 1e-9)
+    inverse[well] = np.linalg.inv(normal[well])
+    own[well] = 1.0 / np.maximum(np.diagonal(inverse[well], axis1=1, axis2=2).real, 1.0)
+    for f in np.flatnonzero(finite & ~well):
+        own[f] = _shares(normal[f])
+        inverse[f] = np.linalg.pinv(normal[f], rcond=1e-9, hermitian=True)
+    return own, inverse
+
+
+def _shares(normal: Complex) -> Array:
+    """Own shares where the matrix is singular: 1 - multiple coherence with the other inputs, by least squares."""
+    n = normal.shape[0]
+    share = np.zeros(n)
+    for i in range(n):
+        others = [j for j in range(n) if j != i]
+        gii = normal[i, i].real
+        across = normal[others, i]
+        told = float((across.conj() @ np.linalg.pinv(normal[np.ix_(others, others)], rcond=1e-9) @ across).real)
+        share[i] = max(gii - told, 0.0)
+    return share
+
+
+def random_error(coherence: Array, averages: float) -> Array:
+    """Relative standard deviation of a response's magnitude, and of its phase in rad.
+
+    C sqrt(1 - coherence) / (sqrt(coherence) sqrt(2 n_d)) (Tischler and Remple 2012, eq. 7.62; Bendat and Piersol 2010).
+
+    Args:
+        coherence: ordinary, or partial with the averages reduced by the number of other inputs.
+        averages: independent windows n_d.
+    """
+    held = np.clip(coherence, 1e-12, 1.0)
+    return np.asarray(C_EPSILON * np.sqrt((1.0 - held) / held / (2.0 * max(averages, 1.0))))
+
+
+def project_on_references(spectra: Complex, inputs: int, references: int) -> Complex:
+    """The spectral matrix with the inputs replaced by what the references explain of them (joint input-output).
+
+    A loop feeds the outputs' disturbances back into the inputs and biases the direct estimate. The references are free
+    of them, so conditioning on the explained inputs gives S_ry / S_ru, with as many references as inputs, and its
+    two-stage form with more (Ljung 1999, sec. 13.5; van den Hof and Schrama 1993).
+
+    Args:
+        spectra: channels in the order inputs, outputs, references.
+        inputs, references: how many of each.
+
+    Returns:
+        The matrix of explained inputs and outputs.
+    """
+    n = spectra.shape[1] - references
+    told = spectra[:, :inputs, n:]  # S_ur
+    grr = spectra[:, n:, n:]
+    out = spectra[:, :n, :n].copy()
+    usable = np.all(np.isfinite(spectra), axis=(1, 2))
+    inverse = np.full_like(grr, np.nan)
+    inverse[usable] = np.linalg.pinv(grr[usable], rcond=1e-9, hermitian=True)
+    gain = told @ inverse
+    out[:, :inputs, :inputs] = gain @ told.conj().transpose(0, 2, 1)
+    out[:, :inputs, inputs:n] = gain @ spectra[:, n:, inputs:n]
+    out[:, inputs:n, :inputs] = out[:, :inputs, inputs:n].conj().transpose(0, 2, 1)
+    return out

@@ -1,0 +1,111 @@
+"""Frequency responses as netCDF files (netCDF 4, readable by any netCDF tool), and back without loss.
+
+The file knows arrays and words by the names of `FrequencyResponse`'s fields, not the class.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import msgspec
+import numpy as np
+import xarray as xr
+
+from swashplate import documents
+from swashplate.atomic import write_bytes
+from swashplate.errors import FlightError
+from swashplate.flights import hdf5
+
+SCHEMA = 1
+_PAIR = ("frequency", "output", "input")
+_ARRAYS = {
+    "coherence": _PAIR,
+    "error": _PAIR,
+    "multiple": ("frequency", "output"),
+    "input_power": ("frequency", "input"),
+    "output_power": ("frequency", "output"),
+    "input_coherence": ("frequency", "input", "input_2"),
+}
+
+
+class _Words(msgspec.Struct):
+    """What a file says beside its numbers."""
+
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    method: str
+    windows: tuple[float, ...]
+    sources: tuple[str, ...]
+    warnings: tuple[str, ...]
+    problems: tuple[str, ...]
+    settings: dict[str, Any]
+
+
+def save(fields: Mapping[str, Any], path: Path) -> Path:
+    """Writes the fields of a `FrequencyResponse` as a file, which appears by rename when it is complete.
+
+    Raises:
+        WriteError: where the folder is missing or cannot be written to, or the disk is full.
+    """
+    variables: dict[str, Any] = {
+        "response_real": (_PAIR, fields["response"].real, {"long_name": "real part of the response"}),
+        "response_imag": (_PAIR, fields["response"].imag, {"long_name": "imaginary part of the response"}),
+    }
+    variables |= {name: (dims, fields[name]) for name, dims in _ARRAYS.items()}
+    coordinates = {
+        "frequency": ("frequency", fields["omega"], {"units": "rad/s"}),
+        "output": list(fields["outputs"]),
+        "input": list(fields["inputs"]),
+    }
+    words = {name: fields[name] for name in _Words.__struct_fields__}
+    attributes = {"swashplate_response": SCHEMA, "words": json.dumps(words, default=str)}
+    data = xr.Dataset(variables, coords=coordinates, attrs=attributes)
+    encoding: dict[Any, Any] = {name: {"_FillValue": None} for name in (*variables, "frequency")}
+    file = io.BytesIO()  # not on the disk: where that is full, the HDF5 library ends the whole process
+    data.to_netcdf(file, engine="h5netcdf", encoding=encoding)
+    return write_bytes(path, file.getbuffer())
+
+
+def load(path: Path) -> dict[str, Any]:
+    """The fields of the `FrequencyResponse` in a file that `save` wrote.
+
+    Raises:
+        FlightError: where the file is missing, damaged, of a newer schema or something else.
+    """
+    if not path.is_file():
+        raise FlightError("there is no such file.", where=path, hint="Make it with 'swash respond'.")
+    try:
+        with h5py.File(path, "r") as file:
+            hdf5.check(path, file)
+        with xr.open_dataset(path, engine="h5netcdf", mask_and_scale=False) as found:
+            data = found.load()
+        schema = int(np.ravel(data.attrs["swashplate_response"])[0])
+        words = documents.parse_logged(data.attrs["words"], _Words, where=path, at="words", error=FlightError)
+        arrays: dict[str, Any] = {name: np.asarray(data[name].values, dtype=np.float64) for name in _ARRAYS}
+        response = data["response_real"].values + 1j * data["response_imag"].values
+        inputs, outputs = (tuple(map(str, data[name].values)) for name in ("input", "output"))
+        omega = np.asarray(data["frequency"].values, dtype=np.float64)
+    except FlightError:
+        raise
+    except Exception as error:  # whatever the libraries raise on foreign or damaged bytes is the file's fault
+        raise FlightError(
+            "does not hold frequency responses of swashplate.",
+            where=path,
+            hint="Make it with 'swash respond LOG --inputs ... --outputs ... --out DIR'.",
+        ) from error
+    if schema > SCHEMA:
+        raise FlightError(f"has schema {schema}; this swashplate knows up to {SCHEMA}.", where=path, hint="Update it.")
+    sizes = {"frequency": omega.size, "output": len(outputs), "input": len(inputs), "input_2": len(inputs)}
+    for name, values in {"response_real": response, **arrays}.items():
+        expected = tuple(sizes[dimension] for dimension in _ARRAYS.get(name, _PAIR))
+        if values.shape != expected:
+            raise FlightError(f"has shape {values.shape}, expected {expected}.", where=path, channel=name)
+    if not np.all(np.isfinite(omega)) or not np.all(np.diff(omega, prepend=0.0) > 0.0):
+        raise FlightError("does not rise from above zero.", where=path, channel="frequency")
+    channels = {"omega": omega, "inputs": inputs, "outputs": outputs}
+    return {**channels, "response": response, **arrays, **msgspec.structs.asdict(words)}

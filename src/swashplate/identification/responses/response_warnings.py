@@ -1,0 +1,258 @@
+"""What a reader of frequency responses must know: dead and doubled inputs, mixing, bias by feedback, bystanders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.arrays import Array
+from swashplate.flights.flight import Flight
+from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
+from swashplate.identification.responses.multi_input import SINGULAR, condition_spectra
+from swashplate.identification.responses.spectra import Signals, SpectralMatrix, spectral_matrix
+
+MIXED = 0.5
+"""Coherence between two inputs above which the pilot (or a loop) mixed them (Tischler and Remple 2012, ch. 9)."""
+
+MOST = 0.25
+"""Share of the lines that need a number for the lack of coherence to be the thing to say."""
+
+NEARLY_ONE = 0.9
+"""Coherence between two inputs above which a tenth or less of one is its own: errors of a strong response go over."""
+
+CLEAR, EXPLAINED = 0.8, 0.2
+"""Partial coherence from which a bystander counts, and the share of the noise that it may leave over."""
+
+SURE = 0.2
+"""Random error below which two estimates are compared."""
+
+
+def _hertz(omega: Array, where: NDArray[np.bool_]) -> str:
+    inside = omega[where] / TWO_PI
+    return f"{inside.min():.3g}-{inside.max():.3g} Hz"
+
+
+def _logs(found: FrequencyResponse) -> str:
+    """The records behind responses."""
+    return ", ".join(found.sources) or "flight"
+
+
+def still(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in names if all(np.ptp(flight.values(name)) == 0.0 for flight in flights))
+
+
+def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str]) -> list[str]:
+    where = ", ".join(sorted({flight.provenance.source or "flight" for flight in flights}))
+    return [
+        f"{where}: {role} '{name}' never moves; there is no response for it."
+        for role, names in (("input", inputs), ("output", outputs))
+        for name in still(flights, names)
+    ]
+
+
+def damaged(flights: Sequence[Flight]) -> list[str]:
+    """What is broken in the logs themselves (cut off, bytes lost, clock set back): responses are of what is left."""
+    return [
+        f"{flight.provenance.source or 'flight'}: {'; '.join(flight.provenance.damage)}; what was read is used."
+        for flight in flights
+        if flight.provenance.damage
+    ]
+
+
+def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
+    """Inputs that no frequency, or hardly one, tells apart."""
+    alive = [o for o, name in enumerate(found.outputs) if name not in dead]
+    together: dict[tuple[str, ...], list[str]] = {}
+    for i, name in enumerate(found.inputs):
+        lost = np.isnan(found.response[:, alive, i]).all(axis=1) & np.isfinite(found.input_power[:, i])
+        if name in dead or not alive or len(found.inputs) < 2 or not lost.any():
+            continue
+        mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
+        mean[i] = -1.0
+        pair = tuple(sorted((name, found.inputs[int(np.argmax(mean))])))
+        together.setdefault(pair, []).append(_hertz(found.omega, lost))
+    return [
+        f"{_logs(found)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
+        f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently, "
+        "best in a sweep of each."
+        for (one, other), bands in together.items()
+    ]
+
+
+def incoherent(found: FrequencyResponse) -> list[str]:
+    words = []
+    for output in found.outputs:
+        o = found.outputs.index(output)
+        # Where the inputs could not be told apart nearly everywhere, that is what is said.
+        if np.isfinite(found.response[:, o, :]).any(axis=1).mean() < MOST:
+            continue
+        if all(found.band(output, name) is None for name in found.inputs):
+            best = float(np.nanmax(found.coherence[:, o, :]))
+            words.append(
+                f"{_logs(found)}: no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a "
+                f"quarter of an octave (largest single value {best:.2f}): do not use its responses."
+            )
+    return words
+
+
+def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
+    fewest = min(matrix.averages for matrix in matrices)
+    if fewest >= 4.95:
+        return []
+    return [f"the longest window fits {fewest:.1f} times into the records, expected at least 5: errors are large."]
+
+
+def mixing_words(found: FrequencyResponse) -> list[str]:
+    """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it."""
+    words = []
+    for i, one in enumerate(found.inputs):
+        for j, other in enumerate(found.inputs[:i]):
+            mixed = np.nan_to_num(found.input_coherence[:, i, j])
+            told = np.isfinite(found.response[:, :, [i, j]]).any(axis=(1, 2))
+            mean = float(np.mean(mixed[told])) if told.any() else 0.0
+            if mean > MIXED:
+                words.append(
+                    f"'{other}' and '{one}' moved together (mean coherence {mean:.2f}, over {MIXED:g}): "
+                    "conditioning tells them apart, with larger errors."
+                )
+            nearly = told & (mixed > NEARLY_ONE)
+            if nearly.any() and found.omega[nearly].max() >= found.omega[nearly].min() * 2.0**0.25:
+                words.append(
+                    f"'{other}' and '{one}' were nearly one at {_hertz(found.omega, nearly)} (coherence up to "
+                    f"{mixed[nearly].max():.2f}): what windows blur counts many times over there. Do not trust weak "
+                    "responses to either, however coherent; fly one log per axis."
+                )
+    return words
+
+
+def bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]:
+    """Where the loop makes the direct estimate another one than the joint."""
+    words = []
+    for o, output in enumerate(joint.outputs):
+        for i, name in enumerate(joint.inputs):
+            h, d = joint.response[:, o, i], direct.response[:, o, i]
+            sure = joint.error[:, o, i] < SURE
+            with np.errstate(divide="ignore", invalid="ignore"):
+                apart = np.abs(np.log(d / h))
+            bound = np.maximum(3.0 * np.hypot(joint.error[:, o, i], direct.error[:, o, i]), np.log(10.0) / 20.0)
+            biased = sure & (apart > bound)
+            if biased.sum() > 0.1 * max(sure.sum(), 1):
+                words.append(
+                    f"{output} / {name}: feedback biases the direct estimate by up to "
+                    f"{20 * np.log10(np.e) * np.nanmax(apart[biased]):.1f} dB at {_hertz(joint.omega, biased)}; "
+                    "the joint estimate is given."
+                )
+    return words
+
+
+def unused_references(
+    flights: Sequence[Flight], inputs: Sequence[str], *, names: tuple[str, ...], axes: int
+) -> list[str]:
+    """Injected excitations in the logs that would make the joint estimate, where the loop may bias the direct one.
+
+    One that swept several axes in turn counts once for each.
+    """
+    shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
+    moving = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
+    found = [n for n in moving if flights[0][n].attrs.get("units") != "Hz"]  # not the sweep's own frequency
+    enough = len(found) >= len(inputs) or (len(found) == 1 and axes >= len(inputs))
+    if not enough or any(name.startswith(names) for name in inputs):
+        return []
+    return [
+        f"the logs hold {', '.join(found)}: --references {','.join(found)} makes the estimate that no loop biases, "
+        "above all where little was swept."
+    ]
+
+
+def bystander_words(
+    pieces: Sequence[Signals],
+    omega: Array,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    others: Sequence[str],
+    *,
+    window: float,
+    overlap: float,
+) -> list[str]:
+    """Commands left out that change the answer: compared in one window, with and without them.
+
+    A middle window: enough averages to be sure of a difference, long enough to see the low end. The pieces hold
+    inputs, outputs and the others, in this order.
+    """
+    n_in, n_out = len(inputs), len(outputs)
+    first = pieces[0].values.shape[1] - len(others)
+    words: list[str] = []
+    matrix = spectral_matrix(pieces, omega, window=window, overlap=overlap)
+    if matrix is None:
+        return []
+    places = list(range(n_in, n_in + n_out))
+    alone = condition_spectra(matrix.values[:, : n_in + n_out, : n_in + n_out], n_in, averages=matrix.averages)
+    for k, name in enumerate(others):
+        order = [*range(n_in), first + k, *places]
+        both = condition_spectra(
+            matrix.values[np.ix_(range(omega.size), order, order)], n_in + 1, averages=matrix.averages
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # What it adds must be real: its own share, its own effect, and noise that it explains away.
+            quieter = (1.0 - both.multiple) < EXPLAINED * (1.0 - alone.multiple)
+        for o, output in enumerate(outputs):
+            for i, mover in enumerate(inputs):
+                h, b = alone.response[:, o, i], both.response[:, o, i]
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    apart = np.abs(np.log(h / b))
+                bound = np.maximum(3.0 * both.error[:, o, i], np.log(10.0) / 40.0)
+                off = (both.error[:, o, i] < SURE) & (apart > bound) & quieter[:, o]
+                off &= both.coherence[:, o, n_in] >= CLEAR
+                if off.sum() > max(2, 0.05 * np.isfinite(h).sum()):
+                    words.append(
+                        f"{output} / {mover}: '{name}' moved along and acts on {output} too at {_hertz(omega, off)}; "
+                        f"this single response is wrong there. Add '{name}' to the inputs, and logs that move each."
+                    )
+    return words
+
+
+RISING = 15.0
+"""Degrees by which a phase may rise over the coherent band, while the gain does not, before it is said."""
+
+
+def lead_words(found: FrequencyResponse) -> list[str]:
+    """Outputs that run ahead of their input: phase that rises where the gain does not.
+
+    A stable system's phase rises only with its gain (Bode 1945: 90 degrees for 20 dB per decade), and delays make it
+    fall. What is left is a controller that answers the motion, a time skew, or an unstable aircraft.
+    """
+    words = []
+    for output in found.outputs:
+        for name in found.inputs:
+            h, _, error = found.pair(output, name)
+            band = found.band(output, name)
+            if band is None:
+                continue
+            inside = (found.omega >= band[0]) & (found.omega <= band[1]) & np.isfinite(h)
+            decades = np.log10(found.omega[inside])
+            if decades.size < 8 or decades[-1] - decades[0] < 0.5:
+                continue
+            weight = 1.0 / np.maximum(np.degrees(error[inside]), 1.0)
+            phase, sigma = _weighted_slope(decades, np.degrees(np.unwrap(np.angle(h[inside]))), weight)
+            gain, _ = _weighted_slope(decades, 20.0 * np.log10(np.abs(h[inside])), weight)
+            ahead = phase * (decades[-1] - decades[0])
+            if ahead > RISING and phase > 3.0 * sigma and gain < 1.0:
+                words.append(
+                    f"{output} / {name}: the phase rises by {ahead:.0f} degrees over "
+                    f"{_hertz(found.omega, inside)} while the gain does not: the output runs ahead of the input. A "
+                    "controller that answers the motion looks like this, and so do channels skewed in time or an "
+                    "unstable aircraft; do not take it for the aircraft unless an injected sweep (--references) agrees."
+                )
+    return words
+
+
+def _weighted_slope(x: Array, y: Array, weight: Array) -> tuple[float, float]:
+    """Slope of a weighted straight line and its standard deviation from the scatter about it."""
+    middle = float(np.average(x, weights=weight**2))
+    level = float(np.average(y, weights=weight**2))
+    spread = float(weight**2 @ (x - middle) ** 2)
+    slope = float(weight**2 @ ((x - middle) * (y - level))) / spread
+    scatter = weight * (y - level - slope * (x - middle))
+    return slope, float(np.sqrt(scatter @ scatter / max(x.size - 2, 1) / spread))

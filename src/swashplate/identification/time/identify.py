@@ -1,0 +1,260 @@
+"""From flights to an identified helicopter, with everything that a reader needs to trust it or not."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.flights.flight import Flight
+from swashplate.identification.core import accuracy
+from swashplate.identification.core.delay_restarts import minimise_over_valleys
+from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
+from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
+from swashplate.identification.core.records import POSE, Record, records
+from swashplate.identification.core.result import APART, Estimate, Result, correlation_of
+from swashplate.identification.core.scoring import Optimum, Progress
+from swashplate.identification.core.sources import sources_of
+from swashplate.identification.estimators import Data, Question
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.time import feedback, nelder_mead
+from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
+from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
+from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.identification.time.output_error import OutputError
+from swashplate.identification.time.prediction_error import PredictionError, in_wind
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.simulation.dynamics import enable_double_precision
+
+ITERATIONS = 60
+"""At most, where nothing is said."""
+
+FlightLikelihood = PredictionError | OutputError
+LikelihoodOf = Callable[[Parameterization, Sequence[Record], Question], FlightLikelihood]
+Search = Callable[[FlightLikelihood, int, Progress | None], Optimum]
+
+
+def identify_flight(
+    vehicle: Vehicle,
+    flights: Sequence[Flight],
+    question: Question,
+    *,
+    method: str,
+    likelihood_of: LikelihoodOf,
+    search: Search,
+) -> Result[Vehicle, FlightDetails]:
+    """Identify a helicopter whose pose was tracked.
+
+    Args:
+        vehicle: the equations and the card to start from.
+        flights: conditioned; each unbroken piece is a record with its own delays, trims and lever arm.
+        question: what is asked.
+        method: its name.
+        likelihood_of: makes the likelihood of records.
+        search: finds its optimum.
+
+    Raises:
+        IdentificationError, FlightError: see `identify`.
+    """
+    free = "full" if question.free is None else question.free
+    outputs = POSE if question.outputs is None else question.outputs
+    enable_double_precision()
+    enable_compilation_cache()
+    started = time.perf_counter()
+    refuse_lowpassed(flights)
+    table = parameterize(
+        vehicle,
+        free,
+        ties=question.ties,
+        fixed=question.fixed,
+        priors=question.priors,
+        prior_card=question.prior_card,
+    )
+    pieces = _long_enough(records(flights, vehicle, outputs=outputs))
+    axes = tuple(
+        axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
+    )
+    notes = [] if axes else [_UNJUDGED]
+    if method == "prediction-error" and not question.keep_unexcited:
+        table, held = _hold_unexcited(table, axes)
+        notes += held
+    likelihood = likelihood_of(table, pieces, question)
+    where = ", ".join(piece.name for piece in pieces)
+    likelihood.refresh(likelihood.row.starts())
+    accuracy.refuse_unseen(likelihood.row, likelihood.scores(likelihood.row.starts())[2], where=where)
+    optimum = search(likelihood, ITERATIONS if question.iterations is None else question.iterations, question.progress)
+    found = found_at(table, likelihood, optimum)
+    parameters, problems = estimates_of(found, vehicle)
+    problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(optimum.row), flights)]
+    notes += [
+        f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
+        for e in parameters
+        if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
+    ]
+    identified = _identified(found, vehicle, parameters, pieces, method)
+    return Result(
+        method=method,
+        model=identified,
+        start=vehicle,
+        estimates=parameters,
+        constants=constants(found),
+        noise=likelihood.noise_of(optimum.row),
+        nuisance=likelihood.nuisance_of(optimum.row),
+        names=table.names,
+        covariance=found.scaled(found.plain),
+        covariance_corrected=found.scaled(found.corrected),
+        correlation=correlation_of(found.scaled(found.plain)),
+        directions=accuracy.blind_directions(
+            table.names, accuracy.marginal_information(optimum.information, found.prior, found.places)
+        ),
+        details=FlightDetails(axes),
+        history=optimum.history,
+        converged=optimum.converged,
+        problems=(*problems, *notes, *(() if optimum.converged else ("the iterations ran out",))),
+        failed=bool(problems),
+        comparisons=likelihood.comparisons(optimum.row),
+        data=sources_of(flights),
+        seconds=time.perf_counter() - started,
+        settings={
+            "method": method,
+            "choice": free if isinstance(free, str) else "given",
+            "free": list(table.names),
+            "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
+            "held at the prior card": list(table.held),
+            "outputs": list(outputs),
+            "wind": question.wind,
+            "rate": 1.0 / pieces[0].dt,
+            "records": [piece.name for piece in pieces],
+            "voltage": "logged" if all(piece.voltage_known for piece in pieces) else "not logged: card's nominal",
+        },
+    )
+
+
+@dataclass(frozen=True)
+class FlightEstimator:
+    """An estimator of helicopters whose pose was tracked: a likelihood and a search."""
+
+    method: str
+    takes: frozenset[str]
+    likelihood_of: LikelihoodOf
+    search: Search
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        if isinstance(data, FrequencyResponse):
+            return "it fits records in time"
+        if not isinstance(model, Vehicle):
+            return "it fits vehicles"
+        lacking = [name for name in PREDICTED if name not in model.state_names]
+        lacking += [] if model.traits.axes or "lateral" in model.input_names else ["axes that its inputs drive"]
+        return f"it fits helicopters, and the vehicle lacks {', '.join(lacking)}" if lacking else ""
+
+    def estimate(self, model: Vehicle, data: Sequence[Flight], question: Question) -> Result[Vehicle, FlightDetails]:
+        return identify_flight(
+            model, data, question, method=self.method, likelihood_of=self.likelihood_of, search=self.search
+        )
+
+
+def _prediction_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> PredictionError:
+    return PredictionError(table, pieces, noise=in_wind(pieces) if question.wind else None)
+
+
+def _output_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> OutputError:
+    del question
+    return OutputError(table, pieces)
+
+
+def _scoring(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
+    return minimise_over_valleys(likelihood, iterations=iterations, progress=progress)
+
+
+def _scoring_together(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
+    return minimise_over_valleys(likelihood, iterations=iterations, together=True, progress=progress)
+
+
+def _simplex(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
+    del iterations
+    assert isinstance(likelihood, OutputError)
+    return nelder_mead.minimise_squares(likelihood, progress=progress)
+
+
+_TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
+PREDICTION_ERROR = FlightEstimator("prediction-error", _TAKES | {"keep_unexcited", "wind"}, _prediction_error, _scoring)
+OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together)
+NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex)
+
+SHORTEST = 6.0
+"""Seconds below which a piece is left out: the filter settles in a quarter of that."""
+
+
+def _long_enough(pieces: list[Record]) -> list[Record]:
+    kept = [piece for piece in pieces if piece.time[-1] - piece.time[0] >= SHORTEST]
+    if not kept:
+        longest = max(piece.time[-1] - piece.time[0] for piece in pieces)
+        raise IdentificationError(
+            f"the longest unbroken piece has {longest:.1f} s, expected at least {SHORTEST:g} s.",
+            where=pieces[0].name,
+            hint="Bridge longer gaps with a larger max_gap, or fly longer.",
+        )
+    return kept
+
+
+_UNJUDGED = "the model names no axes: whether the flights move each by itself was not judged"
+
+
+def _hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:
+    """Fix what only unexcited axes could tell, at its prior where it has one."""
+    notes = []
+    for axis in table.vehicle.traits.axes:
+        judged = [item for item in axes if item.axis == axis.name]
+        held = [item for item in table.free if item.name in axis.parameters]
+        if not held or any(item.identifiable for item in judged):
+            continue
+        at = {item.name: item.start if item.mean is None else item.mean for item in held}
+        table = replace(
+            table.without(at), vehicle=table.vehicle.with_values({k: v for k, v in at.items() if v is not None})
+        )
+        notes.append(f"{', '.join(at)} held: {judged[0].words}")
+    return table, notes
+
+
+def _identified(
+    found: Found, vehicle: Vehicle, estimates: Sequence[Estimate], pieces: Sequence[Record], method: str
+) -> Vehicle:
+    """The identified vehicle: the card with the new numbers, where they come from, and what the observer needs."""
+    sources = ", ".join(piece.name for piece in pieces)
+    card = found.table.vehicle.card
+    for estimate in estimates:
+        card = card.with_values(
+            {estimate.name: estimate.value},
+            status="identified",
+            sigma=estimate.sigma_corrected,
+            source=f"identified by {method} from {sources}",
+        )
+    changed = {
+        name: parameter.value
+        for name, parameter in card.parameters.items()
+        if parameter.status != "identified"
+        and name not in found.table.held
+        and parameter.value != vehicle.card.parameters[name].value
+    }
+    card = card.with_values(changed, status="assumed", source="held during the identification")
+    started = vehicle.card.parameters
+    moved = {name for name, entry in card.parameters.items() if entry.value != started[name].value}
+    card = replace(
+        card,
+        parameters={
+            name: replace(entry, before=started[name].value if name in moved else None)
+            for name, entry in card.parameters.items()
+        },
+    )
+    row = found.optimum.row
+    noise, nuisance = found.likelihood.noise_of(row), found.likelihood.nuisance_of(row)
+    observer = {"nuisance": {k: float(v) for k, v in nuisance._asdict().items()}}
+    if noise is not None:
+        observer["noise"] = {k: float(v) for k, v in noise._asdict().items()}
+    card = replace(card, title=f"{vehicle.card.title}, identified from {sources}", observer=observer, path="")
+    return found.table.vehicle.with_card(card)

@@ -1,0 +1,48 @@
+"""The body's motion from a measured pose: what models are held against."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.identification.core.records import Record
+
+PREDICTED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
+"""The body states in the order of every (n, 12) table."""
+
+
+def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13) -> Array:
+    """Body states (n, 12) of the centre of gravity from the measured pose, in the order of `PREDICTED`.
+
+    Rates and velocities are slopes of a cubic fitted to the samples within `window` seconds (Savitzky and Golay 1964),
+    so each uses samples after its own time too: this is what predictions are held against, never what they start from.
+    """
+    names = list(record.output_names)
+    pose = record.outputs[:, [names.index(name) for name in ("x", "y", "z", "phi", "theta", "psi")]].copy()
+    pose[:, 3] -= float(nuisance.level_phi)
+    pose[:, 4] -= float(nuisance.level_theta)
+    if float(nuisance.level_psi):
+        tracked = Rotation.from_euler("ZYX", pose[:, [5, 4, 3]])
+        turned = (tracked * Rotation.from_euler("Z", -float(nuisance.level_psi))).as_euler("ZYX")
+        pose[:, 3:] = np.stack([turned[:, 2], turned[:, 1], np.unwrap(turned[:, 0])], axis=1)
+        pose[:, 5] += 2.0 * np.pi * np.round((record.outputs[0, names.index("psi")] - pose[0, 5]) / (2.0 * np.pi))
+    lever = np.array([nuisance.lever_x, nuisance.lever_y, nuisance.lever_z], dtype=np.float64)
+    pose[:, :3] -= Rotation.from_euler("ZYX", pose[:, [5, 4, 3]]).apply(lever)
+    length = max(5, 2 * round(window / record.dt / 2) + 1)
+    smooth = savgol_filter(pose, length, 3, axis=0)
+    slope = savgol_filter(pose, length, 3, deriv=1, delta=record.dt, axis=0)
+    phi, theta = smooth[:, 3], smooth[:, 4]
+    phi_dot, theta_dot, psi_dot = slope[:, 3], slope[:, 4], slope[:, 5]
+    velocity = Rotation.from_euler("ZYX", smooth[:, [5, 4, 3]]).apply(slope[:, :3], inverse=True)
+    rates = np.stack(
+        [
+            phi_dot - psi_dot * np.sin(theta),
+            theta_dot * np.cos(phi) + psi_dot * np.cos(theta) * np.sin(phi),
+            -theta_dot * np.sin(phi) + psi_dot * np.cos(theta) * np.cos(phi),
+        ],
+        axis=1,
+    )
+    return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)

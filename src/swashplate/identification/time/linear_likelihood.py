@@ -1,0 +1,167 @@
+"""Likelihoods of a linear model's errors along records: output errors, and innovations with a free gain.
+
+Every derivative is taken by complex steps through matrix exponentials and recursions, exact to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import jax
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.filtering.filter_loop import filtered
+from swashplate.identification.core.parameter_row import Entry
+from swashplate.identification.core.records import Record
+from swashplate.identification.core.time_likelihood import TimeErrors, gain_entries
+from swashplate.models.linear.expressions import Expression
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.simulation.discretisation import first_order_hold
+from swashplate.simulation.dynamics import enable_double_precision
+
+STEP = 1e-30
+"""Of the complex steps."""
+
+
+class OutputErrors(TimeErrors):
+    """The likelihood of a linear model's output errors, or of its innovations.
+
+    Args:
+        model: structure and start values. outputs: channels to fit.
+        records: measured inputs and outputs.
+        shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
+        delays: of the inputs. gain: whether innovations correct the states, by a free gain.
+    """
+
+    def __init__(
+        self,
+        model: StateSpaceModel,
+        outputs: tuple[str, ...],
+        records: Sequence[Record],
+        shifts: bool,
+        biases: tuple[str, ...],
+        *,
+        delays: tuple[Expression | None, ...],
+        gain: bool,
+    ) -> None:
+        self.delays = delays
+        self.model, self._gained = model, gain
+        self.rows_of = [model.outputs.index(o) for o in outputs]
+        entries = [
+            Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper)
+            for n in model.free
+            for p in (model.parameters[n],)
+        ]
+        super().__init__(
+            entries, states=model.states, outputs=outputs, records=records, rest={}, shifts=shifts, biases=biases
+        )
+
+    def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
+        return gain_entries(self.model.states, size, spread) if self._gained else []
+
+    def _plain(self, row: Array) -> Array:
+        return np.asarray(self._errors(np.asarray(row * self.row.scale)[None])[0].real)
+
+    def _with_slopes(self, row: Array) -> tuple[Array, Array]:
+        errors = self._errors(self._stepped(row))
+        return errors[0].real, errors[1:].imag / STEP * self.row.scale[:, None, None]
+
+    def _stepped(self, row: Array) -> Any:
+        """A row's numbers, plain and with a complex step in each."""
+        numbers = np.asarray(row * self.row.scale)
+        return numbers + 1j * STEP * np.vstack([np.zeros(numbers.size), np.eye(numbers.size)])
+
+    def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""
+        values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
+        n, m, k = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
+        shapes = {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
+        found = {s: np.zeros(shape, dtype=np.complex128) for s, shape in shapes.items()}
+        found["M"] += np.eye(n)
+        for e in self.model.elements:
+            found[e.matrix][e.row, e.column] = e.expression(values)
+        a, b = np.linalg.solve(found["M"], found["F"]), np.linalg.solve(found["M"], found["G"])
+        h1 = found["H1"][self.rows_of]
+        return a, b, found["H0"][self.rows_of] + h1 @ a, found["D"][self.rows_of] + h1 @ b, h1
+
+    def _systems(self, batch: Any) -> tuple[Any, ...]:
+        return tuple(np.stack(part) for part in zip(*(self._matrices(numbers) for numbers in batch), strict=True))
+
+    def _errors(self, batch: Any) -> Any:
+        """Output errors of every record, one after the other, for a batch of rows: (n_batch, n_t, n_outputs)."""
+        n, m = len(self.model.states), len(self.model.inputs)
+        a, b, c, d, h1 = self._systems(batch)
+        parts = []
+        for number, record in enumerate(self.records):
+            dt, measured = record.dt, record.outputs[:, None, :]
+            shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
+            bias = self._column(batch, f"bias {{}}[{number}]", self.outputs) + np.einsum("poi,pi->po", h1, shift)
+            x = self._column(batch, f"start {{}}[{number}]", self.model.states)
+            held = np.concatenate([b, np.broadcast_to(np.eye(n), (len(batch), n, n))], axis=2)
+            phi, g0, g1 = first_order_hold(a, held, dt)
+            gain = self._gain(batch, a, c, phi, dt)
+            u = self._late(batch, record.inputs, dt)
+            drive = np.einsum("pij,tpj->tpi", g0[:, :, :m], u[:-1]) + np.einsum(
+                "pij,tpj->tpi", g1[:, :, :m], np.diff(u, axis=0)
+            )
+            drive = drive + np.einsum("pij,pj->pi", g0[:, :, m:], shift)
+            through = np.einsum("pij,tpj->tpi", d, u) + bias
+            drive = np.concatenate([drive, np.zeros_like(drive[:1])])
+            parts.append(np.asarray(_recursion()(x, phi, c, gain, measured - through, drive)))
+        return np.concatenate(parts, axis=1)
+
+    def _late(self, batch: Any, u: Array, dt: float) -> Any:
+        """Inputs later by their delays, straight between samples, (n_t, n_batch, n_inputs)."""
+        late = np.broadcast_to(u[:, None, :], (len(u), len(batch), u.shape[1]))
+        if not any(self.delays):
+            return late
+        late = late.astype(np.complex128)
+        count = np.arange(len(u))
+        for p, numbers in enumerate(batch):
+            values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
+            for i, delay in enumerate(self.delays):
+                if delay is not None:
+                    lag = delay(values) / dt
+                    whole = int(np.floor(np.real(lag)))
+                    near, far = (u[np.clip(count - k, 0, len(u) - 1), i] for k in (whole, whole + 1))
+                    late[:, p, i] = near + (lag - whole) * (far - near)
+        return late
+
+    def _gain(self, batch: Any, a: Any, c: Any, phi: Any, dt: float) -> Any:
+        """Gains from innovations to the next states, (n_batch, n_states, n_outputs); zero for output error."""
+        columns = [self._column(batch, f"gain {s}/{{}}", self.outputs) for s in self.model.states]
+        return np.stack(columns, axis=1)
+
+    def _column(self, batch: Any, pattern: str, names: Sequence[str]) -> Any:
+        found = np.zeros((len(batch), len(names)), dtype=np.complex128)
+        for i, name in enumerate(names):
+            place = self._place.get(pattern.format(name))
+            if place is not None:
+                found[:, i] = batch[:, place]
+        return found
+
+
+@cache
+def _recursion() -> Any:
+    """Errors of a batch of models along one record, (n_batch, n_t, n_outputs), compiled for its shapes.
+
+    Arguments, by model first: states at the start, transitions, outputs' and innovations' matrices; by sample first:
+    what is measured less what goes through, and what drives the states to the next sample.
+    """
+    enable_double_precision()
+
+    def one(x: Any, phi: Any, c: Any, gain: Any, measured: Any, drive: Any) -> Any:
+        def correct(x: Any, y: Any, drive: Any) -> Any:
+            error = y - c @ x
+            return (x, drive + gain @ error), error
+
+        def predict(state: tuple[Any, Any], _: Any) -> Any:
+            x, pushed = state
+            return phi @ x + pushed
+
+        return filtered(x, measured, drive, correct=correct, predict=predict)[0]
+
+    return jax.jit(jax.vmap(one, in_axes=(0, 0, 0, 0, 1, 1)))

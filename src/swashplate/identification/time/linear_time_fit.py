@@ -1,0 +1,154 @@
+"""State-space models fitted in time: maximum likelihood under measurement noise, or with gusts by innovations.
+
+    dx/dt = A x + B u(t - tau) + shift (+ gusts),    y = C x + D u(t - tau) + bias + v
+
+Output error takes all noise for measurement noise (Jategaonkar 2015, ch. 4; Klein and Morelli 2006, ch. 6). Prediction
+error corrects the state by K times the last innovation and fits K too: the innovations form, which knows any stationary
+gusts and measurement noise, also where both come in by an accelerometer (Ljung 1999, sec. 7.3). Filter error has K
+from a Kalman filter with white gusts on every state's rate: fewer unknowns, if gusts come in so (Jategaonkar, ch. 5).
+The covariance of the errors alternates with Fisher scoring; derivatives by complex steps are exact to rounding.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.low_passed import refuse_lowpassed
+from swashplate.identification.core.records import Record, uniform_table
+from swashplate.identification.core.result import Result
+from swashplate.identification.core.sources import sources_of
+from swashplate.identification.core.time_fit import TimeDetails, check_method, result_of, solve
+from swashplate.identification.estimators import Data, Question
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.time.linear_filter import FilterErrors
+from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.models.linear.expressions import Expression
+from swashplate.models.linear.linear_vehicle import structure_of
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+
+
+def fit_in_time(
+    model: Vehicle | StateSpaceModel,
+    flights: Flight | Sequence[Flight],
+    *,
+    outputs: Sequence[str] | None = None,
+    shifts: bool = True,
+    biases: Sequence[str] = (),
+    method: str = "output-error",
+    iterations: int = 80,
+    progress: Callable[[int, float], None] | None = None,
+) -> Result[StateSpaceModel, TimeDetails]:
+    """Fit a model's free parameters to records in time.
+
+    Args:
+        model: structure and start values. A delay belongs to an input; free ones are fitted.
+        flights: conditioned; each unbroken piece is a record with its own start state and constants.
+        outputs: channels to fit; all of the model's where None.
+        shifts: constants in the states' rates, per record.
+        biases: outputs with a constant of their own, per record.
+        method: "output-error"; for records with gusts or an unstable aircraft "filter-error" (the gain by the gusts'
+            intensities) or "prediction-error" (any gain).
+        iterations: at most this many.
+        progress: called with the iteration and the cost.
+
+    Raises:
+        IdentificationError: delays that differ between outputs, a model that diverges at its start values, an unknown
+            method, or no free parameter.
+        FlightError: where a flight was low-passed.
+    """
+    began = time.perf_counter()
+    flights, model = (flights,) if isinstance(flights, Flight) else tuple(flights), structure_of(model)
+    names = tuple(outputs or model.outputs)
+    check_method(method)
+    refuse_lowpassed(flights)
+    if not model.free:
+        raise IdentificationError("has no free parameter.", channel=model.name)
+    unknown = [o for o in (*names, *biases) if o not in model.outputs]
+    if unknown:
+        raise IdentificationError(f"is no output of '{model.name}'.", channel=", ".join(unknown))
+    delays = tuple(_delay_of(model, names, i) for i in model.inputs)
+    pieces = []
+    for flight in flights:
+        source = flight.provenance.source or "flight"
+        for piece in flight.split():
+            stamps, table = uniform_table(piece, (*model.inputs, *names), who=f"'{model.name}'")
+            pieces.append(
+                Record(
+                    name=f"{source} {stamps[0]:.2f}-{stamps[-1]:.2f} s",
+                    time=stamps,
+                    inputs=table[:, : len(model.inputs)],
+                    outputs=table[:, len(model.inputs) :],
+                    voltage=np.full(stamps.size, np.nan),
+                    output_names=names,
+                    voltage_known=False,
+                    log=source,
+                )
+            )
+    kind = FilterErrors if method == "filter-error" else OutputErrors
+    likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
+    return result_of(
+        solve(likelihood, iterations=iterations, progress=progress),
+        model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}),
+        start=model,
+        units=[model.parameters[n].unit for n in model.free],
+        ties=[],
+        method=method,
+        data=sources_of(flights),
+        settings={
+            "outputs": list(names),
+            "shifts": shifts,
+            "biases": list(biases),
+            "records": [piece.name for piece in pieces],
+        },
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:
+    found = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
+    if len(found) > 1:
+        raise IdentificationError(
+            f"has different delays to different outputs ({', '.join(found)}).",
+            channel=input,
+            hint="Give the input one delay; the fit in time delays inputs.",
+        )
+    return next(iter(found.values()), None)
+
+
+@dataclass(frozen=True)
+class LinearEstimator:
+    """`fit_in_time` by one of its methods, as an estimator."""
+
+    method: str
+    takes: frozenset[str] = frozenset({"outputs", "iterations", "shifts", "biases", "progress"})
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        if isinstance(data, FrequencyResponse):
+            return "it fits records in time"
+        return "" if isinstance(model, StateSpaceModel) else "it fits state-space models"
+
+    def estimate(
+        self, model: StateSpaceModel, data: Sequence[Flight], question: Question
+    ) -> Result[StateSpaceModel, TimeDetails]:
+        return fit_in_time(
+            model,
+            data,
+            outputs=question.outputs,
+            shifts=question.shifts is not False,
+            biases=question.biases,
+            method=self.method,
+            iterations=80 if question.iterations is None else question.iterations,
+            progress=question.progress,
+        )
+
+
+FILTER_ERROR, PREDICTION_ERROR, OUTPUT_ERROR = (
+    LinearEstimator(method) for method in ("filter-error", "prediction-error", "output-error")
+)

@@ -1,0 +1,336 @@
+"""Maximum likelihood by output errors over many short shots: right where no gust disturbs and no loop is closed.
+
+Each record is cut into windows that start from their own free initial state (multiple shooting), so that neither an
+unstable mode nor a long record lets the simulation run away. The cost is 1/2 sum v' R^-1 v + N/2 ln |R| with R from the
+residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbed_model import (
+    N_DISTURBANCES,
+    Nuisance,
+    StochasticModel,
+    commands,
+    mean_nuisance,
+    stochastic_model,
+)
+from swashplate.identification.core import robust
+from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.parameter_row import Entry, Row
+from swashplate.identification.core.parameters import Layout, Parameterization
+from swashplate.identification.core.records import Record, logs
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.prediction_error import parameter_entries, stack_records
+from swashplate.identification.time.start_states import slopes, start_state
+
+WINDOW = 4.0
+"""Seconds of one shot: some periods of the fast modes, and short against the growth of unstable ones and of yaw."""
+
+_NUISANCE = {
+    # name: scale, prior sigma
+    "delay_servo": (0.05, 0.05),
+    "delay_motor": (0.05, 0.05),
+    "trim_motor_lower": (0.02, 0.05),
+    "trim_motor_upper": (0.02, 0.05),
+    "trim_servo_roll": (0.02, 0.1),
+    "trim_servo_pitch": (0.02, 0.1),
+    "lever_x": (0.05, 0.1),
+    "lever_y": (0.05, 0.1),
+    "lever_z": (0.05, 0.1),
+    "level_phi": (0.02, 0.1),
+    "level_theta": (0.02, 0.1),
+}
+
+_INITIAL = {
+    # state: scale, prior sigma of its correction; pose and velocities are free, hidden states stay near their guess
+    **dict.fromkeys(("x", "y", "z", "phi", "theta", "psi"), (0.01, 1.0)),
+    **dict.fromkeys(("u", "v", "w", "p", "q", "r"), (0.1, 10.0)),
+    **dict.fromkeys(("alpha_lower", "beta_lower"), (0.02, 0.2)),
+    **dict.fromkeys(("eta_bar", "zeta_bar"), (0.02, 0.5)),
+    **dict.fromkeys(("omega_lower", "omega_upper"), (2.0, 10.0)),
+}
+_HIDDEN = (0.02, 0.1)
+"""The same for inner states that have no entry: flapping, stabilizer bar."""
+
+_DRIFTING = {"trim_motor_lower": (0.002, 0.002), "trim_motor_upper": (0.002, 0.002)}
+"""Scale and prior sigma of what moves slowly between windows: with the battery, by the error of its voltage.
+
+A part in a thousand of one rotor's command turns the nose by 1.6 rad in 4 s.
+"""
+
+
+class OutputError:
+    """The residuals' likelihood of windows simulated from their own initial states.
+
+    Args:
+        table: free parameters and ties.
+        pieces: the records, all at one rate.
+        window: length of one shot [s].
+        nuisances: which of the records' own numbers to estimate (names of `Nuisance`).
+    """
+
+    def __init__(
+        self,
+        table: Parameterization,
+        pieces: Sequence[Record],
+        *,
+        window: float = WINDOW,
+        nuisances: Sequence[str] = tuple(_NUISANCE),
+    ) -> None:
+        self.table = table
+        self.pieces = tuple(pieces)
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt)
+        self.nuisances = tuple(nuisances)
+        self.length = round(window / self.model.dt)
+        self._places = [
+            (number, first)
+            for number, piece in enumerate(pieces)
+            for first in range(0, piece.time.size - self.length, self.length)
+        ]
+        if not self._places:
+            longest = max(piece.time.size for piece in pieces) * self.model.dt
+            raise IdentificationError(
+                f"the longest record has {longest:.1f} s, expected more than one window of {window:g} s.",
+                hint="Choose a shorter window.",
+            )
+        absent = {name for name in _NUISANCE if name.startswith("trim_")}
+        absent -= {f"trim_{name}" for name in table.vehicle.input_names}
+        self.nuisances = tuple(name for name in self.nuisances if name not in absent)
+        drifting = tuple(name for name in _DRIFTING if name in self.nuisances)
+        spread = {**_INITIAL, **_DRIFTING}
+        self._own = {name: spread.get(name, _HIDDEN) for name in (*table.vehicle.state_names, *drifting)}
+        self.logs, self._log = logs(pieces)
+        entries = parameter_entries(table)
+        for number in range(len(self.logs)):
+            for name in self.nuisances:
+                scale, sigma = _NUISANCE[name]
+                low = -0.02 if name.startswith("delay") else -np.inf
+                kinked = name.startswith("delay")
+                entries.append(Entry(f"{name}[{number}]", "nuisance", 0.0, scale, low, sigma=sigma, kinked=kinked))
+        self._shared = len(entries)
+        for place in range(len(self._places)):
+            for name, (scale, sigma) in self._own.items():
+                entries.append(Entry(f"{name} at window {place}", "initial", 0.0, scale, sigma=sigma))
+        self.row = Row(tuple(entries), table.prior_correlations)
+        self._plan = _Plan(
+            self.model, table.layout, len(self.logs), self.nuisances, drifting, self.length, self._shared
+        )
+        self._data = self._windows()
+        self._L = np.eye(len(pieces[0].output_names))
+
+    def _windows(self) -> dict[str, Any]:
+        outputs, values, rates = [], [], []
+        for number, first in self._places:
+            piece = self.pieces[number]
+            value, rate = slopes(piece, np.array([first]))
+            outputs.append(piece.outputs[first : first + self.length])
+            values.append(value[0])
+            rates.append(rate[0])
+        stacked = stack_records(self.pieces)
+        return {
+            "outputs": jnp.asarray(np.stack(outputs)),
+            "value": jnp.asarray(np.stack(values)),
+            "rate": jnp.asarray(np.stack(rates)),
+            "first": jnp.asarray([first for _, first in self._places]),
+            "record": jnp.asarray([number for number, _ in self._places]),
+            "inputs": jnp.asarray(stacked["inputs"]),
+            "voltage": jnp.asarray(stacked["voltage"]),
+            "card": jnp.asarray(self.table.card_row),
+            "log": jnp.asarray(self._log),
+            "scale": jnp.asarray(self.row.scale[: self._shared]),
+            "initial_scale": jnp.asarray([scale for scale, _ in self._own.values()]),
+        }
+
+    def unpack(self, shared: Any) -> tuple[Any, Nuisance]:
+        """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
+        return _unpack(self._plan, self._data, jnp.asarray(shared))
+
+    def residuals(self, row: Array) -> tuple[Any, Any]:
+        """Residuals (windows, n, outputs) and states (windows, n, states)."""
+        return _residuals(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+
+    # ---- likelihood --------------------------------------------------------------------------------------------
+    def cost(self, row: Array) -> float:
+        """Negative log-likelihood with the covariance of the last accepted row."""
+        residual = np.asarray(self.residuals(row)[0])
+        return self._cost(residual)
+
+    def _cost(self, residual: Array) -> float:
+        flat = residual.reshape(-1, residual.shape[-1])
+        if not np.isfinite(flat).all():
+            return np.inf
+        white = np.linalg.solve(self._L, flat.T)
+        return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
+
+    def refresh(self, row: Array) -> None:
+        """Covariance of the residuals at an accepted row, outliers weighed down."""
+        flat = np.asarray(self.residuals(row)[0]).reshape(-1, self._L.shape[0])
+        if not np.isfinite(flat).all():
+            return
+        scale = 1.4826 * np.median(np.abs(flat), axis=0) + 1e-12
+        weight = np.minimum(robust.weights(flat / scale).min(axis=1), 1.0)[:, None]
+        R = (flat * weight).T @ flat / weight.sum()
+        floor = np.diag(np.full(R.shape[0], 1e-14))
+        self._L = np.linalg.cholesky(0.5 * (R + R.T) + floor)
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and information; windows share only the first entries (an arrow-shaped matrix)."""
+        residual, gradient, information, _ = self._accumulate(row)
+        return self._cost(residual), gradient, information
+
+    def _accumulate(self, row: Array) -> tuple[Array, Array, Array, Array]:
+        values, tangents = _with_tangents(self._plan, self._data, jnp.asarray(row))
+        residual, derivative = np.asarray(values), np.asarray(tangents)
+        Li = np.linalg.inv(self._L)
+        white = residual @ Li.T
+        weight = robust.weights(white)
+        d_white = derivative @ Li.T
+        p, s, n = len(self.row), self._shared, len(self._own)
+        gradient, information = np.zeros(p), np.zeros((p, p))
+        for place in range(len(self._places)):
+            own = np.concatenate([np.arange(s), s + place * n + np.arange(n)])
+            flat = d_white[place].reshape(s + n, -1)
+            gradient[own] += flat @ (white[place] * weight[place]).ravel()
+            information[np.ix_(own, own)] += (flat * weight[place].ravel()) @ flat.T
+        return residual, gradient, information, d_white
+
+    # ---- what the accuracy analysis and the report need --------------------------------------------------------
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per window: whitened residuals (n, outputs), their sensitivities (p, n, outputs); no other information."""
+        residual, _, _, d_white = self._accumulate(row)
+        Li = np.linalg.inv(self._L)
+        p, s, n = len(self.row), self._shared, len(self._own)
+        white, sensitivities = [], []
+        for place in range(len(self._places)):
+            full = np.zeros((p, *d_white.shape[2:]))
+            full[:s] = d_white[place, :s]
+            full[s + place * n : s + (place + 1) * n] = d_white[place, s:]
+            white.append(residual[place] @ Li.T)
+            sensitivities.append(full)
+        return white, sensitivities, np.zeros((p, p))
+
+    def noise_of(self, row: Array) -> None:
+        """It knows of no process noise."""
+
+    def nuisance_of(self, row: Array) -> Nuisance:
+        """The records' mean nuisance at a row."""
+        return mean_nuisance(self.unpack(row[: self._shared])[1])
+
+    def comparisons(self, row: Array) -> tuple[Comparison, ...]:
+        """Every record beside its simulated windows."""
+        residual, simulated = (np.asarray(item) for item in self.residuals(row))
+        kept = [self.table.vehicle.index(name) for name in PREDICTED]
+        sigma, made = np.sqrt(np.diag(self.covariance)), []
+        for number, piece in enumerate(self.pieces):
+            model, counted = np.full_like(piece.outputs, np.nan), np.zeros(piece.time.size, dtype=bool)
+            body = np.full((piece.time.size, len(PREDICTED)), np.nan)
+            for place, (owner, first) in enumerate(self._places):
+                if owner == number:
+                    here = slice(first, first + self.length)
+                    model[here] = piece.outputs[here] - residual[place]
+                    body[here] = simulated[place][:, kept]
+                    counted[here] = True
+            made.append(Comparison(record=piece, counted=counted, model=model, sigma=sigma, states=body))
+        return tuple(made)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the output errors at the last accepted row."""
+        return np.asarray(self._L @ self._L.T)
+
+    def places(self) -> list[tuple[int, int]]:
+        """Record number and first sample of each window."""
+        return list(self._places)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What compiled code depends on: everything but numbers."""
+
+    model: StochasticModel
+    layout: Layout
+    logs: int
+    nuisances: tuple[str, ...]
+    drifting: tuple[str, ...]
+    length: int
+    shared: int
+
+
+def _unpack(plan: _Plan, data: Any, shared: Any) -> tuple[Any, Nuisance]:
+    numbers = shared * data["scale"]
+    k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
+    block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
+    nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
+        **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
+    )
+    return plan.layout.values(data["card"], numbers[:k]), nuisance
+
+
+def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tuple[Any, Any]:
+    """Outputs and states of one window."""
+    model, vehicle = plan.model, plan.model.vehicle
+    parameters, nuisances = _unpack(plan, data, shared)
+    record, first = data["record"][place], data["first"][place]
+    nuisance = jax.tree.map(lambda values: values[record], nuisances)
+    own = initial * data["initial_scale"]
+    states = len(vehicle.state_names)
+    nuisance = nuisance._replace(
+        **{name: getattr(nuisance, name) + own[states + i] for i, name in enumerate(plan.drifting)}
+    )
+    reaching = commands(vehicle, model.dt, data["inputs"][record], nuisance)
+    cut = jax.lax.dynamic_slice_in_dim(reaching, first, plan.length)
+    voltage = jax.lax.dynamic_slice_in_dim(data["voltage"][record], first, plan.length)
+    start = start_state(
+        vehicle,
+        model.output_names,
+        parameters,
+        nuisance,
+        value=data["value"][place],
+        rate=data["rate"][place],
+        inputs=cut[0],
+        voltage=voltage[0],
+    )
+    calm = jnp.zeros(N_DISTURBANCES)
+
+    def sample(x: Any, now: Any) -> tuple[Any, Any]:
+        u, volts = now
+        return model.step(x, calm, u, parameters, volts), x
+
+    _, flown = jax.lax.scan(sample, start + own[:states], (cut, voltage))
+    return jax.vmap(lambda x: model.measure(x, nuisance))(flown), flown
+
+
+@partial(jax.jit, static_argnums=0)
+def _residuals(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
+    places = jnp.arange(initial.shape[0])
+    outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
+    return data["outputs"] - outputs, states
+
+
+@partial(jax.jit, static_argnums=0)
+def _with_tangents(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+    """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
+    shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
+
+    def one(place: Any, x0: Any) -> Any:
+        def outputs(both: Any) -> Any:
+            return _shoot(plan, data, both[: plan.shared], both[plan.shared :], place)[0]
+
+        both = jnp.concatenate([shared, x0])
+        return jax.vmap(lambda t: jax.jvp(outputs, (both,), (t,)), out_axes=(None, 0))(jnp.eye(both.shape[0]))
+
+    values, tangents = jax.vmap(one)(jnp.arange(initial.shape[0]), initial)
+    return data["outputs"] - values, -tangents

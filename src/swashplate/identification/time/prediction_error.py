@@ -1,0 +1,284 @@
+"""Maximum likelihood by prediction errors: the default for flights, which fly in disturbed air under feedback.
+
+The cost is the negative log-likelihood of the innovations of a constant-gain Kalman filter around the nonlinear
+equations, with the process and measurement noise estimated beside the parameters (filter error method: Maine and
+Iliff 1981; Jategaonkar 2015, ch. 5; Ljung 1999, ch. 7). Because every prediction uses only the past, a controller that
+answers to the measured motion does not bias it as it biases output error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, mean_nuisance, stochastic_model
+from swashplate.identification.core import robust
+from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.parameter_row import Entry, Row
+from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.records import Record, logs
+from swashplate.identification.time.innovations import Plan, innovations, tangents, unpack
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.start_states import mean_velocity, slopes
+
+SETTLING = 1.5
+"""Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
+
+_NOISE_SPREAD = {"tau_gust_moment": 0.5, "tau_gust_force": 0.5, "drift_moment": 0.5, "drift_force": 0.5}
+"""Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
+
+_WIND = ("wind", "tau_wind")
+
+_NUISANCE = {
+    # name: start, scale, prior sigma
+    "delay_servo": (0.05, 0.05, 0.05),
+    "delay_motor": (0.05, 0.05, 0.05),
+    "trim_servo_roll": (0.0, 0.02, 0.05),
+    "trim_servo_pitch": (0.0, 0.02, 0.05),
+    "lever_x": (0.0, 0.05, 0.1),
+    "lever_y": (0.0, 0.05, 0.1),
+    "lever_z": (0.0, 0.05, 0.1),
+    "level_psi": (0.0, 0.1, 0.2),
+}
+
+
+_LENGTHS = 256
+"""Records are padded to a multiple of this many samples, so that flights of similar length share compiled code."""
+
+
+def parameter_entries(table: Parameterization) -> list[Entry]:
+    """Row entries of the free parameters with their bounds and priors."""
+    low, high = table.bounds()
+    return [
+        Entry(
+            name=free.name,
+            group="parameter",
+            start=start,
+            scale=free.scale,
+            lower=lower,
+            upper=upper,
+            mean=0.0 if free.mean is None else free.mean,
+            sigma=np.inf if free.sigma is None else free.sigma,
+        )
+        for free, start, lower, upper in zip(table.free, table.starts(), low, high, strict=True)
+    ]
+
+
+def in_wind(pieces: Sequence[Record]) -> Noise:
+    """First guesses of the noise for flights in horizontal wind, with the speed that the records were flown at."""
+    return Noise(wind=0.1, speed=_typical_speed(pieces))
+
+
+def _typical_speed(pieces: Sequence[Record]) -> float:
+    """Root mean square of each horizontal velocity [m/s]; zero where no positions were measured."""
+    if not {"x", "y"} <= set(pieces[0].output_names):
+        return 0.0
+    columns = [pieces[0].output_names.index(name) for name in ("x", "y")]
+    velocities = [slopes(piece, np.arange(0.0, piece.time.size, 10.0))[1][:, columns] for piece in pieces]
+    return float(np.sqrt(np.mean(np.concatenate(velocities) ** 2)))
+
+
+def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
+    """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
+    longest = -(-max(piece.time.size for piece in pieces) // _LENGTHS) * _LENGTHS
+
+    def padded(rows: Array) -> Array:
+        return np.concatenate([rows, np.repeat(rows[-1:], longest - rows.shape[0], axis=0)])
+
+    return {
+        "outputs": np.stack([padded(piece.outputs) for piece in pieces]),
+        "inputs": np.stack([padded(piece.inputs) for piece in pieces]),
+        "voltage": np.stack([padded(piece.voltage) for piece in pieces]),
+        "mask": np.stack([np.arange(longest) < piece.time.size for piece in pieces]),
+    }
+
+
+class PredictionError:
+    """The innovations' likelihood of some records as a function of parameters, nuisances and noise.
+
+    Args:
+        table: free parameters and ties.
+        pieces: the records, all at one rate.
+        noise: first guesses of the noise.
+        estimate_noise: False keeps the noise at `noise`.
+        nuisance: centre of the priors on delays, trims and lever arms (None: the usual ones).
+    """
+
+    def __init__(
+        self,
+        table: Parameterization,
+        pieces: Sequence[Record],
+        *,
+        noise: Noise | None = None,
+        estimate_noise: bool = True,
+        nuisance: Nuisance | None = None,
+    ) -> None:
+        self.table = table
+        self.pieces = tuple(pieces)
+        self.noise = noise or Noise()
+        windy = float(self.noise.wind) > 0.0
+        self.estimate_noise = estimate_noise
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, windy=windy)
+        self.logs, self._log = logs(pieces)
+        entries = parameter_entries(table)
+        for number in range(len(self.logs)):
+            for name, (usual, scale, sigma) in _NUISANCE.items():
+                start = usual if nuisance is None else float(getattr(nuisance, name))
+                low = 0.0 if name.startswith("delay") else -np.inf
+                kinked = name.startswith("delay")
+                entries.append(
+                    Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
+                )
+        noises = _estimated(self.model) if estimate_noise else ()
+        for name in noises:
+            log = float(np.log(getattr(self.noise, name)))
+            entries.append(
+                Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
+            )
+        self.row = Row(tuple(entries), table.prior_correlations)
+        stacked = stack_records(pieces)
+        first = [slopes(piece, np.array([0])) for piece in pieces]
+        self._plan = Plan(self.model, table.layout, len(self.logs), tuple(_NUISANCE), noises)
+        self._data = {
+            **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
+            "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
+            "rate": jnp.asarray(np.stack([rate[0] for _, rate in first])),
+            "velocity": jnp.asarray(np.stack([mean_velocity(table.vehicle, piece) for piece in pieces])),
+            "card": jnp.asarray(table.card_row),
+            "log": jnp.asarray(self._log),
+            "scale": jnp.asarray(self.row.scale),
+            "noise": jnp.asarray([float(value) for value in self.noise]),
+        }
+        late = np.arange(stacked["mask"].shape[1]) >= round(SETTLING / self.model.dt)
+        self.counted = np.asarray(stacked["mask"], dtype=bool) & late
+
+    def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
+        """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
+        return unpack(self._plan, self._data, jnp.asarray(row))
+
+    def innovations(self, row: Array) -> tuple[Any, Any, FilterState]:
+        """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
+        return innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+
+    # ---- likelihood --------------------------------------------------------------------------------------------
+    def cost(self, row: Array) -> float:
+        """Negative log-likelihood of the counted innovations (without its constant)."""
+        found, covariances, _ = self.innovations(row)
+        return self._cost(np.asarray(found), np.asarray(covariances))
+
+    def _cost(self, found: Array, covariances: Array) -> float:
+        total = 0.0
+        for nu, S, counted in zip(found, covariances, self.counted, strict=True):
+            nu = nu[counted]
+            if not (np.isfinite(nu).all() and np.isfinite(S).all()):
+                return np.inf
+            try:
+                L = np.linalg.cholesky(S)
+            except np.linalg.LinAlgError:
+                return np.inf
+            total += robust.huber(np.linalg.solve(L, nu.T)) + nu.shape[0] * float(np.log(np.diag(L)).sum())
+        return total
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
+        gradient, information, values, _ = self._accumulate(row)
+        return self._cost(*values), gradient, information
+
+    def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
+        given = (self._plan, self._data, jnp.asarray(row))
+        *found, states = innovations(*given)
+        values = (np.asarray(found[0]), np.asarray(found[1]))
+        p = len(self.row)
+        gradient, information = np.zeros(p), np.zeros((p, p))
+        by_row = tangents(*given, states)
+        moved = (np.asarray(by_row[0]), np.asarray(by_row[1]))
+        for r, counted in enumerate(self.counted):
+            nu, S = values[0][r][counted], values[1][r]
+            if not np.isfinite(nu).all():
+                return gradient, information, values, moved
+            d_nu, dS = moved[0][:, r][:, counted], moved[1][:, r]
+            Li = np.linalg.inv(np.linalg.cholesky(S))
+            white = nu @ Li.T
+            weight = robust.weights(white)
+            d_white = d_nu @ Li.T
+            dM = Li @ dS @ Li.T
+            flat = d_white.reshape(p, -1)
+            gradient += flat @ (white * weight).ravel()
+            gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
+            # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
+            gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
+            information += (flat * weight.ravel()) @ flat.T
+            information += _by_covariance(dM, nu.shape[0])
+        return gradient, information, values, moved
+
+    def refresh(self, row: Array) -> None:
+        """Nothing is held between iterations: the noise is part of the row."""
+
+    def unturned(self, innovations: Array, piece: Record) -> Array:
+        """Innovations of a record with their horizontal part back in local axes."""
+        names = list(self.model.output_names)
+        if not {"x", "y", "psi"} <= set(names):
+            return innovations
+        turned = innovations.copy()
+        i, j, k = (names.index(name) for name in ("x", "y", "psi"))
+        c, s = np.cos(piece.outputs[:, k]), np.sin(piece.outputs[:, k])
+        turned[:, i] = c * innovations[:, i] - s * innovations[:, j]
+        turned[:, j] = s * innovations[:, i] + c * innovations[:, j]
+        return turned
+
+    # ---- what the accuracy analysis and the report need --------------------------------------------------------
+    def noise_of(self, row: Array) -> Noise:
+        """The noise at a row."""
+        return Noise(*(float(value) for value in self.unpack(row)[2]))
+
+    def nuisance_of(self, row: Array) -> Nuisance:
+        """The records' mean nuisance at a row."""
+        return mean_nuisance(self.unpack(row)[1])
+
+    def comparisons(self, row: Array) -> tuple[Comparison, ...]:
+        """Every record beside its one-step predictions."""
+        found, covariances, states = self.innovations(row)
+        kept = [self.table.vehicle.index(name) for name in PREDICTED]
+        made = []
+        for number, piece in enumerate(self.pieces):
+            n = piece.time.size
+            made.append(
+                Comparison(
+                    record=piece,
+                    counted=self.counted[number][:n],
+                    model=piece.outputs - self.unturned(np.asarray(found)[number][:n], piece),
+                    sigma=np.sqrt(np.diag(np.asarray(covariances)[number])),
+                    states=np.asarray(states.x)[number][:n][:, kept],
+                )
+            )
+        return tuple(made)
+
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
+
+        The last is the information (p, p) that lies in the innovations' covariance instead.
+        """
+        _, _, values, moved = self._accumulate(row)
+        white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
+        for r, counted in enumerate(self.counted):
+            Li = np.linalg.inv(np.linalg.cholesky(values[1][r]))
+            white.append(values[0][r][counted] @ Li.T)
+            sensitivities.append(moved[0][:, r][:, counted] @ Li.T)
+            rest += _by_covariance(Li @ moved[1][:, r] @ Li.T, int(counted.sum()))
+        return white, sensitivities, rest
+
+
+def _by_covariance(dM: Array, n: int) -> Array:
+    """Information of n innovations about entries that change their covariance, dM = L^-1 dS L^-T (p, m, m)."""
+    flat = dM.reshape(len(dM), -1)
+    return np.asarray(0.5 * n * flat @ flat.T)
+
+
+def _estimated(model: StochasticModel) -> tuple[str, ...]:
+    """The noise numbers that are estimated: the speed is given, and the wind's only where there is one."""
+    return tuple(name for name in Noise._fields if name != "speed" and (model.windy or name not in _WIND))

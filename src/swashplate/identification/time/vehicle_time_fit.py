@@ -1,0 +1,172 @@
+"""`fit_vehicle`: parameters of any vehicle's nonlinear equations from records of whatever was measured.
+
+`identify` knows how small helicopters fly, are tracked and are blown about, and is the better choice for them. This one
+asks for nothing but the equations: an aeroplane with its own states, vanes and accelerometers is a `Vehicle` like any
+other.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from swashplate.errors import IdentificationError
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.low_passed import refuse_lowpassed
+from swashplate.identification.core.parameters import Free, parameterize
+from swashplate.identification.core.records import records
+from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.core.sources import sources_of
+from swashplate.identification.core.time_fit import TimeDetails, check_method, result_of, solve
+from swashplate.identification.estimators import Data, Question
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.simulation.dynamics import enable_double_precision
+
+
+def fit_vehicle(
+    vehicle: Vehicle,
+    flights: Flight | Sequence[Flight],
+    *,
+    free: Sequence[str | Free],
+    outputs: Sequence[str],
+    method: str = "filter-error",
+    ties: Sequence[str] = (),
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    environment: Environment | None = None,
+    shifts: bool = False,
+    biases: Sequence[str] = (),
+    iterations: int = 80,
+    progress: Callable[[int, float], None] | None = None,
+) -> Result[Vehicle, TimeDetails]:
+    """Fit parameters of a vehicle's equations to records in time by maximum likelihood.
+
+    Inputs are straight lines between samples; delays must have been taken out.
+
+    Args:
+        vehicle: the equations and the card to start from.
+        flights: conditioned; each unbroken piece is a record with its own start state and constants.
+        free: names of the parameters to move (a `Free` has a scale and a prior).
+        outputs: channels to fit: states, their rates ("qdot") and the specific force ("ax", "ay", "az").
+        method: "filter-error" (gusts: white noise on every state's rate), "prediction-error" (any stationary gust: a
+            free gain, for long records) or "output-error" (no gusts).
+        ties, priors: see `parameterize`.
+        environment: wind, density and gravity (None: the usual ones).
+        shifts: constants in the states' rates, per record.
+        biases: outputs with a constant of their own, per record.
+        iterations: at most this many.
+        progress: called with the iteration and the cost.
+
+    Returns:
+        The fit; `model` is the vehicle with the numbers found.
+
+    Raises:
+        IdentificationError: an unknown method, parameter or output, or a model that diverges at its start values.
+        FlightError: where a flight lacks a channel, is not on a uniform grid, or was low-passed.
+    """
+    began = time.perf_counter()
+    check_method(method)
+    enable_double_precision()
+    enable_compilation_cache()
+    outputs = tuple(outputs)
+    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    refuse_lowpassed(flights)
+    unknown = [name for name in biases if name not in outputs]
+    if unknown:
+        raise IdentificationError(f"is none of the outputs {', '.join(outputs)}.", channel=", ".join(unknown))
+    table = parameterize(vehicle, free, ties=ties, priors=priors)
+    pieces = records(flights, vehicle, outputs=outputs)
+    likelihood = VehicleErrors(
+        table,
+        pieces,
+        method=method,
+        environment=environment or Environment(),
+        shifts=shifts,
+        biases=tuple(biases),
+    )
+    solved = solve(likelihood, iterations=iterations, progress=progress)
+    sources = tuple(piece.name for piece in pieces)
+    values = table.identified([solved.numbers[n] for n in table.names])
+    origin = f"identified by {method} from {', '.join(sources)}"
+
+    def identified(estimates: Mapping[str, Estimate]) -> Vehicle:
+        card = table.vehicle.card
+        for name, value in values.items():
+            sigma = estimates[name].sigma if name in table.names else None
+            card = card.with_values({name: value}, status="identified", sigma=sigma, source=origin)
+        title = f"{card.title}, {origin.replace(f' by {method}', '')}"
+        return table.vehicle.with_card(replace(card, title=title, path=""))
+
+    card = vehicle.card.parameters
+    return result_of(
+        solved,
+        model=identified,
+        start=vehicle,
+        units=[card[name].unit for name in table.names],
+        ties=[Estimate(n, card[n].unit, card[n].value, values[n], tie=tie.text) for n, tie in table.ties],
+        method=method,
+        data=sources_of(flights),
+        settings={
+            "free": list(table.names),
+            "ties": [f"{name} = {tie.text}" for name, tie in table.ties],
+            "outputs": list(outputs),
+            "shifts": shifts,
+            "biases": list(biases),
+            "records": list(sources),
+        },
+        seconds=time.perf_counter() - began,
+    )
+
+
+@dataclass(frozen=True)
+class VehicleEstimator:
+    """`fit_vehicle` by one of its methods, as an estimator."""
+
+    method: str
+    takes: frozenset[str] = frozenset(
+        {"free", "ties", "priors", "outputs", "iterations", "environment", "shifts", "biases", "progress"}
+    )
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        if isinstance(data, FrequencyResponse):
+            return "it fits records in time"
+        return "" if isinstance(model, Vehicle) else "it fits vehicles"
+
+    def estimate(self, model: Vehicle, data: Sequence[Flight], question: Question) -> Result[Vehicle, TimeDetails]:
+        if question.free is None or isinstance(question.free, str):
+            raise IdentificationError(
+                f"'{model.name}' has no ready choice of what may move.",
+                channel="free",
+                hint=f"Name parameters, e.g. free=['{next(iter(model.card.parameters))}'].",
+            )
+        shared = [n for n in measurable(model) if all(n in flight for flight in data)]
+        outputs = shared if question.outputs is None else question.outputs
+        if not outputs:
+            raise IdentificationError(
+                f"the flights have nothing that '{model.name}' foretells: {', '.join(measurable(model))}.",
+                channel="outputs",
+            )
+        return fit_vehicle(
+            model,
+            data,
+            free=question.free,
+            outputs=outputs,
+            method=self.method,
+            ties=question.ties,
+            priors=question.priors,
+            environment=question.environment,
+            shifts=bool(question.shifts),
+            biases=question.biases,
+            iterations=80 if question.iterations is None else question.iterations,
+            progress=question.progress,
+        )
+
+
+FILTER_ERROR, PREDICTION_ERROR, OUTPUT_ERROR = (
+    VehicleEstimator(method) for method in ("filter-error", "prediction-error", "output-error")
+)

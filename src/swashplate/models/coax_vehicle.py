@@ -1,0 +1,156 @@
+"""The CoaX as a vehicle: its equations with a card's numbers, its picture, its hover in closed form, its traits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from swashplate.errors import CardError
+from swashplate.models.card import Card
+from swashplate.models.coax import UNITS, CoaxInputs, CoaxParameters, CoaxState, Drive, derivatives, specific_force
+from swashplate.models.coax_choices import CHOICES
+from swashplate.models.nesting import rebuild
+from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics import rotor, stabilizer_bar
+from swashplate.physics.backend import Backend, FloatBackend, Scalar
+from swashplate.physics.drive_train import steady_speed
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
+from swashplate.physics.rotor import TipPathPlane
+from swashplate.physics.stabilizer_bar import StabilizerBar
+
+_XP = FloatBackend()
+
+
+def picture(vehicle: Vehicle) -> dict[str, Any]:
+    """Two rotors, a bar where there is one, and skids of the rotor's size."""
+    card = vehicle.card.values()
+    radius = card["rotor_radius"]
+    hubs = {"upper": (-1, card["hub_height_upper"]), "lower": (1, card["hub_height_lower"])}
+    rotors = [
+        {"name": name, "hub": [0.0, 0.0, -height], "radius": radius, "blades": 2, "sense": sense, "tilt": 0.0}
+        for name, (sense, height) in hubs.items()
+    ]
+    height = card["hub_height_upper"] + 0.25 * radius
+    bar = {"hub": [0.0, 0.0, -height], "radius": 0.55 * radius} if vehicle.card.options.get("bar", True) else None
+    skids = {"length": 0.45 * radius, "width": 0.35 * radius, "depth": 0.55 * radius}
+    parts = {"rotors": rotors, "bar": bar, "tail": None, "skids": skids, "fin": None}
+    return {"size": radius, "weight": card["mass"] * LABORATORY_GRAVITY, **parts, "ground": True, "rpm": True}
+
+
+def pose(vehicle: Vehicle) -> Pose:
+    """Both discs with their thrusts, and the bar's tilt against the fuselage."""
+    parameters = vehicle.values()
+
+    def coaxial(x: Sequence[float], u: Sequence[float], around: Environment) -> dict[str, Any]:
+        state: CoaxState = rebuild(vehicle.state, [float(value) for value in x])
+        par, density = parameters, float(around.air_density) / parameters.air_density
+        upper, bar = TipPathPlane(0.0, 0.0), None
+        if state.bar is not None:
+            body = state.body.attitude
+            bar = [state.bar.eta - body.phi, state.bar.zeta - body.theta]
+            upper = stabilizer_bar.upper_tip_path_plane(
+                state.bar,
+                body,
+                linkage=par.linkage_upper,
+                lag=stabilizer_bar.phase_lag(par.k_zeta_upper, par.o_zeta_upper, state.drive.omega_upper),
+                mixing=vehicle.card.options.get("mixing", "rotation"),
+                xp=_XP,
+            )
+        rotors = []
+        for plane, k, omega in (
+            (upper, par.k_thrust_upper, state.drive.omega_upper),
+            (state.lower, par.k_thrust_lower, state.drive.omega_lower),
+        ):
+            force = rotor.thrust_direction(plane, _XP).scaled(rotor.thrust(k, omega, density))
+            rotors.append([plane.alpha, plane.beta, omega, *force])
+        return {"rotors": rotors, "bar": bar, "tail": None}
+
+    return coaxial
+
+
+def hover(parameters: Any, voltage: Scalar, xp: Backend) -> tuple[dict[str, Scalar], tuple[Scalar, ...]]:
+    """Hover in closed form: both torques balance and both thrusts carry the weight.
+
+    Returns:
+        The states that are not zero, by name, and the inputs.
+    """
+    p = parameters
+    ratio = p.k_torque_lower / p.k_torque_upper
+    omega_lower = xp.sqrt(p.mass * LABORATORY_GRAVITY / (p.k_thrust_lower + p.k_thrust_upper * ratio))
+    omega_upper = omega_lower * xp.sqrt(ratio)
+    sag = p.k_drive_voltage * (voltage - p.voltage_nominal)
+    motors = (
+        (omega_lower - p.o_drive_lower - sag) / p.k_drive_lower,
+        (omega_upper - p.o_drive_upper - sag) / p.k_drive_upper,
+    )
+    return {"omega_lower": omega_lower, "omega_upper": omega_upper}, (*motors, 0.0, 0.0)
+
+
+def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any) -> dict[str, Scalar]:
+    """Inner states in a slow flight: steady rotor speeds, the bar aligned with the fuselage."""
+    speeds = {
+        f"omega_{side}": steady_speed(
+            getattr(inputs, f"motor_{side}"),
+            voltage,
+            k=getattr(parameters, f"k_drive_{side}"),
+            o=getattr(parameters, f"o_drive_{side}"),
+            k_voltage=parameters.k_drive_voltage,
+            nominal=parameters.voltage_nominal,
+        )
+        for side in ("lower", "upper")
+    }
+    return {**speeds, "eta_bar": attitude.phi, "zeta_bar": attitude.theta}
+
+
+_AXES = (
+    Axis("roll", {"servo_roll": 1.0}),
+    Axis("pitch", {"servo_pitch": 1.0}),
+    Axis("yaw", {"motor_upper": 1.0, "motor_lower": -1.0}, ("damping_r", "inertia_zz")),
+    Axis("heave", {"motor_upper": 0.5, "motor_lower": 0.5}, ("damping_w",)),
+)
+TRAITS = Traits(
+    axes=_AXES,
+    coaxial=True,
+    observed=True,
+    published="coax",
+    servos="coax",
+    choices=lambda card: CHOICES,
+    recording=RecordingFit(),
+    switches=("bar",),
+    picture=picture,
+    pose=pose,
+    hover=hover,
+    settled=settled,
+)
+
+
+def coax(card: Card) -> Vehicle:
+    """The CoaX with a card's numbers and options (`bar`, `mixing`)."""
+    options = {"bar": True, "mixing": "rotation", **card.options}
+    unknown = sorted(options.keys() - {"bar", "mixing"})
+    if unknown or options["mixing"] not in ("rotation", "as_printed") or not isinstance(options["bar"], bool):
+        raise CardError(
+            f"options are {dict(card.options)}, expected bar = true or false and mixing = 'rotation' or 'as_printed'.",
+            where=card.where,
+            channel="options",
+        )
+    card.checked_against(UNITS)
+    bar = StabilizerBar(0.0, 0.0) if options["bar"] else None
+    bar_names = ("eta_bar", "zeta_bar") if options["bar"] else ()
+    return Vehicle(
+        card=card,
+        state=CoaxState(RigidBody(*(0.0,) * 12), TipPathPlane(0.0, 0.0), bar, Drive(0.0, 0.0)),
+        inputs=CoaxInputs,
+        parameters=CoaxParameters,
+        state_names=(*RigidBody._fields, "alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper"),
+        state_units=(*BODY_UNITS, *("rad",) * (2 + len(bar_names)), "rad/s", "rad/s"),
+        input_names=CoaxInputs._fields,
+        input_units=("1",) * 4,
+        input_limits=((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)),
+        derivatives=partial(derivatives, mixing=options["mixing"]),
+        specific_force=partial(specific_force, mixing=options["mixing"]),
+        traits=TRAITS,
+    )

@@ -1,0 +1,113 @@
+"""The switches of the single-rotor helicopter's equations."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from swashplate.errors import CardError
+from swashplate.models.card import Card
+
+
+class HelicopterOptions(NamedTuple):
+    """What a card's `[options]` may say.
+
+    Attributes:
+        rotation: "ccw" or "cw", the main rotor's sense seen from above.
+        inflow: "glauert" (momentum theory and Glauert's gradient), "uniform" (no gradient), "pitt-peters-static", or
+            "pitt-peters" (three inflow states).
+        coning: blades cone by themselves; False holds them at the precone (teetering hubs).
+        bar: Bell-Hiller stabilizer bar.
+        rotor_speed: "fixed", "governed" (a state under the governor) or "throttle" (the same with a fifth input).
+        gyro: yaw gyro.
+        servos: servo lags, speed limits and stops.
+        delay: commands come late by the card's pure delay.
+        engine_lag: the engine's power follows the governor with a lag; it needs a rotor speed that is not fixed.
+        ground: skids touch ground at z = 0.
+        grip: skids stick to the ground until friction gives way (eight states); it needs ground.
+        phase_lag: use the card's aerodynamic phase lag.
+        in_plane: "blade-element", or "thrust-tilt" for thrust perpendicular to the tip-path plane.
+        yaw_at_blades: the blades meet the air at the rotor's speed less the yaw rate, as they do on any shaft whose
+            speed is kept against the fuselage; most published tables and the packaged cards leave it out.
+        yaw_at_hub: the hub feels the yaw rate, which rolls a shaft that leans forward and carries a hub ahead of the CG
+            sideways; Padfield (2007) and what follows him leave both out.
+        precession_torque: the shaft carries the torque with which a tilted rotor answers pitch and roll rates
+            (`flapping.precession_torque`); the packaged cards, whose tables leave it out, do too.
+    """
+
+    rotation: str = "ccw"
+    inflow: str = "glauert"
+    coning: bool = False
+    bar: bool = False
+    rotor_speed: str = "fixed"
+    gyro: bool = False
+    servos: bool = False
+    delay: bool = False
+    engine_lag: bool = False
+    ground: bool = False
+    grip: bool = False
+    phase_lag: bool = False
+    in_plane: str = "blade-element"
+    yaw_at_blades: bool = False
+    yaw_at_hub: bool = True
+    precession_torque: bool = False
+
+    @property
+    def sense(self) -> float:
+        """+1 for a counter-clockwise rotor, -1 for a clockwise one (Gamma)."""
+        return 1.0 if self.rotation == "ccw" else -1.0
+
+    @property
+    def throttle(self) -> bool:
+        return self.rotor_speed == "throttle"
+
+
+_CHOICES: dict[str, tuple[Any, ...]] = {
+    "rotation": ("ccw", "cw"),
+    "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
+    "rotor_speed": ("fixed", "governed", "throttle"),
+    "in_plane": ("blade-element", "thrust-tilt"),
+    **dict.fromkeys(
+        (
+            "coning",
+            "bar",
+            "gyro",
+            "servos",
+            "delay",
+            "engine_lag",
+            "ground",
+            "grip",
+            "phase_lag",
+            "yaw_at_blades",
+            "yaw_at_hub",
+            "precession_torque",
+        ),
+        (True, False),
+    ),
+}
+
+
+def helicopter_options(card: Card) -> HelicopterOptions:
+    """A card's options.
+
+    Raises:
+        CardError: naming the option that is not known or has no such value.
+    """
+    where = card.where
+    for name, value in card.options.items():
+        if name not in _CHOICES:
+            known = ", ".join(_CHOICES)
+            raise CardError("is not an option.", where=where, channel=name, hint=f"Options are {known}.")
+        if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
+            expected = ", ".join(map(repr, _CHOICES[name]))
+            raise CardError(f"is {value!r}, expected one of {expected}.", where=where, channel=name)
+    chosen = HelicopterOptions(**dict(card.options))
+    if chosen.engine_lag and chosen.rotor_speed == "fixed":
+        raise CardError(
+            "needs a rotor speed that the engine can change.",
+            where=where,
+            channel="engine_lag",
+            hint='Add rotor_speed = "governed", or "throttle".',
+        )
+    if chosen.grip and not chosen.ground:
+        raise CardError("needs ground to hold.", where=where, channel="grip", hint="Add ground = true.")
+    return chosen

@@ -1,0 +1,162 @@
+"""The main rotor of a single-rotor helicopter in body axes: from what the hub does to its loads on the fuselage."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from swashplate.models.conventional.helicopter_options import HelicopterOptions
+from swashplate.physics import blade_element, flapping, inflow
+from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.flapping import Flapping
+from swashplate.physics.frames import Vector
+from swashplate.physics.inflow import Inflow
+
+_PI = 3.141592653589793
+
+
+class Contribution(NamedTuple):
+    """Force [N] and moment about the CG [N m] of one part, body axes."""
+
+    force: Vector
+    moment: Vector
+
+
+class MainRotor(NamedTuple):
+    """The main rotor's loads on the fuselage, torque [N m], and the rates of disc [rad/s] and inflow [1/s]."""
+
+    acting: Contribution
+    torque: Scalar
+    disc: Flapping
+    inflow: Inflow | None
+    induced: Scalar
+
+
+def main_rotor(
+    air: Vector,
+    rates: Vector,
+    disc: Flapping,
+    induced: Inflow | None,
+    blades: tuple[Scalar, Scalar, Scalar],
+    omega: Scalar,
+    par: Any,
+    density: Scalar,
+    xp: Backend,
+    options: HelicopterOptions,
+) -> MainRotor:
+    """The main rotor in body axes (blade elements, momentum theory, first-order tip-path plane).
+
+    Args:
+        air: velocity of the CG through the air, body axes [m/s].
+        rates: body rates [rad/s].
+        disc: tip-path plane.
+        induced: dynamic inflow states, or None for momentum theory at every instant.
+        blades: theta0, A1, B1 at the blades [rad].
+        omega: rotor speed against the fuselage [rad/s].
+        par, density: the card's numbers, the air.
+    """
+    sense = options.sense
+    hub = Vector(par.hub_x, par.hub_y, -par.hub_height)
+    ct, st = xp.cos(par.shaft_tilt), xp.sin(par.shaft_tilt)
+    if options.yaw_at_blades:
+        omega = omega - sense * (rates.z * ct - rates.x * st)
+    felt = rates if options.yaw_at_hub else Vector(rates.x, rates.y, 0.0)
+    at_hub = air + felt.cross(hub)
+    tip = omega * par.rotor_radius
+    mu_x = (at_hub.x * ct + at_hub.z * st) / tip
+    mu_y = sense * at_hub.y / tip
+    mu_z = (at_hub.z * ct - at_hub.x * st) / tip
+    p, q = sense * (felt.x * ct + felt.z * st), felt.y
+    theta0, A1, B1 = blades
+    cp, sp = xp.cos(par.cyclic_phase), xp.sin(par.cyclic_phase)
+    A1, B1 = sense * A1 * cp - B1 * sp, B1 * cp + sense * A1 * sp
+    solidity = par.rotor_blades * par.rotor_chord / (_PI * par.rotor_radius)
+    slope = par.rotor_lift_slope
+    mu2 = mu_x * mu_x + mu_y * mu_y
+    own = Flapping(disc.a1, sense * disc.b1)
+    seen = blade_element.Disc(
+        mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, own.a1, own.b1
+    )
+
+    # Inflow: mean, gradient, and what a static gradient takes from the flap moments.
+    deficiency = None
+    if induced is None:
+        free = blade_element.thrust_coefficient(seen, solidity, slope)
+        lam0 = inflow.momentum_inflow(free, 0.25 * slope * solidity, mu_z, mu2, xp)
+        flow = Inflow(lam0, 0.0, 0.0)
+    else:
+        flow = Inflow(induced.lam0, induced.lam_c, sense * induced.lam_s)
+    skew = inflow.wake_skew(flow.lam0, mu_x, mu_y, mu_z, xp)
+    through, through2, _ = inflow.mass_flow(flow.lam0, mu_z, mu2, xp)
+    gradient_through = inflow.gradient_flow(flow.lam0, mu_z, mu2, through)
+    if options.inflow == "glauert":
+        flow = inflow.glauert_gradient(flow.lam0, skew)
+    elif options.inflow == "pitt-peters-static":
+        flow, deficiency = inflow.pitt_peters_static(
+            flow.lam0, 2.0 * flow.lam0 * through, skew, gradient_through, solidity, slope
+        )
+    seen = seen._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
+
+    # Flapping: coning, then the tip-path plane's rates in space.
+    held = flapping.hinge(
+        blade_inertia=par.blade_inertia,
+        blades=par.rotor_blades,
+        hub_stiffness=par.hub_stiffness,
+        hinge_offset=par.hinge_offset,
+        omega=omega,
+        density=density,
+        lift_slope=slope,
+        chord=par.rotor_chord,
+        radius=par.rotor_radius,
+    )
+    if options.coning:
+        cone = flapping.coning(blade_element.flap_moments(seen).mean, held, par.precone, free=1.0)
+    else:
+        cone = par.precone
+    seen = seen._replace(a0=cone)
+    still = blade_element.flap_moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1))
+    bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
+    # Dynamic inflow has the wake's lag in its states.
+    kept = 0.0 if options.inflow == "pitt-peters" else bending * flapping.wake_follows(held.excess, through2, xp)
+    lag = (xp.cos(par.phase_lag), xp.sin(par.phase_lag)) if options.phase_lag else None
+    plane_p, plane_q = flapping.plane_rates(
+        own, still, held, (p / omega, q / omega), wake_distortion=kept, phase_lag=lag, deficiency=deficiency
+    )
+    disc_rates = Flapping(omega * plane_q - q, sense * (omega * plane_p - p))
+
+    # Loads with everything that the blades now see.
+    lam_c, lam_s = flow.lam_c + kept * plane_q, flow.lam_s + kept * plane_p
+    if deficiency is not None:
+        cc, cs, ss = deficiency
+        turned = held.damping - kept
+        c = 4.0 * still.cos + turned * plane_q + (1.0 - held.damping) * q / omega
+        s = 4.0 * still.sin + turned * plane_p + (1.0 - held.damping) * p / omega
+        lam_c, lam_s = lam_c + c - (cc * c + cs * s), lam_s + s - (cs * c + ss * s)
+    moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
+    inflow_rates = None
+    CT = blade_element.thrust_coefficient(moving, solidity, slope)
+    if induced is not None:
+        loading = blade_element.FlapMoments(still.mean, still.cos + 0.25 * plane_q, still.sin + 0.25 * plane_p)
+        change = inflow.pitt_peters_rates(
+            flow,
+            CT,
+            loading,
+            (plane_p, plane_q),
+            skew,
+            (through, gradient_through),
+            wake_distortion=bending,
+            solidity=solidity,
+            lift_slope=slope,
+        )
+        inflow_rates = Inflow(omega * change.lam0, omega * change.lam_c, sense * omega * change.lam_s)
+    form = blade_element.thrust_tilt_loads if options.in_plane == "thrust-tilt" else blade_element.disc_loads
+    coefficients = form(moving, solidity, slope, par.rotor_drag + par.rotor_drag_thrust * CT * CT)
+    pressure = density * _PI * par.rotor_radius * par.rotor_radius * tip * tip
+    thrust, ahead = pressure * coefficients.CT, pressure * coefficients.CX
+    torque = pressure * par.rotor_radius * coefficients.CQ
+    if options.precession_torque:
+        polar = par.rotor_blades * par.blade_inertia
+        torque = torque - flapping.precession_torque(own, p, q, inertia=polar, omega=omega)
+    force = Vector(ahead * ct + thrust * st, sense * pressure * coefficients.CY, ahead * st - thrust * ct)
+    roll, yaw = held.moment * disc.b1, sense * torque
+    moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * disc.a1, roll * st + yaw * ct)
+    return MainRotor(Contribution(force, moment), torque, disc_rates, inflow_rates, flow.lam0 * tip)

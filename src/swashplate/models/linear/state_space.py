@@ -1,0 +1,320 @@
+"""`StateSpaceModel`: named states, inputs and outputs, and matrices whose entries are expressions of named parameters.
+
+    M dx/dt = F x + G u(t - tau),    y = H0 x + H1 dx/dt + D u(t - tau)
+
+(Tischler and Remple 2012, eq. 13.1). The response and its derivatives are exact: with T = (j omega M - F)^-1 an entry
+f of F changes H = C T G by C T (dF/df) T G, one outer product each; entries change with parameters by complex steps,
+which are exact to rounding for a grammar of arithmetic (Squire and Trapp 1998).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import CardError
+from swashplate.models.linear.expressions import Expression
+
+MATRICES = ("M", "F", "G", "H0", "H1", "D")
+_STEP = 1e-30
+
+
+@dataclass(frozen=True)
+class ModelParameter:
+    """One number of a model.
+
+    Attributes:
+        name, unit: what it is.
+        value: start or estimate.
+        free: whether a fit may move it.
+        lower, upper: bounds.
+        tie: what it is tied to, None where it stands for itself.
+        dropped: value that it takes when a reduction drops it.
+        note: anything a reader must know.
+        cramer_rao, insensitivity: of an identified value, in its unit (NaN before a fit).
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    free: bool = True
+    lower: float = -np.inf
+    upper: float = np.inf
+    tie: Expression | None = None
+    dropped: float = 0.0
+    note: str = ""
+    cramer_rao: float = float("nan")
+    insensitivity: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Element:
+    """One entry of a matrix: an expression at a place."""
+
+    matrix: str
+    row: int
+    column: int
+    expression: Expression
+
+
+@dataclass(frozen=True)
+class StateSpaceModel:
+    """A linear model with numbers.
+
+    Attributes:
+        name, title, trust: what it is and where it holds.
+        states, inputs, outputs: names; units by name in `units`.
+        parameters: by name, in the file's order.
+        elements: entries of the matrices (M is the identity where nothing is said).
+        delays: expressions [s] by input, or by "output/input" for one response.
+        units: by state, input and output.
+        document: the file's own structure, from which the model is written again.
+    """
+
+    name: str
+    title: str
+    trust: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: Mapping[str, ModelParameter]
+    elements: tuple[Element, ...]
+    delays: Mapping[str, Expression] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    document: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    # ---- numbers -----------------------------------------------------------------------------------------------
+    @cached_property
+    def tie_order(self) -> tuple[str, ...]:
+        """Tied parameters, each after those that it uses.
+
+        Raises:
+            CardError: where ties run in a circle.
+        """
+        waiting = {name for name, p in self.parameters.items() if p.tie is not None}
+        order: list[str] = []
+        while waiting:
+            ready = sorted(n for n in waiting if not (self._tie(n).names & waiting))
+            if not ready:
+                raise CardError("ties run in a circle.", where=self.name, channel=", ".join(sorted(waiting)))
+            order += ready
+            waiting -= set(ready)
+        return tuple(order)
+
+    def _tie(self, name: str) -> Expression:
+        tie = self.parameters[name].tie
+        assert tie is not None
+        return tie
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """Names that a fit moves, in the file's order."""
+        return tuple(name for name, p in self.parameters.items() if p.free and p.tie is None)
+
+    def numbers(self, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Every parameter's value, ties followed (also for complex numbers)."""
+        values: dict[str, Any] = {name: p.value for name, p in self.parameters.items()}
+        values |= dict(changes or {})
+        for name in self.tie_order:
+            values[name] = self._tie(name)(values)
+        return values
+
+    def with_values(self, values: Mapping[str, float], **changes: Any) -> StateSpaceModel:
+        """A copy with other numbers; ties follow. `changes` go to each changed parameter (e.g. `free=False`).
+
+        Raises:
+            CardError: a name that the model does not have.
+        """
+        unknown = sorted(set(values) - set(self.parameters))
+        if unknown:
+            raise CardError(
+                f"is no parameter of '{self.name}'; it has {', '.join(self.parameters)}.", channel=", ".join(unknown)
+            )
+        changed = {n: replace(self.parameters[n], value=float(v), **changes) for n, v in values.items()}
+        made = replace(self, parameters={**self.parameters, **changed})
+        tied = {n: float(v) for n, v in made.numbers().items() if made.parameters[n].tie is not None}
+        return replace(
+            made, parameters={**made.parameters, **{n: replace(made.parameters[n], value=v) for n, v in tied.items()}}
+        )
+
+    @property
+    def trim(self) -> dict[str, str]:
+        """The held parameters that say where the model stands: by trimmed state, those of the file's [trim]."""
+        named = {state: str(text) for state, text in self.document.get("trim", {}).items()}
+        return {s: n for s, n in named.items() if n in self.parameters and n not in self.free and not self._tied(n)}
+
+    def _tied(self, name: str) -> bool:
+        return self.parameters[name].tie is not None
+
+    def check_bounds(self, names: Iterable[str]) -> None:
+        """That parameters lie within their own bounds.
+
+        Raises:
+            CardError: naming the parameter, its value and its bounds.
+        """
+        for name in names:
+            p = self.parameters[name]
+            if not p.lower <= p.value <= p.upper:
+                raise CardError(
+                    f"is given as {p.value:g}, expected {p.lower:g} to {p.upper:g}{f' {p.unit}' if p.unit else ''}.",
+                    where=self.name,
+                    channel=name,
+                    hint="Give a value within the bounds of the model file, or change them there.",
+                )
+
+    def matrices(self) -> dict[str, Array]:
+        """M, F, G, H0, H1 and D as numbers."""
+        values = self.numbers()
+        shapes = self._shapes
+        found = {name: np.eye(*shapes[name]) if name == "M" else np.zeros(shapes[name]) for name in MATRICES}
+        for e in self.elements:
+            found[e.matrix][e.row, e.column] = float(e.expression(values))
+        return found
+
+    @property
+    def _shapes(self) -> dict[str, tuple[int, int]]:
+        n, m, k = len(self.states), len(self.inputs), len(self.outputs)
+        return {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
+
+    def explicit(self) -> tuple[Array, Array, Array, Array]:
+        """A, B, C, D of dx/dt = A x + B u, y = C x + D u (delays apart).
+
+        Raises:
+            CardError: where the left side M cannot be solved for the states' derivatives.
+        """
+        m = self.matrices()
+        if self.states and np.linalg.cond(m["M"]) > 1e12:
+            raise CardError(
+                "the left side is singular: some state's derivative stands in no equation.", where=self.name
+            )
+        a, b = np.linalg.solve(m["M"], m["F"]), np.linalg.solve(m["M"], m["G"])
+        return np.asarray(a), np.asarray(b), m["H0"] + m["H1"] @ a, m["D"] + m["H1"] @ b
+
+    def delay(self, output: str, input: str) -> float:
+        """Delay of one response [s]."""
+        expression = self.delays.get(f"{output}/{input}", self.delays.get(input))
+        return 0.0 if expression is None else float(expression(self.numbers()))
+
+    def eigenvalues(self) -> Complex:
+        """Of dx/dt = A x [1/s], fastest first."""
+        values = np.linalg.eigvals(self.explicit()[0]).astype(np.complex128)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    def response(self, omega: Array) -> Complex:
+        """H(j omega) with its delays, shape (n_f, n_outputs, n_inputs)."""
+        m, s = self.matrices(), 1j * np.asarray(omega)[:, None, None]
+        x = np.linalg.solve(s * m["M"] - m["F"], np.broadcast_to(m["G"] + 0j, (len(omega), *m["G"].shape)))
+        h = (m["H0"] + s * m["H1"]) @ x + m["D"]
+        lag = np.array([[self.delay(o, i) for i in self.inputs] for o in self.outputs])
+        return np.asarray(h * np.exp(-s * lag), dtype=np.complex128)
+
+    def to_control(self) -> Any:
+        """As `control.StateSpace` with named signals, without the delays."""
+        import control
+
+        return control.ss(
+            *self.explicit(), states=list(self.states), inputs=list(self.inputs), outputs=list(self.outputs)
+        )
+
+    # ---- sensitivities -----------------------------------------------------------------------------------------
+    @cached_property
+    def _uses(self) -> dict[str, frozenset[str]]:
+        """The free parameters behind every parameter."""
+        found: dict[str, frozenset[str]] = {n: frozenset([n]) for n in self.parameters if n not in self.tie_order}
+        for name in self.tie_order:
+            found[name] = frozenset().union(*(found[used] for used in self._tie(name).names))
+        return found
+
+    def sensitivities(
+        self, free: tuple[str, ...], numbers: Array, pairs: list[tuple[int, int, Array]]
+    ) -> tuple[list[Complex], list[Complex]]:
+        """Responses of some pairs at their own frequencies, and their derivatives.
+
+        Args:
+            free: parameters that move, in the order of `numbers`.
+            numbers: their values.
+            pairs: (output index, input index, omega [rad/s]) each.
+
+        Returns:
+            Per pair the response (n,) and the slopes (n, len(free)).
+        """
+        changes = dict(zip(free, map(float, numbers), strict=True))
+        values = self.numbers(changes)
+        m = {name: np.eye(*s) if name == "M" else np.zeros(s) for name, s in self._shapes.items()}
+        for e in self.elements:
+            m[e.matrix][e.row, e.column] = e.expression(values)
+        stepped = {name: self.numbers({**changes, name: changes[name] + 1j * _STEP}) for name in free}
+        grid, where = np.unique(np.concatenate([omega for _, _, omega in pairs]), return_inverse=True)
+        s = 1j * grid[:, None, None]
+        try:
+            t = np.linalg.inv(s * m["M"] - m["F"])
+        except np.linalg.LinAlgError:
+            t = np.full((grid.size, *m["F"].shape), np.nan + 0j)
+        c = m["H0"] + s * m["H1"]
+        x, left = t @ m["G"], c @ t
+        h = c @ x + m["D"]
+        slopes_of = self._element_slopes(free, stepped)
+        answers, slopes, done = [], [], 0
+        for o, i, omega in pairs:
+            at = where[done : done + omega.size]
+            done += omega.size
+            xi, lo, hi = x[at, :, i], left[at, o, :], h[at, o, i]
+            jw: Complex = np.asarray(1j * omega, dtype=np.complex128)
+            moved = [(change, slope) for e, slope in slopes_of if (change := _change(e, o, i, xi, lo, jw)) is not None]
+            total = np.zeros((omega.size, len(free)), dtype=np.complex128)
+            if moved:
+                total += np.column_stack([change for change, _ in moved]) @ np.array([slope for _, slope in moved])
+            expression = self.delays.get(f"{self.outputs[o]}/{self.inputs[i]}", self.delays.get(self.inputs[i]))
+            if expression is not None:
+                lag = np.exp(-jw * float(expression(values)))
+                hi, total = hi * lag, total * lag[:, None]
+                for k, name in enumerate(free):
+                    total[:, k] -= jw * hi * (np.imag(expression(stepped[name])) / _STEP)
+            answers.append(hi)
+            slopes.append(total)
+        return answers, slopes
+
+    def _element_slopes(
+        self, free: tuple[str, ...], stepped: Mapping[str, Mapping[str, Any]]
+    ) -> list[tuple[Element, Array]]:
+        """The entries that move, each with its derivative by every free parameter."""
+        found = []
+        for e in self.elements:
+            behind = frozenset().union(*(self._uses[used] for used in e.expression.names))
+            if behind & set(free):
+                row = [np.imag(e.expression(stepped[n])) / _STEP if n in behind else 0.0 for n in free]
+                found.append((e, np.array(row)))
+        return found
+
+    def __repr__(self) -> str:
+        head = f"{self.name}: {len(self.states)} states, inputs {', '.join(self.inputs)}"
+        lines = [head, f"  {'parameter':<14}{'value':>12}{'CR %':>8}{'I %':>8}  unit"]
+        for p in self.parameters.values():
+            size = abs(p.value) or 1.0
+            known = np.isfinite(p.cramer_rao)
+            cells = f"{100 * p.cramer_rao / size:>8.1f}{100 * p.insensitivity / size:>8.1f}" if known else " " * 16
+            tie = f"  = {p.tie.text}" if p.tie is not None else "" if p.free else "  fixed"
+            lines.append(f"  {p.name:<14}{p.value:>12.5g}{cells}  {p.unit}{tie}")
+        return "\n".join(lines)
+
+
+def _change(e: Element, o: int, i: int, x: Complex, left: Complex, jw: Complex) -> Complex | None:
+    """What one entry's unit change does to one response, None where nothing."""
+    if e.matrix == "F":
+        return left[:, e.row] * x[:, e.column]
+    if e.matrix == "M":
+        return -jw * left[:, e.row] * x[:, e.column]
+    if e.matrix == "G":
+        return left[:, e.row] if e.column == i else None
+    if e.row != o:
+        return None
+    if e.matrix == "H0":
+        return x[:, e.column]
+    if e.matrix == "H1":
+        return jw * x[:, e.column]
+    return np.ones_like(jw) if e.column == i else None

@@ -1,0 +1,204 @@
+"""`TransferFunction`: gain, zeros, poles and a delay, with names; what its form may be and how it answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import IdentificationError
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a transfer function is made of: K (zeros) e^(-tau s) / (s^integrators (poles)).
+
+    A first-order factor is (s + a), a second-order one (s^2 + 2 zeta omega s + omega^2), where zeta above one is a pair
+    of real roots.
+
+    Attributes:
+        zeros, poles: polynomial orders.
+        integrators: poles at the origin (negative: zeros there).
+        delay: whether it has one.
+    """
+
+    zeros: int
+    poles: int
+    integrators: int = 0
+    delay: bool = True
+
+    def __post_init__(self) -> None:
+        if self.zeros > self.poles + self.integrators and not (self.zeros == 0 and self.poles == 0):
+            raise IdentificationError(
+                f"a form with {self.zeros} zeros over {self.poles + self.integrators} poles is no model of a flight."
+            )
+
+    @property
+    def zero_names(self) -> tuple[str, ...]:
+        return _factor_names("zero", self.zeros)
+
+    @property
+    def pole_names(self) -> tuple[str, ...]:
+        return _factor_names("pole", self.poles)
+
+    @property
+    def own_names(self) -> tuple[str, ...]:
+        """What belongs to one response: gain, zeros and delay (poles may be shared)."""
+        return ("K", *self.zero_names, *(("tau",) if self.delay else ()))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.own_names, *self.pole_names)
+
+    @property
+    def text(self) -> str:
+        origin = (
+            f"+{self.integrators}s" if self.integrators > 0 else f"-{-self.integrators}s" if self.integrators else ""
+        )
+        return f"{self.zeros}/{self.poles}{origin}{'' if self.delay else ' no delay'}"
+
+    @staticmethod
+    def parse(text: str) -> Form:
+        """`"1/2"` (orders of zeros and poles), `"0/1+1s"` (one integrator), `"0/0"` (gain and delay), `"... no delay"`.
+
+        Raises:
+            IdentificationError: with examples.
+        """
+        found = re.fullmatch(r"(\d)/(\d)(?:([+-])(\d)s)?( no delay)?", text.strip())
+        if found is None:
+            raise IdentificationError(
+                f"'{text}' is no form of a transfer function.",
+                hint='Examples: "1/2" (one zero, two poles, delay), "0/1+1s" (with an integrator), "0/2 no delay".',
+            )
+        origin = int(found[4] or 0) * (-1 if found[3] == "-" else 1)
+        return Form(int(found[1]), int(found[2]), origin, not found[5])
+
+
+USUAL = (
+    Form(0, 0),
+    Form(0, 0, 1),
+    Form(0, 1),
+    Form(0, 1, 1),
+    Form(1, 1),
+    Form(0, 2),
+    Form(1, 2),
+    Form(0, 2, 1),
+    Form(2, 2),
+    Form(1, 2, 1),
+    Form(1, 3),
+    Form(2, 3),
+    Form(2, 4),
+)
+"""Structures worth trying on a flying thing, simplest first; "0/0" is the pure gain and delay of Bhandari et al."""
+
+
+def _factor_names(role: str, order: int) -> tuple[str, ...]:
+    names: list[str] = []
+    for k in range(order // 2):
+        number = k + 1 if order > 3 else ""
+        names += [f"zeta_{role}{number}", f"omega_{role}{number}"]
+    return (*names, f"{role}") if order % 2 else tuple(names)
+
+
+def _factors(names: Sequence[str], values: Mapping[str, Any], s: Complex) -> tuple[Complex, dict[str, Complex]]:
+    """The product of a polynomial's factors at s, and the derivative of its logarithm by each parameter."""
+    product, slopes = np.ones_like(s), {}
+    for name in names:
+        if name.startswith("zeta_"):
+            zeta, omega = values[name], values["omega_" + name[5:]]
+            factor = s**2 + 2.0 * zeta * omega * s + omega**2
+            slopes[name] = 2.0 * omega * s / factor
+            slopes["omega_" + name[5:]] = (2.0 * zeta * s + 2.0 * omega) / factor
+        elif not name.startswith("omega_"):
+            factor = s + values[name]
+            slopes[name] = 1.0 / factor
+        else:
+            continue
+        product = product * factor
+    return product, slopes
+
+
+@dataclass(frozen=True)
+class TransferFunction:
+    """A form with numbers.
+
+    Attributes:
+        form: what it is made of.
+        values: by name: K, tau [s], zero and pole [1/s], zeta_... [1], omega_... [rad/s].
+        output, input: channels that it joins.
+    """
+
+    form: Form
+    values: Mapping[str, float]
+    output: str = "y"
+    input: str = "u"
+
+    def response(self, omega: Array) -> Complex:
+        """H(j omega), shape (n,)."""
+        return self.with_slopes(omega)[0]
+
+    def with_slopes(self, omega: Array) -> tuple[Complex, dict[str, Complex]]:
+        """H(j omega) and the derivatives of its logarithm by each parameter."""
+        s: Complex = np.asarray(1j * np.asarray(omega), dtype=np.complex128)
+        top, slopes = _factors(self.form.zero_names, self.values, s)
+        bottom, down = _factors(self.form.pole_names, self.values, s)
+        tau = self.values.get("tau", 0.0)
+        h = self.values["K"] * top * np.exp(-tau * s) / (bottom * s**self.form.integrators)
+        slopes |= {name: -slope for name, slope in down.items()}
+        slopes["K"] = np.full(s.shape, 1.0 / self.values["K"], dtype=np.complex128)
+        slopes["tau"] = -s
+        return np.asarray(h, dtype=np.complex128), slopes
+
+    @property
+    def poles(self) -> Complex:
+        """Roots of the denominator [1/s]."""
+        return np.concatenate([_roots(self.form.pole_names, self.values), np.zeros(max(self.form.integrators, 0))])
+
+    @property
+    def zeros(self) -> Complex:
+        """Roots of the numerator [1/s]."""
+        return np.concatenate([_roots(self.form.zero_names, self.values), np.zeros(max(-self.form.integrators, 0))])
+
+    @property
+    def coefficients(self) -> tuple[Array, Array]:
+        """Numerator and denominator in falling powers of s, without the delay."""
+        top = self.values["K"] * np.real(np.atleast_1d(np.poly(self.zeros)))
+        return np.asarray(top), np.real(np.atleast_1d(np.poly(self.poles)))
+
+    def to_control(self) -> Any:
+        """As `control.TransferFunction`, without the delay (python-control has none: see `values["tau"]`)."""
+        import control
+
+        return control.tf(*(list(row) for row in self.coefficients))
+
+    def __repr__(self) -> str:
+        def side(names: Sequence[str]) -> str:
+            parts = []
+            for name in names:
+                if name.startswith("zeta_"):
+                    zeta, omega = self.values[name], self.values["omega_" + name[5:]]
+                    parts.append(f"[zeta {zeta:.3g}, omega {omega:.4g} rad/s]")
+                elif not name.startswith("omega_"):
+                    parts.append(f"(s + {self.values[name]:.4g})")
+            return " ".join(parts)
+
+        k = self.form.integrators
+        below = " ".join(part for part in (("s " * k).strip(), side(self.form.pole_names)) if part)
+        above = " ".join(part for part in (("s " * -k).strip(), side(self.form.zero_names)) if part)
+        delay = f" e^(-{self.values['tau']:.4g} s)" if self.form.delay else ""
+        return f"{self.output}/{self.input} = {self.values['K']:.4g} {above}{delay}" + (f" / {below}" if below else "")
+
+
+def _roots(names: Sequence[str], values: Mapping[str, float]) -> Complex:
+    roots: list[complex] = []
+    for name in names:
+        if name.startswith("zeta_"):
+            zeta, omega = values[name], values["omega_" + name[5:]]
+            roots += list(np.roots([1.0, 2.0 * zeta * omega, omega**2]))
+        elif not name.startswith("omega_"):
+            roots.append(-values[name])
+    return np.array(roots, dtype=np.complex128)

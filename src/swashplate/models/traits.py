@@ -1,0 +1,117 @@
+"""What a kind of model can do, and what the rest of the package must know of it: said once, beside its equations.
+
+Nothing outside `swashplate.models` asks for a model's name. The defaults are right for a rigid body of anybody's own
+equations that says nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from swashplate.arrays import Array
+from swashplate.models.card import Card
+from swashplate.models.choices import Choice, uncertain_numbers
+from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.environment import Environment
+
+Model = Any
+"""A `Vehicle`: it has traits, so that its type cannot be imported here."""
+
+Pose = Callable[[Sequence[float], Sequence[float], Environment], dict[str, Any]]
+"""From a state row, an input row and surroundings to how the moving parts stand (see `Traits.pose`)."""
+Doubts = Callable[[Model, Array, Array, Environment], Mapping[str, str]]
+Hover = Callable[[Any, Scalar, Backend], tuple[Mapping[str, Scalar], Sequence[Scalar]]]
+Settled = Callable[[Any, Any, Scalar, Any], Mapping[str, Scalar]]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One of the four axes that a model is flown and judged in.
+
+    Attributes:
+        name: "roll", "pitch", "yaw" or "heave".
+        inputs: what drives it, with their shares.
+        parameters: those that only this axis tells; a fit holds them where a flight does not move it by itself.
+    """
+
+    name: str
+    inputs: Mapping[str, float]
+    parameters: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RecordingFit:
+    """How the live page fits a model to a recording.
+
+    Attributes:
+        options: of `swash identify`, beside the vehicle and the flight.
+        longest: of the recording that is used, the part in which the inputs move most [s]; None for all of it.
+    """
+
+    options: tuple[str, ...] = ()
+    longest: float | None = None
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What a model says of itself.
+
+    Attributes:
+        axes: that it is flown in, with their inputs: whether a flight moves each by itself is judged in these.
+        linear: it holds near one trim only: small angles, deviations, input ranges that are often assumed.
+        remark: what whoever flies it must know, in a line; "" for nothing.
+        about: the same at length.
+        no_trim: why it cannot be brought into equilibrium as a flying body; "" where it can.
+        rest: of a card, the states in which it rests where it cannot be brought into equilibrium; None where no such
+            states are known.
+        wind, ground: whether they are in its equations (a battery is where the card has `voltage_nominal`). What has no
+            `ground` cannot stand either.
+        standing: options of its card with which it stands on the ground and starts its engine; others get skids.
+        heavy: its equations have so many operations that derivatives are compiled soon instead of for speed.
+        rotorcraft: it is a single-rotor helicopter's equations: derivatives by contributor, the forms of papers.
+        coaxial: two rotors on drive trains, as the autopilot with the decoupling inverts them.
+        observed: the observer of validation (tracked pose, gusts, delays of servos and motors) is made for it.
+        published: name of the packaged card of just these equations, "" where cards differ by aircraft.
+        servos: name of its packaged servo mapping, "" where that is its card's.
+        choices: a card's ready choices of what a fit may free.
+        recording: how the live page fits it to a recording; None where only frequency responses are made.
+        switches: options of the card that may be changed in flight on the live page.
+        picture: shapes in body axes (forward, right, down) [m] that the live page draws; None for a plain one.
+        pose: of a vehicle, the function from state, inputs and surroundings to how its moving parts stand.
+        hover: from parameters, voltage [V] and operations to the hover in closed form: states that are not zero, and
+            inputs; None where it is found by Newton's method.
+        settled: from inputs, parameters, voltage and attitude to the inner states in slow flight, by name; None where
+            they are found where they rest.
+        doubts: what of its equations does not hold at a state, in words by kind; None where nothing is known.
+        power: of a state, the shaft power [W]; None where it has none.
+        voltage_seconds: over which a logged voltage is averaged each way: long where it sags slowly and is noisy, short
+            where the motors' commands are shares of it.
+    """
+
+    axes: tuple[Axis, ...] = ()
+    linear: bool = False
+    remark: str = ""
+    about: str = ""
+    no_trim: str = ""
+    rest: Callable[[Card], Mapping[str, float]] | None = None
+    wind: bool = True
+    ground: bool = True
+    standing: Mapping[str, Any] = field(default_factory=dict)
+    heavy: bool = False
+    rotorcraft: bool = False
+    coaxial: bool = False
+    observed: bool = False
+    published: str = ""
+    servos: str = ""
+    choices: Callable[[Card], Mapping[str, Choice]] = uncertain_numbers
+    recording: RecordingFit | None = None
+    switches: tuple[str, ...] = ()
+    picture: Callable[[Model], dict[str, Any]] | None = None
+    pose: Callable[[Model], Pose] | None = None
+    hover: Hover | None = None
+    settled: Settled | None = None
+    doubts: Doubts | None = None
+    power: Callable[[Model, Array, Array, Environment], float] | None = None
+    voltage_seconds: float = 8.0

@@ -1,0 +1,110 @@
+"""`Vehicle`: named states and inputs, bare numbers, and one pure function that gives the states' derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from swashplate.errors import CardError
+from swashplate.models.card import Card
+from swashplate.models.choices import Choice
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.nesting import leaves, rebuild
+from swashplate.models.traits import Traits
+from swashplate.physics.backend import Backend
+from swashplate.physics.environment import Environment
+
+Derivatives = Callable[[Any, Any, Any, Environment, Backend], Any]
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Something that flies.
+
+    Attributes:
+        card: its numbers, with their sources.
+        state: a nested template whose leaves, in order, are `state_names`.
+        inputs: a named tuple type of the inputs.
+        parameters: a named tuple type of the parameters.
+        state_names, state_units: the flat states.
+        input_names, input_units, input_limits: the inputs, their units and their (lower, upper).
+        derivatives: `derivatives(state, inputs, parameters, environment, xp)` in nested form.
+        specific_force: what accelerometers at the CG read [m/s^2], same arguments, returns three scalars.
+        trim_held: inputs that a trim does not solve for, with their values (a throttle that a governor stands behind).
+        traits: what the rest of the package must know of it.
+        options: the switches of the equations, where they are more than the card's options.
+        structure: of a state-space model, its matrices of named expressions; None for all others.
+    """
+
+    card: Card
+    state: Any
+    inputs: Any
+    parameters: Any
+    state_names: tuple[str, ...]
+    state_units: tuple[str, ...]
+    input_names: tuple[str, ...]
+    input_units: tuple[str, ...]
+    input_limits: tuple[tuple[float, float], ...]
+    derivatives: Derivatives
+    specific_force: Derivatives
+    trim_held: tuple[tuple[str, float], ...] = ()
+    traits: Traits = field(default_factory=Traits, repr=False, compare=False)
+    options: Any = None
+    structure: StateSpaceModel | None = field(default=None, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Of its equations."""
+        return self.card.vehicle
+
+    @property
+    def called(self) -> str:
+        """What a reader should see: its equations' name, or its own title where many models share such a name."""
+        return self.card.title if self.traits.linear else self.name
+
+    @property
+    def choices(self) -> Mapping[str, Choice]:
+        """Ready choices of what an identification may move, by name."""
+        return self.traits.choices(self.card)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(self.parameters._fields)
+
+    def values(self) -> Any:
+        """The card's numbers as the equations want them."""
+        numbers = self.card.values()
+        return self.parameters(*(numbers[name] for name in self.parameter_names))
+
+    def rates(self, x: Any, u: Any, parameters: Any, environment: Environment, xp: Backend) -> list[Any]:
+        """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states."""
+        nested = rebuild(self.state, [x[i] for i in range(len(self.state_names))])
+        commands = self.inputs(*(u[i] for i in range(len(self.input_names))))
+        return list(leaves(self.derivatives(nested, commands, parameters, environment, xp)))
+
+    def index(self, state: str) -> int:
+        """Place of a state in the flat row."""
+        return self.state_names.index(state)
+
+    def with_card(self, card: Card) -> Vehicle:
+        """The same equations with another card's numbers."""
+        if card.vehicle != self.card.vehicle:
+            raise CardError(f"is for '{card.vehicle}', not for '{self.card.vehicle}'.", where=card.path)
+        return replace(self, card=card)
+
+    def with_values(self, values: Mapping[str, float], **changes: Any) -> Vehicle:
+        """A copy with other numbers (see `Card.with_values`)."""
+        return replace(self, card=self.card.with_values(values, **changes))
+
+    def save(self, path: str | Path) -> None:
+        """Write the card as a model file."""
+        from swashplate.atomic import write_text
+
+        write_text(path, self.card.to_toml())
+
+    def __repr__(self) -> str:
+        return (
+            f"Vehicle {self.name}: {self.card.title} ({len(self.state_names)} states, {len(self.input_names)} inputs)"
+        )

@@ -1,0 +1,134 @@
+"""The public names, and the one place where a lower layer reaches a higher one: by name, when it is used.
+
+`Flight.condition`, `.plot` and the like are verbs of layers above `Flight`. Importing those would make a circle, so
+such a method calls `resolve("condition")`, and the verb's module is loaded then. Rules for them:
+
+* the method has the verb's own signature, written out (`tests/unit/test_public.py` compares the two);
+* it does nothing but call the verb;
+* the name stands in one of the tables below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+_LIGHT: Mapping[str, str] = {
+    "CHOICES": "swashplate.models.coax_choices:CHOICES",
+    "Card": "swashplate.models.card:Card",
+    "Flight": "swashplate.flights.flight:Flight",
+    "FrequencyResponse": "swashplate.identification.responses.frequency_response:FrequencyResponse",
+    "Parameter": "swashplate.models.card:Parameter",
+    "Result": "swashplate.identification.core.result:Result",
+    "SwashError": "swashplate.errors:SwashError",
+    "Validation": "swashplate.validation.validation:Validation",
+    "Vector": "swashplate.physics.frames:Vector",
+    "Vehicle": "swashplate.models.vehicle:Vehicle",
+    "datasets": "swashplate.flights.datasets:listing",
+    "equation_error": "swashplate.identification.time.equation_error:equation_error",
+    "evaluate_bench": "swashplate.api.bench:evaluate_bench",
+    "export_controller": "swashplate.api.export:export_controller",
+    "fit_in_frequency": "swashplate.identification.time.linear_frequency_fit:fit_in_frequency",
+    "fit_state_space": "swashplate.identification.frequency.state_space_fit:fit_state_space",
+    "fit_transfer_function": "swashplate.identification.frequency.transfer_function_fit:fit_transfer_function",
+    "inspect": "swashplate.flights.inspect:inspect",
+    "load": "swashplate.identification.core.result_file:load",
+    "maneuver": "swashplate.flights.maneuvers.series:parse",
+    "merge": "swashplate.flights.conditioning.synchronise:merge",
+    "read_control": "swashplate.export.control_json:read_control",
+    "report": "swashplate.reporting.report:report",
+    "respond": "swashplate.identification.responses.respond:respond",
+    "stepwise": "swashplate.identification.time.equation_error:stepwise",
+    "structure": "swashplate.models.catalogue:structure",
+    "suggest_gains": "swashplate.api.gains:suggest_gains",
+    "synchronise": "swashplate.flights.conditioning.synchronise:synchronise",
+    "vehicle": "swashplate.models.catalogue:vehicle",
+    "verify": "swashplate.validation.verification:verify",
+}
+_COMPUTING: Mapping[str, str] = {
+    "QUIET": "swashplate.simulation.sensors:QUIET",
+    "Sensors": "swashplate.simulation.sensors:Sensors",
+    "autopilot": "swashplate.control.laws.autopilot:autopilot",
+    "check_controller": "swashplate.api.check_controller:check_controller",
+    "decouple": "swashplate.api.decouple:decouple",
+    "decouple_axes": "swashplate.api.decouple_axes:decouple_axes",
+    "derivatives": "swashplate.simulation.derivatives_over_speed:derivatives",
+    "design_controller": "swashplate.api.design_controller:design_controller",
+    "excitation": "swashplate.api.excitation:excitation",
+    "export_model": "swashplate.api.export:export_model",
+    "fit_in_time": "swashplate.identification.time.linear_time_fit:fit_in_time",
+    "fit_vehicle": "swashplate.identification.time.vehicle_time_fit:fit_vehicle",
+    "fly_maneuver": "swashplate.api.fly_maneuver:fly_maneuver",
+    "hover_hold": "swashplate.control.laws.hold:hover_hold",
+    "identify": "swashplate.identification.identify:identify",
+    "linearize": "swashplate.simulation.linearize:linearize",
+    "link_ardupilot": "swashplate.api.link:link_ardupilot",
+    "link_px4": "swashplate.api.link:link_px4",
+    "live": "swashplate.api.live:live",
+    "load_controller": "swashplate.api.controllers:load_controller",
+    "monte_carlo": "swashplate.api.monte_carlo:monte_carlo",
+    "observability": "swashplate.api.observability:observability",
+    "observe": "swashplate.simulation.sensors:observe",
+    "observer_trial": "swashplate.control.lqg.observer_trial:trial",
+    "plan_bench": "swashplate.bench.plan:plan",
+    "replay": "swashplate.links.live.replay:replay",
+    "show_replay": "swashplate.api.live:show_replay",
+    "simulate": "swashplate.simulation.integrate:simulate",
+    "simulate_adaptive": "swashplate.simulation.adaptive:simulate_adaptive",
+    "simulate_bench": "swashplate.api.bench:simulate_bench",
+    "simulate_closed_loop": "swashplate.simulation.closed_loop:simulate_closed_loop",
+    "simulate_lpv": "swashplate.simulation.lpv:simulate_lpv",
+    "simulate_maneuver": "swashplate.simulation.closed_loop:simulate_maneuver",
+    "speed_schedule": "swashplate.simulation.lpv:schedule",
+    "state_hold": "swashplate.control.laws.state_hold:state_hold",
+    "trim": "swashplate.simulation.trim:trim",
+    "trim_curve": "swashplate.simulation.trim_curve:trim_curve",
+    "validate": "swashplate.validation.verb:validate",
+}
+"""Names that set JAX up when they are first used; the others leave it alone."""
+
+_BEHIND_METHODS: Mapping[str, str] = {
+    "condition": "swashplate.flights.conditioning.condition:condition",
+    "flight_from_arrays": "swashplate.flights.tabular:from_arrays",
+    "flight_from_dataframe": "swashplate.flights.tabular:from_dataframe",
+    "flight_to_dataframe": "swashplate.flights.tabular:to_dataframe",
+    "html_of_derivatives": "swashplate.reporting.notebook:html_of_derivatives",
+    "html_of_flight": "swashplate.reporting.notebook:html_of_flight",
+    "html_of_responses": "swashplate.reporting.notebook:html_of_responses",
+    "html_of_trim_curve": "swashplate.reporting.notebook:html_of_trim_curve",
+    "html_of_validation": "swashplate.reporting.notebook:html_of_validation",
+    "plot_derivatives": "swashplate.reporting.paper_figures:plot_derivatives",
+    "plot_flight": "swashplate.reporting.paper_figures:plot_flight",
+    "plot_responses": "swashplate.reporting.paper_figures:plot_responses",
+    "plot_trim_curve": "swashplate.reporting.paper_figures:plot_trim_curve",
+    "plot_validation": "swashplate.reporting.paper_figures:plot_validation",
+    "result_from_document": "swashplate.identification.core.result_file:from_document",
+    "result_to_document": "swashplate.identification.core.result_file:to_document",
+    "save_result": "swashplate.identification.core.result_file:save",
+}
+"""Verbs that are reached as methods (`flight.condition(...)`) and have no name in `swashplate`."""
+
+_SET_UP = (
+    "swashplate.simulation.dynamics:enable_double_precision",
+    "swashplate.simulation.compilation:enable_compilation_cache",
+)
+NAMES = tuple(sorted((*_LIGHT, *_COMPUTING)))
+"""What `swashplate` offers by name, `read` and the version besides."""
+
+
+def _load(place: str) -> Any:
+    module, _, attribute = place.partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def resolve(name: str) -> Any:
+    """What a name of the tables stands for; its module is loaded now, and JAX is set up where it computes.
+
+    Raises:
+        KeyError: where no table has the name.
+    """
+    if name in _COMPUTING:
+        for place in _SET_UP:
+            _load(place)()
+    return _load({**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name])

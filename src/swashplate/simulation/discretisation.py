@@ -1,0 +1,153 @@
+"""Continuous linear models from sample to sample: by SciPy, and as series where a derivative or C code is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.linalg import expm
+from scipy.signal import cont2discrete
+
+from swashplate.arrays import Array
+
+_HALVINGS, _TERMS = 8, 5
+_SAMPLE = 1e-6
+"""Share of a sample that counts as none."""
+
+
+def zero_order_hold(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
+    """(F, G) of x' = A x + B u under inputs held for `dt` [s]: x+ = F x + G u."""
+    n, m = B.shape
+    F, G, *_ = cont2discrete((A, B, np.zeros((1, n)), np.zeros((1, m))), dt)
+    return np.asarray(F), np.asarray(G)
+
+
+def first_order_hold(A: Any, B: Any, dt: float) -> tuple[Any, Any, Any]:
+    """Exact step for inputs that run straight between samples: x+ = F x + G0 u + G1 (u+ - u) (Van Loan 1978).
+
+    SciPy's `cont2discrete` turns the state into one that is no sample of x; this does not.
+
+    Args:
+        A, B: of dx/dt = A x + B u, shapes (..., n, n) and (..., n, m), real or complex.
+        dt: step [s].
+    """
+    n, m = B.shape[-2:]
+    block = np.zeros((*B.shape[:-2], n + 2 * m, n + 2 * m), dtype=np.result_type(A, B))
+    block[..., :n, :n], block[..., :n, n : n + m] = A, B
+    block[..., n : n + m, n + m :] = np.eye(m) / dt
+    step = expm(block * dt)
+    return step[..., :n, :n], step[..., :n, n : n + m], step[..., :n, n + m :]
+
+
+def held_series(A: Any, dt: Any, one: Any, *, terms: int = 4) -> tuple[Any, Any]:
+    """(F, H) with F = e^(A dt) = 1 + dt A H, by the series to so many terms; inputs B held for dt act by dt H B.
+
+    To fourth order it is what a Runge-Kutta step makes of a linear system. Only `@`, `*` and `+` are used: it can be
+    differentiated, and CasADi can trace it.
+
+    Args:
+        A: shape (n, n).
+        dt: step [s].
+        one: the identity (n, n).
+        terms: the order of the series.
+    """
+    H = one + ((1.0 / terms) * dt) * A
+    for order in range(terms - 1, 1, -1):
+        H = one + (((1.0 / order) * dt) * A) @ H
+    return one + (dt * A) @ H, H
+
+
+def gathered_noise(A: Any, W: Any, dt: Any) -> tuple[Any, Any]:
+    """Transition e^(A dt) and the noise gathered meanwhile, the integral of e^(As) W e^(A's), to be differentiated.
+
+    Series over a small part of the sample, then doubled (Van Loan's exponential of twice the size takes five times as
+    long to compile).
+
+    Args:
+        A: shape (n, n), real or complex.
+        W: intensity of white noise on the rates, shape (n, n).
+        dt: sample time [s].
+    """
+    h = dt / 2**_HALVINGS
+    transition, _ = held_series(A, h, jnp.eye(A.shape[0]), terms=_TERMS)
+    gathered = jnp.zeros_like(W)
+    for order in range(_TERMS, 0, -1):
+        gathered = W + h / (order + 1) * (A @ gathered + gathered @ A.T)
+    return summed(transition, h * gathered, _HALVINGS)
+
+
+def summed(F: Any, W: Any, doublings: int) -> tuple[Any, Any]:
+    """F^n and the sum of F^k W F'^k over k below n = 2^doublings (Smith 1968, SIAM J. Appl. Math. 16, 198-201)."""
+
+    def double(carry: tuple[Any, Any], _: None) -> tuple[tuple[Any, Any], None]:
+        F, total = carry
+        return (F @ F, total + F @ total @ F.T), None
+
+    return jax.lax.scan(double, (F, W), None, length=doublings)[0]
+
+
+def held_late(A: Array, B: Array, dt: float, delays: Sequence[float]) -> tuple[Array, Array, Array, tuple[int, ...]]:
+    """`zero_order_hold` with inputs that act at any time within a sample (Jury 1964, the modified z-transform; exact).
+
+    Args:
+        A, B: continuous model.
+        dt: sample time [s].
+        delays: of each input [s].
+
+    Returns:
+        F; what the command of so many whole samples ago does, and what the one before it does until that arrives, both
+        (n, m); those numbers of whole samples.
+    """
+    whole = [int(np.floor(d / dt + _SAMPLE)) for d in delays]
+    rest = [d - k * dt if d - k * dt > _SAMPLE * dt else 0.0 for d, k in zip(delays, whole, strict=True)]
+    F, G = zero_order_hold(A, B, dt)
+    now = G.copy()
+    for late in {r for r in rest if r}:
+        columns = [j for j, r in enumerate(rest) if r == late]
+        now[:, columns] = zero_order_hold(A, B[:, columns], dt - late)[1]
+    return F, now, G - now, tuple(whole)
+
+
+def with_late_inputs(
+    F: Array, G: Array, delays: Sequence[int], before: Array | None = None
+) -> tuple[Array, Array, tuple[tuple[int, int], ...]]:
+    """The sampled model with its inputs so many samples late, as states: of each late input its last commands.
+
+    Args:
+        F, G: sampled model.
+        delays: in samples.
+        before: what the command of one sample earlier still does (see `held_late`), shape of G.
+
+    Returns:
+        F and G of the larger model, and for each added state (input, samples ago).
+    """
+    n, m = G.shape
+    if before is not None and np.any(before):
+        still = [d + int(bool(np.any(before[:, j]))) for j, d in enumerate(delays)]
+        larger, entering, waiting = with_late_inputs(F, G, still)
+        for j, d in enumerate(delays):
+            if still[j] > d:
+                larger[:n, n + waiting.index((j, still[j]))] = before[:, j]
+                if d == 0:
+                    entering[:n, j] = G[:, j]
+                else:
+                    larger[:n, n + waiting.index((j, d))] = G[:, j]
+        return larger, entering, waiting
+    added = [(j, ago) for j, d in enumerate(delays) for ago in range(1, d + 1)]
+    size = n + len(added)
+    larger, entering = np.zeros((size, size)), np.zeros((size, m))
+    larger[:n, :n] = F
+    for i, (j, ago) in enumerate(added):
+        if ago == delays[j]:
+            larger[:n, n + i] = G[:, j]
+        if ago == 1:
+            entering[n + i, j] = 1.0
+        else:
+            larger[n + i, n + i - 1] = 1.0
+    for j, d in enumerate(delays):
+        if d == 0:
+            entering[:n, j] = G[:, j]
+    return larger, entering, tuple(added)

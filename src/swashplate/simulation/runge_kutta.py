@@ -1,0 +1,63 @@
+"""One step of Runge and Kutta's classical method of order 4, and many of them: what every compiled loop is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+Rates = Callable[[Any, Any], Any]
+"""`f(x, w)`: the rates of a row (or column, or number) under what drives it."""
+Driving = Callable[[Any], Any]
+"""What drives it at a fraction 0 to 1 of the step."""
+
+
+def rk4_change(rates: Rates, x: Any, w: Driving, dt: Any, *, looped: bool) -> Any:
+    """How far a step takes `x`; arguments as in `rk4_step`."""
+
+    def stage(fraction: Any, weight: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        k, total = carry
+        k = rates(x + (fraction * dt) * k, w(fraction))
+        return k, total + (weight * dt) * k
+
+    start = (0.0 * x, 0.0 * x)
+    if not looped:
+        for fraction, weight in ((0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)):
+            start = stage(fraction, weight, start)
+        return start[1]
+
+    def numbered(i: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        # No table of the four: a loop that gathers is not compiled as one function.
+        inner = (i == 1) | (i == 2)
+        fraction = jnp.where(inner, 0.5, jnp.where(i == 0, 0.0, 1.0))
+        return stage(fraction, jnp.where(inner, 1.0 / 3.0, 1.0 / 6.0), carry)
+
+    return jax.lax.fori_loop(0, 4, numbered, start)[1]
+
+
+def rk4_step(rates: Rates, x: Any, w: Driving, dt: Any, *, looped: bool) -> Any:
+    """The state one step later.
+
+    Args:
+        rates: `f(x, w)`.
+        x: the state; an array, or with stages written out anything that can be added and multiplied by a number.
+        w: what drives it at a fraction of the step; `lambda _: row` where it is held.
+        dt: length of the step [s].
+        looped: the four stages in an inner loop. XLA's CPU compiler turns a small loop into one function instead of 75
+            separately launched kernels (measured: 2.6 times faster for one CoaX). Written out, a batch is 2.3 times
+            faster in float32, and CasADi and NumPy can run it.
+    """
+    return x + rk4_change(rates, x, w, dt, looped=looped)
+
+
+def rk4_steps(rates: Rates, x: Any, w: Callable[[Any, Any], Any], dt: Any, count: int) -> Any:
+    """The state `count` steps later, each with its stages in a loop; `w(i, fraction)` drives step i."""
+    if count == 1:
+        return rk4_step(rates, x, lambda fraction: w(0.0, fraction), dt, looped=True)
+
+    def step(i: Any, x: Any) -> Any:
+        return rk4_step(rates, x, lambda fraction: w(i, fraction), dt, looped=True)
+
+    return jax.lax.fori_loop(0, count, step, x)

@@ -1,0 +1,136 @@
+"""`TrimCurve`: steady flight over a range of speeds, as one result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from swashplate.errors import SwashError
+from swashplate.models.doubts import doubts, shaft_power
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.public import resolve
+from swashplate.simulation.speeds import trims_over_speed
+from swashplate.simulation.trim import Trim
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class TrimCurve:
+    """The trims of a vehicle at ascending speeds.
+
+    Attributes:
+        vehicle: whose they are.
+        trims: at each speed.
+    """
+
+    vehicle: Vehicle
+    trims: tuple[Trim, ...]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Where the vehicle's equations do not hold."""
+        return tuple(
+            f"At {at.speed:g} m/s {words}."
+            for at in self.trims
+            for words in doubts(self.vehicle, at.state, at.inputs, at.environment)
+        )
+
+    def units(self) -> dict[str, str]:
+        """The unit of every input and state."""
+        v = self.vehicle
+        return dict(zip((*v.input_names, *v.state_names), (*v.input_units, *v.state_units), strict=True))
+
+    def power(self, at: Trim) -> float | None:
+        """Shaft power [W]; None where the vehicle has none."""
+        return shaft_power(self.vehicle, at.state, at.inputs, at.environment)
+
+    def shown_unit(self, name: str) -> str:
+        """The unit that an input or a state is shown in: angles in degrees."""
+        unit = self.units()[name]
+        return "deg" if unit == "rad" else unit
+
+    def shown(self, name: str) -> list[float]:
+        """An input or a state at each speed, in the unit that it is shown in."""
+        values = [{**at.states(), **at.commands()}[name] for at in self.trims]
+        return [math.degrees(value) for value in values] if self.shown_unit(name) == "deg" else values
+
+    def columns(self) -> dict[str, list[float]]:
+        """Speed, inputs, attitude, flapping and power by "name [unit]", one value a speed."""
+        first = self.trims[0]
+        names = (*self.vehicle.input_names, *(n for n in ("phi", "theta", "a1", "b1") if n in first.state_names))
+        found = {"speed [m/s]": [at.speed for at in self.trims]}
+        found |= {f"{name} [{self.shown_unit(name)}]": self.shown(name) for name in names}
+        powers = [self.power(at) for at in self.trims]
+        if all(power is not None for power in powers):
+            found["power [W]"] = [float(power or 0.0) for power in powers]
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Trims, units and remarks as JSON types."""
+        return {
+            "trims": [
+                {
+                    "speed": at.speed,
+                    "climb": at.climb,
+                    "lateral": at.lateral,
+                    "turn": at.turn,
+                    "inputs": at.commands(),
+                    "states": at.states(),
+                    "residual": at.residual,
+                    **({} if (power := self.power(at)) is None else {"power": power}),
+                }
+                for at in self.trims
+            ],
+            "units": self.units(),
+            "remarks": self.remarks,
+        }
+
+    def __repr__(self) -> str:
+        columns = self.columns()
+        width = max(map(len, columns)) + 2
+        lines = ["".join(f"{head:>{width}}" for head in columns)]
+        lines += ["".join(f"{value:>{width}.3f}" for value in row) for row in zip(*columns.values(), strict=True)]
+        return "\n".join([f"Trims of {self.vehicle.card.title}", *lines, *(f"! {words}" for words in self.remarks)])
+
+    def plot(self) -> Figure:
+        """Inputs, attitude and power over speed, as a matplotlib figure."""
+        figure: Figure = resolve("plot_trim_curve")(self)
+        return figure
+
+    def _repr_html_(self) -> str:
+        page: str = resolve("html_of_trim_curve")(self)
+        return page
+
+
+def trim_curve(
+    vehicle: Vehicle,
+    speeds: Sequence[float],
+    *,
+    climb: float = 0.0,
+    lateral: float = 0.0,
+    turn: float = 0.0,
+    environment: Environment | None = None,
+) -> TrimCurve:
+    """Steady flight over a range of speeds.
+
+    Args:
+        vehicle: what flies.
+        speeds: ahead, ascending [m/s].
+        climb: rate of climb [m/s]. lateral: speed to the right [m/s]. turn: rate of turn to the right [rad/s].
+        environment: wind, air and voltage.
+
+    Raises:
+        SwashError: without any speed.
+        TrimError: at the first speed that cannot be flown, with the limit that stops it.
+    """
+    if not len(speeds):
+        raise SwashError("a trim curve needs at least one speed.", channel="speeds")
+    return TrimCurve(
+        vehicle,
+        trims_over_speed(vehicle, speeds, climb=climb, lateral=lateral, turn=turn, environment=environment),
+    )

@@ -1,0 +1,109 @@
+"""`validate`: the verb that asks how well a model predicts flights which no fit has seen, whatever the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, overload
+
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.result import Result
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionDetails, as_state_space
+from swashplate.identification.time.flight_details import FlightDetails
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.validation.calibration import CALIBRATION
+from swashplate.validation.prediction import HORIZONS
+from swashplate.validation.validate import validate as predict_flights
+from swashplate.validation.validation import Validation
+from swashplate.validation.vehicle_verification import verify_vehicle
+from swashplate.validation.verification import Verification, verify
+
+
+@overload
+def validate(
+    model: Result[Vehicle, FlightDetails],
+    flights: Flight | Iterable[Flight],
+    *,
+    published: Vehicle | None = None,
+    horizons: Sequence[float] = HORIZONS,
+    every: float = 0.1,
+    calibration: float = CALIBRATION,
+    outputs: Sequence[str] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> Validation: ...
+
+
+@overload
+def validate(
+    model: Result[Any, Any] | Vehicle | StateSpaceModel,
+    flights: Flight | Iterable[Flight],
+    *,
+    published: Vehicle | None = None,
+    horizons: Sequence[float] = HORIZONS,
+    every: float = 0.1,
+    calibration: float = CALIBRATION,
+    outputs: Sequence[str] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> Validation | Verification: ...
+
+
+def validate(
+    model: Result[Any, Any] | Vehicle | StateSpaceModel,
+    flights: Flight | Iterable[Flight],
+    *,
+    published: Vehicle | None = None,
+    horizons: Sequence[float] = HORIZONS,
+    every: float = 0.1,
+    calibration: float = CALIBRATION,
+    outputs: Sequence[str] | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> Validation | Verification:
+    """Predict unseen flights and judge the result.
+
+    A vehicle with the states of a rigid body, in flights whose pose was tracked, is predicted from many start points
+    beside the published card and naive predictors: see `swashplate.validation.validate.validate` for what is told. Any
+    other vehicle, a state-space model and transfer functions are flown along the recorded inputs; start states, shifts
+    and biases are solved for.
+
+    Args:
+        model: what an identification returned, or a model.
+        flights: conditioned flights that the fit has not seen.
+        published: the card to compare with (None: the card that the model was identified from).
+        horizons: seconds ahead.
+        every: seconds between starts.
+        calibration: seconds at the start of each record that tell its delays and trims.
+        outputs: channels to compare, for models that are flown along the inputs; all that both have where None.
+        progress: called with the number of records done and their number.
+
+    Returns:
+        A `Validation`, or the `Verification` of a model that is flown along the inputs.
+
+    Raises:
+        FlightError: where no record is long enough, or the flights lack what the model needs.
+        SwashError: for a calibration that is too short, or `published` beside a model that has no card to compare with.
+        CardError: for an identified model that does not say what it was identified from, and no `published`.
+    """
+    flown = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    held = model.model if isinstance(model, Result) else model
+    rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
+    if rigid and outputs is None:
+        return predict_flights(
+            model,  # type: ignore[arg-type]
+            flown,
+            published=published,
+            horizons=horizons,
+            every=every,
+            calibration=calibration,
+            progress=progress,
+        )
+    if published is not None:
+        raise SwashError(
+            "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"
+        )
+    if isinstance(held, Vehicle):
+        return verify_vehicle(held, flown, outputs=outputs)
+    if isinstance(held, tuple) and isinstance(model, Result) and isinstance(model.details, TransferFunctionDetails):
+        held = as_state_space(model)
+    return verify(held, flown, outputs=outputs)

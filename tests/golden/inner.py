@@ -1,0 +1,25 @@
+"""Names that the top package does not offer: when modules move, this is the only file of the golden cases to change."""
+
+from __future__ import annotations
+
+from swashplate.control.analysis.ardupilot_gains import suggest_gains
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.frequency.transfer_function_fit import as_state_space, suggest
+from swashplate.identification.time.equation_error import equation_error
+from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
+from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.validation.verification import verify_inside
+
+__all__ = [
+    "Flight",
+    "Provenance",
+    "as_state_space",
+    "equation_error",
+    "fit_in_frequency",
+    "fit_in_time",
+    "stream",
+    "suggest",
+    "suggest_gains",
+    "verify_inside",
+]

@@ -1,0 +1,86 @@
+"""Suggested rate-loop gains keep their margins on the model they were made for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from swashplate.control.analysis.ardupilot_gains import GAIN_MARGIN, PHASE_MARGIN, loop_of, suggest_gains
+from swashplate.models.linear.state_space_file import structure
+
+SITL = {
+    "Lb": 3588.6, "Ma": 617.5, "tau_f": 0.068232, "Ba": 1.2963, "Ab": -1.3402, "Blat": 0.24493, "Blon": -0.08487,
+    "Alat": 0.07285, "Alon": 0.26962, "tau_roll": 0.0534, "tau_pitch": 0.0526,
+}  # fmt: skip
+
+
+def test_gains_of_the_simulated_helicopter() -> None:
+    model = structure("rotor_body").with_values(SITL)
+    roll, pitch = suggest_gains(model)
+    # Feed-forward: one over the steady rate per command (true DC gains 3.5897 and 3.9515 rad/s per unit).
+    assert abs(roll.parameters["ATC_RAT_RLL_FF"] * 3.5897 - 1.0) < 0.03
+    assert abs(pitch.parameters["ATC_RAT_PIT_FF"] * 3.9515 - 1.0) < 0.03
+    for found in (roll, pitch):
+        read = found.margins
+        assert not read.gain_margin.value < GAIN_MARGIN
+        assert not read.phase_margin.value < PHASE_MARGIN
+        assert found.peak < 2.0
+        # The closed loop is stable: Nyquist's curve of this stable plant does not go round -1.
+        omega = np.geomspace(0.01, 500.0, 20000)
+        turns = np.unwrap(np.angle(1.0 + loop_of(model, found, omega)))
+        assert abs(turns[-1] - turns[0]) < np.pi
+    # The firmware's own hand-tuned P for this helicopter is 0.06 in roll.
+    assert 0.03 < roll.parameters["ATC_RAT_RLL_P"] < 0.12
+
+
+def test_an_axis_that_the_model_lacks_gets_none() -> None:
+    assert suggest_gains(structure("heave")) == ()
+
+
+def test_the_controllers_filters_cost_margin_and_are_suggested_with_the_gains() -> None:
+    model = structure("rotor_body").with_values(SITL)
+    flown = {"ATC_RAT_RLL_P": 0.06, "ATC_RAT_RLL_I": 0.105, "ATC_RAT_RLL_D": 0.0, "ATC_RAT_RLL_FF": 0.21}
+    unfiltered, _ = suggest_gains(model, autopilot={**flown, "ATC_RAT_RLL_FLTE": 0.0})
+    filtered, _ = suggest_gains(model, autopilot={**flown, "ATC_RAT_RLL_FLTE": 20.0})
+    assert filtered.parameters["ATC_RAT_RLL_FLTE"] == 20.0
+    assert unfiltered.parameters["ATC_RAT_RLL_FLTE"] == 0.0
+    # Where the loop is at -180 degrees, 20 Hz take the phase of a first-order filter, and the gain margin with it.
+    without, behind = unfiltered.flown_margins.omega_180.value, filtered.flown_margins.omega_180.value
+    assert behind < without
+
+    def turned(omega: float, *filters: complex) -> float:
+        """From -180 degrees, by hand."""
+        own = 0.06 + 0.105 / (1j * omega)
+        return float(np.degrees(np.angle(-own * model.response(np.array([omega]))[0, 0, 0] * np.prod(filters))))
+
+    assert turned(behind, 1.0 / (1.0 + 1j * behind / (40.0 * np.pi))) == pytest.approx(0.0, abs=0.1)
+    # A rate from before the gyro's filter: the loop has that filter all the same.
+    raw, _ = suggest_gains(
+        model, autopilot={**flown, "ATC_RAT_RLL_FLTE": 20.0, "INS_GYRO_FILTER": 20.0}, sources={"p": "p_sid"}
+    )
+    at = raw.flown_margins.omega_180.value
+    gyro = signal.freqs(*signal.butter(2, 40.0 * np.pi, analog=True), [at])[1][0]
+    assert turned(at, gyro, 1.0 / (1.0 + 1j * at / (40.0 * np.pi))) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("damping", [-0.02, -6.0])
+def test_yaw_that_goes_on_turning_gets_no_feed_forward(damping: float) -> None:
+    (yaw,) = suggest_gains(structure("yaw").with_values({"Nr": damping, "Nped": 30.0, "tau_yaw": 0.05}))
+    slow = damping == -0.02
+    assert yaw.parameters["ATC_RAT_YAW_FF"] == pytest.approx(0.0 if slow else 6.0 / 30.0, rel=0.03)
+    assert ("no feed-forward" in yaw.words) == slow
+    # An integrator with a delay keeps 6 dB up to pi/4 over the delay, with I and the filter somewhat less.
+    assert 3.0 < yaw.parameters["ATC_RAT_YAW_P"] * 30.0 < np.pi / 4 / 0.05
+    assert yaw.margins.gain_margin.value >= GAIN_MARGIN
+    assert yaw.margins.phase_margin.value >= PHASE_MARGIN
+
+
+def test_an_unstable_rate_gets_no_gains_but_a_reason() -> None:
+    (yaw,) = suggest_gains(structure("yaw").with_values({"Nr": 3.0}), autopilot={"ATC_RAT_YAW_P": 0.2})
+    assert yaw.parameters == {}
+    assert "unstable mode at 3 rad/s" in yaw.words
+    assert yaw.flown == {"ATC_RAT_YAW_P": 0.2}
+    (slow,) = suggest_gains(structure("yaw").with_values({"Nr": 0.2}))
+    assert "0.2 rad/s" in slow.words
+    assert slow.parameters

@@ -1,0 +1,39 @@
+"""A flown step teaches the decoupling what a hover leaves open, and the spread of many paths is told by its sources."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.control.analysis.straightness import step_paths
+from swashplate.control.laws.autopilot import autopilot
+from swashplate.control.laws.learning import corrected_by_step, drift_sources
+
+
+def test_one_step_teaches_the_law_the_aircraft() -> None:
+    """Aircraft that tilt with speed as the model does not: at most a quarter of their drift is left."""
+    coax = sp.vehicle("coax")
+    hover = sp.trim(coax)
+    law = autopilot(coax, hover, mode="manual", lag=np.radians(20.0))
+    tilts = np.array([-0.006, 0.006])
+    others = {"a_alpha_u_linear": tilts, "a_beta_v_linear": tilts}
+    flown = step_paths(coax, law, hover, command=0.2, size=2, parameters=others).drift
+    assert np.all(np.abs(flown) > 0.5), flown
+    for i, drift in enumerate(flown):
+        own = {name: values[i : i + 1] for name, values in others.items()}
+        taught = corrected_by_step(coax, law, hover, command=0.2, drift=float(drift))
+        again = step_paths(coax, taught, hover, command=0.2, parameters=own).drift[0]
+        assert abs(again) < 0.25 * abs(drift)
+
+
+def test_sources_add_up_and_tied_numbers_count_once() -> None:
+    random = np.random.default_rng(0)
+    a, b, c = random.standard_normal((3, 4000))
+    shares, explained = drift_sources(3.0 * a + b + 0.1, {"a": 5.0 + 2.0 * a, "twin": a, "b": -b, "c": c, "d": 0.0 * c})
+    assert [name for name, _ in shares] == ["a", "b"]
+    assert dict(shares)["a"] == pytest.approx(0.9, abs=0.02)
+    assert explained == pytest.approx(1.0, abs=1e-9)
+    drift = np.where(a > 2.0, np.nan, a)  # some never arrived
+    assert drift_sources(drift, {"a": a})[0][0][0] == "a"
+    assert drift_sources([1.0, 2.0, 3.0, 3.5], {"a": [1.0, 2.0, 3.0, 4.0]}) == ((), 0.0)  # too few to tell

@@ -1,0 +1,170 @@
+"""Regulators, filters, delays and margins from linear algebra, and what cannot be held or seen said by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate.control.analysis.stability import loop_modes
+from swashplate.control.analysis.stability_limit import with_servos
+from swashplate.control.controller_file import read_controller, save_controller
+from swashplate.control.lqg.analysis import analyse
+from swashplate.control.lqg.controller import Lqg
+from swashplate.control.lqg.design import design
+from swashplate.control.lqg.observability import in_words, observability
+from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
+from swashplate.errors import ControllerError
+from swashplate.filtering.sensor_suite import suite
+from swashplate.models.catalogue import vehicle
+from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.trim import trim
+
+SENSORS = "gyro@100,mocap@50+20ms"
+
+
+@pytest.fixture(scope="module")
+def made() -> Lqg:
+    return design(vehicle("coax"), sensors=suite(SENSORS), rate=100.0, delays=0.02)
+
+
+# ---- linear algebra ------------------------------------------------------------------------------------------------
+def test_a_scalar_regulator_and_filter_have_their_closed_forms() -> None:
+    """x+ = a x + u: P = q + a^2 P r / (P + r), K = a P / (P + r); the filter is its dual."""
+    a, q, r = 1.2, 0.7, 0.3
+    b = a * a * r - r + q
+    P = 0.5 * (b + np.sqrt(b * b + 4.0 * q * r))
+    one = np.ones((1, 1))
+    K = regulator(a * one, one, q * one, r * one, ["x"], scale=np.ones(1), where="toy")
+    assert K[0, 0] == pytest.approx(a * P / (P + r), rel=1e-12)
+    L, found = steady_filter(a * one, one, q * one, r * one, ["x"], scale=np.array([3.0]), where="toy")
+    assert found[0, 0] == pytest.approx(P, rel=1e-9)
+    assert L[0, 0] == pytest.approx(P / (P + r), rel=1e-9)
+
+
+def test_late_inputs_are_states() -> None:
+    """A simulation with a queue gives what the larger model gives."""
+    F, G = zero_order_hold(np.array([[0.0, 1.0], [-4.0, -0.3]]), np.array([[0.0, 0.2], [1.0, 0.0]]), 0.05)
+    larger, entering, added = with_late_inputs(F, G, (3, 0))
+    assert added == ((0, 1), (0, 2), (0, 3))
+    commands = np.random.default_rng(0).standard_normal((30, 2))
+    x, whole = np.zeros(2), np.zeros(5)
+    for k, now in enumerate(commands):
+        late = commands[k - 3, 0] if k >= 3 else 0.0
+        x = F @ x + G @ np.array([late, now[1]])
+        whole = larger @ whole + entering @ now
+        np.testing.assert_allclose(whole[:2], x, atol=1e-12)
+
+
+def test_directions_that_nothing_reaches_or_sees_are_named() -> None:
+    F = np.array([[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.1]])
+    scale = np.array([2.0, 1.0, 5.0])
+    assert not unseen(F, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), "abc", scale=scale)
+    (hidden,) = unseen(F, np.array([[1.0, 0.0, 0.0]]), "abc", scale=scale)
+    assert str(hidden) == "c"
+    assert hidden.mode == pytest.approx(1.1)
+    (lost,) = unreached(F, np.array([[0.0], [1.0], [0.0]]), "abc", scale=scale)
+    assert str(lost) == "c"
+    with pytest.raises(ControllerError, match=r"toy: no input moves c \(mode z = 1.1000\): it cannot be stabilised"):
+        regulator(F, np.array([[0.0], [1.0], [0.0]]), np.eye(3), np.eye(1), "abc", scale=scale, where="toy")
+    with pytest.raises(ControllerError, match="state weights: have shape"):
+        regulator(F, np.eye(3), np.eye(2), np.eye(3), "abc", scale=scale, where="toy")
+
+
+# ---- design --------------------------------------------------------------------------------------------------------
+def test_the_linear_loop_is_the_nonlinear_ones_slope(made: Lqg) -> None:
+    """Modes from linear algebra against the differentiated map of the flying loop, delays and all."""
+    coax = vehicle("coax")
+    fed = design(coax, rate=100.0, delays=0.02)
+    modes = analyse(fed).modes
+    flown = loop_modes(coax, fed, fed.start)
+    for mode in modes:
+        assert np.min(np.abs(np.exp(flown / 100.0) - np.exp(mode / 100.0))) < 1e-4
+
+
+def test_margins_and_spread(made: Lqg) -> None:
+    found = analyse(made)
+    assert found.modes[0].real < -0.01
+    assert found.margins.together.alpha > 0.4
+    assert {a.name for a in found.margins.axes} == set(made.vehicle.input_names)
+    assert all(np.degrees(a.phase) > 35.0 for a in found.margins.axes)
+    assert 0.02 < found.spread["x"] < 0.1
+    assert found.uncertainty["eta_bar"] == pytest.approx(0.0064, rel=0.1)
+
+
+def test_servo_lags_are_first_order() -> None:
+    coax = vehicle("coax")
+    model = linearize(coax, trim(coax))
+    slow = with_servos(model, 0.05)
+    values = np.linalg.eigvals(slow.A)
+    assert np.sum(np.abs(values + 20.0) < 1e-6) == 2
+    steady = slow.A[: len(model.A), len(model.A) :]
+    np.testing.assert_allclose(steady, model.B[:, 2:], atol=1e-12)
+
+
+def test_observability_in_words() -> None:
+    coax = vehicle("coax")
+    hover = trim(coax)
+    blind = observability(coax, hover, suite("imu@100,sonar,pressure,flow@25+40ms"), seconds=4.0)
+    assert [in_words(d) for d in blind.hidden] == ["place to the north", "place to the east", "heading"]
+    whole = observability(coax, hover, suite("imu@100,mocap@100+10ms"), seconds=4.0)
+    assert not whole.hidden
+    assert "Nothing that lasts stays unseen" in repr(whole)
+    still = observability(coax, hover, suite("imu@100,sonar"), seconds=4.0)
+    faint = [in_words(d) for d in still.faint]
+    assert "speed ahead" in faint
+    assert any(text.startswith("bar's roll angle, together with") for text in faint)
+    known = {k.name: k for k in whole.known}
+    assert known["eta_bar"].sigma < 0.1 * known["eta_bar"].before
+
+
+def test_a_controller_comes_back_from_its_file(made: Lqg, tmp_path: Path) -> None:
+    path = tmp_path / "lqg.toml"
+    save_controller(made, path)
+    again = read_controller(path)
+    assert isinstance(again, Lqg)
+    np.testing.assert_array_equal(again.gains, made.gains)
+    assert again.plan == made.plan
+    np.testing.assert_allclose(again.memory, made.memory, atol=1e-15)
+    text = path.read_text()
+    for change, said in (
+        (('kind = "gyro"', 'kind = "nose"'), "'nose' is no sensor"),
+        (("battery = [", "battery = [\n    1.0,"), r"feedback.battery: has shape \(5,\), expected \(4,\)"),
+        (("jolt = ", "jilt = "), r"unrest\.jilt: is not known here"),
+    ):
+        assert change[0] in text
+        path.write_text(text.replace(*change, 1))
+        with pytest.raises(ControllerError, match=said):
+            read_controller(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"sensors": suite("mocap@10"), "rate": 20.0}, r"20 Hz is too slow for the mode -0.872 \+- 9.99j 1/s \(phi"),
+        ({"sensors": suite("imu@70")}, "imu: gives 70 readings per second; the controller's 100 Hz is no whole"),
+        ({"Q": np.eye(3)}, "state weights: are for 3 of 22: x, y, z"),
+        ({"R": [1.0, 2.0]}, "input weights: are for 2 of 4: motor_lower"),
+        ({"allowed": {"q": 0.0}}, "must be above zero"),
+        ({"allowed": {"foo": 1.0}}, "is not a state: foo"),
+        ({"delays": {"rudder": 0.1}}, "rudder: expected motor_lower"),
+        ({"speeds": (0.0, 1.0)}, "a place is held in hover only"),
+    ],
+)
+def test_bad_designs_are_named(options: dict[str, object], said: str) -> None:
+    with pytest.raises(ControllerError, match=said):
+        design(vehicle("coax"), **options)  # type: ignore[arg-type]
+
+
+def test_a_place_that_nothing_sees_cannot_be_held() -> None:
+    unplaced = design(vehicle("coax"), sensors=suite("imu@100"))
+    with pytest.raises(ControllerError, match=r"sensors: no sensor sees x \(mode an integrator\)"):
+        analyse(unplaced)
+
+
+@pytest.mark.parametrize("text", ["radar", "imu@fast", "imu,gyro", "mocap,mocap", "imu@0", "flow+2000ms", ""])
+def test_suites_that_are_none(text: str) -> None:
+    with pytest.raises(ControllerError, match="sensors: "):
+        suite(text)

@@ -1,0 +1,191 @@
+"""Linear models for python-control, MATLAB and ArduPilot's state-space helicopter: what goes out comes back."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.errors import ExportError
+from swashplate.export.ardupilot_state_space import KEYS, Sticks, ardupilot_state_space, assembled, read_ardupilot
+from swashplate.export.control_json import read_control, read_linear
+from swashplate.export.formats import export_model
+from swashplate.export.linear import Linear, of_state_space, of_vehicle
+from swashplate.export.matlab import read_matlab
+from swashplate.models.linear.state_space_file import structure
+
+
+def models() -> list[Linear]:
+    raptor = sp.vehicle("raptor50")
+    coax = sp.vehicle("coax")
+    return [
+        of_vehicle(raptor, sp.trim(raptor, speed=5.0), name="raptor50"),
+        of_vehicle(coax, sp.trim(coax), name="coax"),
+        of_state_space(structure("hybrid"), name="hybrid"),
+    ]
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_json_brings_back_every_bit_name_and_unit(place: int, tmp_path: Path) -> None:
+    from swashplate.export.control_json import control_json
+
+    model = models()[place]
+    path = tmp_path / "model.json"
+    path.write_text(control_json(model))
+    found = read_linear(path)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(found, name), getattr(model, name))
+    for name in ("name", "title", "trust", "states", "inputs", "outputs", "units", "delays", "about"):
+        assert getattr(found, name) == getattr(model, name)
+    system = read_control(path)
+    assert system.state_labels == list(model.states)
+    assert system.input_labels == list(model.inputs)
+    assert system.output_labels == list(model.outputs)
+    np.testing.assert_array_equal(system.A, model.A)
+    assert system.dt == 0
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_what_left_as_mat_comes_back_and_goes_on(place: int, tmp_path: Path) -> None:
+    model = models()[place]
+    export_model(model, "matlab", name=model.name).save(tmp_path)
+    found = read_matlab(tmp_path / f"{model.name}.mat")
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(found, name), getattr(model, name))
+    for name in ("name", "title", "trust", "states", "inputs", "outputs"):
+        assert getattr(found, name) == getattr(model, name)
+    assert {n: u for n, u in found.units.items() if u} == {
+        n: model.units[n] for n in (*model.states, *model.inputs, *model.outputs) if model.units.get(n)
+    }
+    assert all(found.delay(o, i) == model.delay(o, i) for o in model.outputs for i in model.inputs)
+    assert all(found.about.get(name, 0.0) == value for name, value in model.about.items())
+    again, first = (export_model(m, "c", name="same").files["same.c"] for m in (found, model))
+    assert again == first
+
+
+@pytest.mark.parametrize(
+    ("leave", "said"), [("io_delay", "io_delay: is no matrix"), ("state_names", "state_names: is mis")]
+)
+def test_a_mat_file_that_lacks_a_variable_is_told(leave: str, said: str, tmp_path: Path) -> None:
+    from scipy.io import loadmat, savemat
+
+    export_model(models()[2], "matlab", name="hybrid").save(tmp_path)
+    whole = loadmat(tmp_path / "hybrid.mat")
+    savemat(tmp_path / "less.mat", {k: v for k, v in whole.items() if k != leave and not k.startswith("__")})
+    with pytest.raises(ExportError, match=said):
+        read_matlab(tmp_path / "less.mat")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"kind": "pickle"}, "no linear model of kind"),
+        ({"A": [[1.0, 2.0]]}, "A: is no matrix of 10 by 10"),
+        ({"B": [["__import__('os')"] * 4] * 10}, "B: is no matrix"),
+        ({"states": ["a", "a"]}, "states: is missing or is no list of different names"),
+        ({"inputs": None}, "inputs: is missing"),
+        ({"delays": {"lateral": True}}, "delays.lateral: is True"),
+        ({"about": [1]}, "about: is no table"),
+    ],
+)
+def test_a_damaged_file_is_told_by_its_entry(change: dict[str, object], said: str, tmp_path: Path) -> None:
+    made = export_model(structure("hybrid"), "control", name="hybrid")
+    document = json.loads(made.files["hybrid_control.json"]) | change
+    path = tmp_path / "damaged.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(ExportError, match=said):
+        read_linear(path)
+    for text in ("", "[" * 100_000, '{"kind": NaN'):
+        path.write_text(text)
+        with pytest.raises(ExportError):
+            read_linear(path)
+
+
+def test_mat_brings_back_matrices_names_units_delays_and_the_trim() -> None:
+    from scipy.io import loadmat
+
+    (content,) = export_model(structure("hybrid"), "matlab", name="hybrid").files.values()
+    assert content == export_model(structure("hybrid"), "matlab", name="hybrid").files["hybrid.mat"]
+    found = loadmat(io.BytesIO(content), simplify_cells=True)
+    truth = of_state_space(structure("hybrid"), name="hybrid")
+    for name in "ABCD":
+        np.testing.assert_array_equal(found[name], getattr(truth, name))
+    assert list(found["state_names"]) == list(truth.states)
+    assert list(found["input_units"]) == [truth.units[name] for name in truth.inputs]
+    assert found["io_delay"].shape == (len(truth.outputs), len(truth.inputs))
+    assert np.all(found["io_delay"] == 0.02)
+
+    raptor = sp.vehicle("raptor50")
+    trim = sp.trim(raptor, speed=5.0)
+    (content,) = export_model(raptor, "matlab", name="raptor50", trim=trim).files.values()
+    found = loadmat(io.BytesIO(content), simplify_cells=True)
+    np.testing.assert_array_equal(found["state_start"], trim.state)
+    np.testing.assert_array_equal(found["input_start"], trim.inputs)
+    assert str(found["name"]) == "raptor50"
+
+
+def test_ardupilot_holds_the_hybrid_structure_exactly(tmp_path: Path) -> None:
+    truth = structure("hybrid").with_values({"Ncol": -3.0, "Np": 0.0, "Mcol": 0.0, "tau_ped": 0.03})
+    made = export_model(truth, "ardupilot-statespace", name="hybrid")
+    (path,) = made.save(tmp_path)
+    numbers = read_ardupilot(path)
+    assert set(numbers) == set(KEYS)
+    values = truth.numbers()
+    assert numbers["Lb1s"] == pytest.approx(values["Lb"])
+    assert numbers["tf"] == pytest.approx(values["tau_f"])
+    assert numbers["Lfa1s"] == pytest.approx(values["Ba"])
+    assert numbers["time_delay_ped"] == pytest.approx(30.0)
+    assert numbers["Mflg"] == pytest.approx(-values["Alon"])  # its stick is forward positive, ArduPilot's nose up
+    again = assembled(numbers)
+    expected = of_state_space(truth, name="hybrid")
+    both = [np.sort_complex(np.linalg.eigvals(model.A)) for model in (again, expected)]
+    np.testing.assert_allclose(both[0], both[1], atol=1e-9)
+    assert "roll 0.0%, pitch 0.0%, yaw 0.0%" in made.notes[-1]
+
+
+def test_ardupilot_keeps_the_modes_of_a_helicopters_card() -> None:
+    raptor = sp.vehicle("raptor50")
+    trim = sp.trim(raptor)
+    made = export_model(raptor, "ardupilot-statespace", name="raptor50", trim=trim)
+    numbers = json.loads(made.files["raptor50_ardupilot.json"])
+    assert numbers["nominal_rpm"] == pytest.approx(1600, rel=1e-3)
+    assert numbers["hover_lean"] == pytest.approx(np.degrees(trim.states()["phi"]))
+    assert numbers["coll_min"] < numbers["coll_hover"] < numbers["coll_max"]
+    for key in ("Mflg", "Lflt", "Nped", "Lb1s", "Ma1s", "Yb1s"):
+        assert numbers[key] > 0.0, key
+    for key in ("Xa1s", "Zcol", "Nr", "Zw", "Xu", "Yv"):
+        assert numbers[key] < 0.0, key
+    # The unstable hovering oscillation and the rotor's mode.
+    mine, theirs = np.linalg.eigvals(sp.linearize(raptor, trim).A), np.linalg.eigvals(assembled(numbers).A)
+    for value in (complex(0.762, 0.976), complex(-31.3, 9.69)):
+        assert np.min(np.abs(mine - value)) < 0.05
+        assert np.min(np.abs(theirs - value)) < 0.05 * max(1.0, abs(value))
+
+
+def test_a_bar_that_does_not_fit_is_told_of() -> None:
+    made = export_model(structure("thirteen_state"), "ardupilot-statespace", name="thirteen")
+    assert "another aircraft" in made.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [('{"Ma1": 1}', "Ma1"), ('{"tf": "0.1"}', "tf"), ("[1]", "object"), ("", "JSON")]
+)
+def test_ardupilots_reader_names_what_is_wrong(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_text(text)
+    with pytest.raises(ExportError, match=said):
+        read_ardupilot(path)
+
+
+def test_ardupilot_refuses_what_has_no_cyclic_of_a_single_rotor() -> None:
+    with pytest.raises(ExportError, match="swash link ardupilot"):
+        export_model(sp.vehicle("coax"), "ardupilot-statespace", name="coax")
+    with pytest.raises(ExportError, match="single-rotor"):
+        ardupilot_state_space(of_state_space(structure("heave"), name="heave"), Sticks({}))
+    raptor = sp.vehicle("raptor50")
+    with pytest.raises(ExportError, match="about hover"):
+        export_model(raptor, "ardupilot-statespace", name="r", trim=sp.trim(raptor, speed=5.0))

@@ -1,0 +1,230 @@
+"""ArduPilot's DataFlash logs, binary and text: what is read, under which name and unit, and what damage costs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from made_autopilot_logs import ARDUPILOT, CHIRP, Row, ardupilot_rows, dataflash, dataflash_text, fmt
+from swashplate.errors import FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.readers import clocked
+from swashplate.flights.readers.dataflash import messages
+from swashplate.flights.readers.read import read
+
+
+def _flight(folder: Path, content: bytes | str, name: str = "a.bin") -> Flight:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read(path)
+
+
+def test_every_message_becomes_a_stream_at_its_own_rate_in_si(tmp_path: Path) -> None:
+    flight = _flight(tmp_path, dataflash(ardupilot_rows()))
+    assert flight.rate("p") == pytest.approx(50.0)
+    assert flight.rate("phi_slow") == pytest.approx(10.0)
+    assert flight.start == 20.0
+    assert_allclose(flight.values("phi"), np.deg2rad(2.0 * np.sin(flight.time("phi"))), atol=1e-8)
+    assert_allclose(flight.values("psi"), np.pi / 2, rtol=1e-7)
+    assert_allclose(flight.values("p"), np.deg2rad(100.0) * flight.values("mixer_roll"), rtol=1e-6, atol=1e-9)
+    assert_allclose(flight.values("omega_rotor"), 1500.0 * 2.0 * np.pi / 60.0, rtol=1e-6)
+    assert_allclose(flight.values("az"), -9.8, rtol=1e-6)
+    assert_allclose(flight.values("az_imu2"), -10.8, rtol=1e-6)
+    assert_allclose(np.unique(flight.values("rcin_2")), 1.5e-3 + 1e-6 * np.arange(7), rtol=1e-12)
+    assert flight["p_imu"].attrs["units"] == "rad/s"
+    assert flight["mixer_collective"].attrs["units"] == "1"
+
+
+def test_second_opinions_get_a_suffix_and_unused_channels_are_left_out(tmp_path: Path) -> None:
+    flight = _flight(tmp_path, dataflash(ardupilot_rows()))
+    for name in ("phi_slow", "p_imu", "p_imu2", "p_sid", "az_sid", "phi_demand", "p_demand"):
+        assert name in flight
+    assert "rcin_3" not in flight
+    bare = [row for row in ardupilot_rows() if row[0] not in ("ANG", "RATE", "SIDD", "SIDS")]
+    flight = _flight(tmp_path, dataflash(bare))
+    assert "phi" in flight
+    assert "phi_slow" not in flight
+    assert flight.stream_of("p") == "inertial"
+
+
+def test_parameters_events_and_the_sweep_are_kept(tmp_path: Path) -> None:
+    provenance = _flight(tmp_path, dataflash(ardupilot_rows())).provenance
+    assert provenance.vehicle == "ArduCopter V4.7.0-dev (1234abcd), HELI"
+    assert provenance.parameters == {"SID_AXIS": 10.0, "SCHED_LOOP_RATE": 400.0}
+    assert provenance.parameter("SID_AXIS", at=25.0) == 10.0
+    assert provenance.parameter("SID_AXIS") == 11.0
+    assert provenance.parameter("NONE") is None
+    assert [e.text for e in provenance.events if e.kind == "mode"] == ["STABILIZE", "SYSTEMID"]
+    (sweep,) = (event for event in provenance.events if event.kind == "sweep")
+    assert sweep.details["start"] == pytest.approx(22.0, abs=1e-6)
+    assert sweep.details["stop"] == pytest.approx(22.0 + CHIRP.record, abs=1e-3)
+    assert sweep.text == "roll mixer, 0.5-8 Hz in 12 s"
+    assert any("XYZ1" in note for note in provenance.notes)
+    assert provenance.damage == ()
+
+
+def test_the_provenance_survives_a_file(tmp_path: Path) -> None:
+    flight = _flight(tmp_path, dataflash(ardupilot_rows(until=25.0)))
+    loaded = Flight.load(flight.save(tmp_path / "a.nc"))
+    assert loaded.provenance == flight.provenance
+    assert loaded.provenance.damage
+
+
+def test_the_text_log_says_the_same(tmp_path: Path) -> None:
+    rows = ardupilot_rows()
+    binary = _flight(tmp_path, dataflash(rows))
+    text = _flight(tmp_path, dataflash_text(rows), "a.log")
+    assert text.channels == binary.channels
+    for name in binary.channels:
+        rounding = np.deg2rad(0.005) * 1.01 if name.endswith("_slow") else 1e-6  # ATT comes in hundredths of a degree
+        assert_allclose(text.values(name), binary.values(name), rtol=1e-6, atol=rounding, err_msg=name)
+    told = [[(e.time, e.kind, e.text) for e in flight.provenance.events] for flight in (text, binary)]
+    assert told[0] == told[1]
+    assert text.provenance.parameters == binary.provenance.parameters
+
+
+def test_a_text_log_with_torn_lines_and_words_for_modes(tmp_path: Path) -> None:
+    text = dataflash_text(ardupilot_rows()).replace("MODE, 20000000, 0, 0, 2", "MODE, 20000000, STABILIZE, 0, 2")
+    lines = text.split("\n")
+    lines[400] = lines[400][:20]
+    lines[500] = lines[500].replace("0.5", "0.5.5").replace("10.0", "ten")
+    lines[-2] = lines[-2][:5]
+    flight = _flight(tmp_path, "\n".join(lines[:-1]), "a.log")
+    assert any("lines are no whole message" in said for said in flight.provenance.damage)
+    assert "the last line is unfinished: not read" in flight.provenance.notes
+    assert next(e.text for e in flight.provenance.events if e.kind == "mode") == "STABILIZE"
+
+
+def test_an_unfinished_last_message_is_ordinary_but_a_log_that_ends_in_flight_is_cut_off(tmp_path: Path) -> None:
+    whole = dataflash(ardupilot_rows())
+    flight = _flight(tmp_path, whole + dataflash(ardupilot_rows())[-12:-4])
+    assert flight.provenance.damage == ()
+    assert any("unfinished" in note for note in flight.provenance.notes)
+    cut = _flight(tmp_path, whole[: len(whole) // 2])
+    said = " ".join(cut.provenance.damage)
+    assert "the motors armed since 20.00 s" in said
+    assert "the sweep at 22.00 s (roll mixer, 0.5-8 Hz in 12 s) ends after" in said
+    assert "the log is cut off" in said
+    (sweep,) = (event for event in cut.provenance.events if event.kind == "sweep")
+    assert sweep.details["seen"] < sweep.details["stop"]
+
+
+def test_a_sweep_that_the_pilot_stopped_is_not_blamed_on_the_log(tmp_path: Path) -> None:
+    rows = [row for row in ardupilot_rows() if row[0] != "SIDD" or row[1][0] < 26_000_000]
+    (said,) = _flight(tmp_path, dataflash(rows)).provenance.damage
+    assert said.endswith("ends after 4.0 s: it was stopped")
+
+
+def test_damaged_bytes_cost_their_own_messages(tmp_path: Path) -> None:
+    rows = ardupilot_rows()
+    content = bytearray(dataflash(rows))
+    whole = _flight(tmp_path, bytes(content))
+    for at in range(20_000, 20_040):
+        content[at] = 0x55
+    flight = _flight(tmp_path, bytes(content))
+    (said,) = flight.provenance.damage
+    assert "belong to no message (the first at byte" in said
+    lost = sum(whole.time(name).size - flight.time(name).size for name in ("p", "phi", "ax", "az_imu2", "sid_target"))
+    assert 1 <= lost <= 5
+    kept = np.isin(whole.time("p"), flight.time("p"))
+    assert_allclose(whole.values("p")[kept], flight.values("p"))
+
+
+def test_a_damaged_description_costs_only_its_message(tmp_path: Path) -> None:
+    content = bytearray(dataflash(ardupilot_rows()))
+    letters = content.find(b"QBffffff\0")
+    content[letters + 2] = ord("%")
+    flight = _flight(tmp_path, bytes(content))
+    assert "p" in flight
+    assert "az" not in flight or flight.stream_of("az") == "system_identification"
+
+
+def test_lost_blocks_at_the_start_and_erased_flash_at_the_end(tmp_path: Path) -> None:
+    content = dataflash(ardupilot_rows())
+    flight = _flight(tmp_path, b"\0\1\2" + content + b"\xff" * 500)
+    assert flight.time("p").size == 800
+    assert any("unused block" in note for note in flight.provenance.notes)
+
+
+def test_a_clock_that_starts_anew_gives_the_longest_run_and_says_so(tmp_path: Path) -> None:
+    short, long = ardupilot_rows(start=100.0, until=104.0, disarm=False), ardupilot_rows(start=20.0)
+    for rows in (short + long, long + ardupilot_rows(start=3.0, until=6.0, disarm=False)):
+        flight = _flight(tmp_path, dataflash(rows))
+        assert (flight.start, flight.time("p").size) == (20.0, 800)
+        (said,) = flight.provenance.damage
+        assert "the clock starts anew 1 times; only the longest run was read" in said
+
+
+def test_wild_stamps_cost_only_themselves(tmp_path: Path) -> None:
+    rows = ardupilot_rows()
+    rates = [i for i, row in enumerate(rows) if row[0] == "RATE"]
+    for i, wild in zip(rates[100:400:100], (1, 2**62, 10**10), strict=True):
+        rows[i] = ("RATE", (wild, *rows[i][1][1:]))
+    flight = _flight(tmp_path, dataflash(rows))
+    assert flight.time("p").size == 800 - 3
+    assert any("rates: 3 of 800 samples left out" in note for note in flight.provenance.notes)
+    assert flight.provenance.damage == ()
+
+
+def test_numbers_that_are_none_are_left_out_and_counted(tmp_path: Path) -> None:
+    rows = ardupilot_rows()
+    i = [k for k, row in enumerate(rows) if row[0] == "RATE"][7]
+    rows[i] = ("RATE", (*rows[i][1][:2], float("nan"), *rows[i][1][3:]))
+    flight = _flight(tmp_path, dataflash(rows))
+    assert np.isfinite(flight.values("p")).all()
+    assert any("rates: 1 of 800 samples left out because a number" in note for note in flight.provenance.notes)
+
+
+def test_a_log_without_a_flight_and_needless_options_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FlightError, match=r"a\.bin: holds no flight: no known message has two samples"):
+        _flight(tmp_path, dataflash(ardupilot_rows(until=20.0)))
+    (tmp_path / "b.bin").write_bytes(dataflash(ardupilot_rows()))
+    with pytest.raises(FlightError, match="units and mappings have no meaning"):
+        read(tmp_path / "b.bin", units={"p": "deg/s"})
+
+
+def test_a_forged_description_is_not_believed() -> None:
+    bad: list[bytes] = [
+        fmt(50, 200, "LONG", "Qf", "TimeUS,Foo"),
+        fmt(51, 2, "TINY", "B", "A"),
+        fmt(52, 11, "BAD", "Q", "TimeUS,Foo"),
+        fmt(128, 10, "FMT", "Q", "TimeUS"),
+        fmt(ARDUPILOT["RATE"][0], 3, "RATE", "", ""),
+    ]
+    rows: list[Row] = [("RATE", (1_000_000 * k, *range(12))) for k in range(5)]
+    content = dataflash(rows)
+    found = messages(content[:89] + b"".join(bad[:4]) + content[89:] + bad[4])
+    assert set(found.tables) == {"RATE"}
+    assert len(found.tables["RATE"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("times", "kept"),
+    [
+        ([1, 2, 3], [1, 2, 3]),
+        ([1, 9, 2, 3], [1, 2, 3]),
+        ([5, 1, 6, 7], [5, 6, 7]),
+        ([1, 1, 2, 2, 3], [1, 2, 3]),
+        ([], []),
+        ([float("nan"), 1, 2], [1, 2]),
+    ],
+)
+def test_the_longest_increasing_stamps_are_kept(times: list[float], kept: list[float]) -> None:
+    stamps = np.asarray(times, dtype=np.float64)
+    found = stamps[clocked.longest_increasing(stamps)]
+    assert len(found) == len(kept)
+    assert np.all(np.diff(found) > 0)
+
+
+def test_the_autopilots_own_filters_and_a_missing_rate_message_are_said(tmp_path: Path) -> None:
+    rows = ardupilot_rows(until=25.0)
+    corner = ("PARM", (rows[0][1][0], "INS_GYRO_FILTER", 20.0, 20.0))
+    notes = _flight(tmp_path, dataflash([corner, *rows])).provenance.notes
+    # sqrt(2) / (2 pi 20 Hz): the phase of a second-order Butterworth at low frequency.
+    assert any("p q r of rates and inertial have passed INS_GYRO_FILTER, 20 Hz: 11.3 ms" in note for note in notes)
+    assert not any("no RATE message" in note or "INS_ACCEL" in note for note in notes)
+    bare = _flight(tmp_path, dataflash([row for row in rows if row[0] != "RATE"]))
+    assert any("no RATE message" in note and "LOG_BITMASK" in note for note in bare.provenance.notes)

@@ -1,0 +1,123 @@
+"""Rates, attitude, velocities, positions and weight against each other: right logs pass, each wrong one is named."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+
+from conditioning_flights import hover, tracked
+from swashplate.errors import FlightError
+from swashplate.flights.conditioning.condition import condition, replay
+from swashplate.flights.consistency import consistency, refuse_inconsistent
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.inspect import inspect
+from swashplate.flights.schema import ATTITUDE, RATES
+
+DEGREE = 180.0 / np.pi
+
+
+@cache
+def flown(*, heading: bool = True, delay: float = 0.0) -> Flight:
+    """30 s of hover: angles and positions at 50 Hz, gyroscopes and accelerometers at 100 Hz with noise and a delay."""
+    motion, rng = hover(30.0, 4), np.random.default_rng(4)
+    turn = motion.rotation()
+    omega = (turn[:-1].inv() * turn[1:]).as_rotvec() / 1e-3
+    velocity = np.gradient(motion.position, motion.time, axis=0)
+    force = turn.inv().apply(np.gradient(velocity, motion.time, axis=0) - [0.0, 0.0, 9.80665])
+    slow, fast = np.arange(0.5, 29.0, 0.02), np.arange(0.503, 29.0, 0.01)
+
+    def seen(at: np.ndarray, values: np.ndarray, noise: float, late: float = 0.0) -> np.ndarray:
+        return np.interp(at - late, motion.time[: values.size], values) + noise * rng.standard_normal(at.size)
+
+    angles = {n: seen(slow, motion.euler[:, k], 1e-3) for k, n in enumerate(ATTITUDE) if heading or n != "psi"}
+    place = {n: seen(slow, motion.position[:, k], 1e-4) for k, n in enumerate("xyz")}
+    moving = {n: seen(slow, velocity[:, k], 1e-3) for k, n in enumerate(("vx", "vy", "vz"))}
+    inertial = {n: seen(fast, omega[:, k], 0.02, delay) for k, n in enumerate(RATES)}
+    inertial |= {n: seen(fast, force[:, k], 0.05, delay) for k, n in enumerate(("ax", "ay", "az"))}
+    return Flight({"motion": stream(slow, angles | place | moving), "imu": stream(fast, inertial)})
+
+
+def changed(flight: Flight, **channels: np.ndarray) -> Flight:
+    for name, values in channels.items():
+        flight = flight.with_channel(name, values, like=name)
+    return flight
+
+
+@pytest.mark.parametrize("flight", [flown(), flown(heading=False), flown(delay=0.05)], ids=["whole", "-psi", "late"])
+def test_a_right_log_passes(flight: Flight) -> None:
+    assert consistency(flight) == ()
+    refuse_inconsistent(flight)
+
+
+@pytest.mark.parametrize("heading", [True, False])
+@pytest.mark.parametrize("name", ["p", "q"])
+@pytest.mark.parametrize(
+    ("factor", "words", "mend"),
+    [
+        (DEGREE, "looks like deg/s, not rad/s", "--unit {}=deg/s"),
+        (-1.0, "has the other sign", "--unit {}=-rad/s"),
+        (-DEGREE, "looks like deg/s, not rad/s and has the other sign", "--unit {}=-deg/s"),
+        (1.0 / DEGREE, "57.3 times too small", "units of both"),
+    ],
+)
+def test_a_wrong_rate_is_named_with_its_number(heading: bool, name: str, factor: float, words: str, mend: str) -> None:
+    whole = flown(heading=heading)
+    (finding,) = consistency(changed(whole, **{name: factor * whole.values(name)}))
+    assert (finding.channel, finding.decisive) == (name, True)
+    assert words in finding.text
+    number = re.search(r"ratio (\S+) ", finding.text)
+    assert number is not None
+    assert float(number[1]) == pytest.approx(factor, rel=0.05)
+    assert mend.format(name) in finding.mend
+
+
+@pytest.mark.parametrize(("one", "other"), [("p", "q"), ("q", "r"), ("p", "r"), ("vx", "vy")])
+def test_exchanged_axes_are_named(one: str, other: str) -> None:
+    flight = flown()
+    found = consistency(changed(flight, **{one: flight.values(other), other: flight.values(one)}))
+    assert {finding.channel for finding in found} == {one, other}
+    assert all("axes seem to be exchanged" in finding.text for finding in found)
+
+
+def test_velocities_weight_and_angles_are_held_against_the_rest() -> None:
+    flight = flown()
+    for channel, factor, words in (
+        ("vz", -1.0, "has the other sign"),
+        ("vx", 1e3, "looks like mm/s"),
+        ("az", -1.0, "has the other sign"),
+        ("az", 1.0 / 9.80665, "looks like g, not m/s^2"),
+    ):
+        (finding,) = consistency(changed(flight, **{channel: factor * flight.values(channel)}))
+        assert finding.channel == channel
+        assert words in finding.text
+    angles = {name: DEGREE * flight.values(name) for name in ATTITUDE}
+    found = consistency(changed(flight, **angles))
+    assert found[0].channel == "theta"
+    assert "looks like degrees" in found[0].text
+    assert {finding.channel for finding in found} == {"theta"}  # the rest is judged with the angles put right
+
+
+def test_an_axis_that_does_not_move_says_nothing() -> None:
+    flight = flown()
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(flight.time("phi").size)
+    still = changed(flight, phi=noise, p=-0.02 * np.random.default_rng(2).standard_normal(flight.time("p").size))
+    assert consistency(still) == ()
+
+
+def test_inspect_says_it_and_conditioning_refuses_it_or_takes_it_as_told() -> None:
+    flight = changed(flown(), q=-flown().values("q"))
+    assert any(problem.startswith("q: has the other sign") for problem in inspect(flight).problems)
+    with pytest.raises(FlightError, match=r"q: has the other sign.*--unit q=-rad/s"):
+        condition(flight, rate=50)
+    taken = condition(flight, rate=50, check=False, trim_ground=False)
+    refuse_inconsistent(taken)
+    np.testing.assert_array_equal(replay(flight, taken.history).values("q"), taken.values("q"))
+
+
+def test_what_conditioning_derived_is_no_measurement() -> None:
+    made = condition(tracked(hover(20.0, 2), 2), trim_ground=False)
+    flipped = made.with_channel("p", -made.values("p"), like="p")
+    assert consistency(flipped) == ()  # p is attitude's own derivative here: nothing was measured

@@ -1,0 +1,223 @@
+"""Both likelihoods on one short simulated flight: gradients and information against differences, and what they find.
+
+The flight is the one of the end-to-end test: the same shapes, so that output error compiles nothing of its own here.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import swashplate as sp
+from simulated_flights import FREE, TIE, ten_seconds
+from swashplate.errors import IdentificationError
+from swashplate.identification.core import accuracy
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.innovations import innovations, tangents
+from swashplate.identification.time.output_error import WINDOW, OutputError
+from swashplate.identification.time.prediction_error import PredictionError, stack_records
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.validation.calibration import first_part
+
+
+@lru_cache(maxsize=1)
+def _record() -> Record:
+    (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), sp.vehicle("coax"))
+    return record
+
+
+def _start() -> Record:
+    """The first five seconds: enough for slopes and bounds, and half the time."""
+    return first_part(_record(), 5.0)
+
+
+@lru_cache(maxsize=1)
+def _output_error() -> OutputError:
+    return OutputError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_record()])
+
+
+@lru_cache(maxsize=1)
+def _prediction_error() -> PredictionError:
+    return PredictionError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_start()])
+
+
+@pytest.fixture(params=["output error", "prediction error"])
+def likelihood(request: pytest.FixtureRequest) -> OutputError | PredictionError:
+    return _output_error() if request.param == "output error" else _prediction_error()
+
+
+def _somewhere(likelihood: OutputError | PredictionError, seed: int = 1) -> np.ndarray:
+    """A row near the start, away from every symmetry, with its weights taken."""
+    rng = np.random.default_rng(seed)
+    row = likelihood.row.starts() + 0.05 * rng.standard_normal(len(likelihood.row))
+    likelihood.refresh(row)
+    return np.asarray(row)
+
+
+def _picked(likelihood: OutputError | PredictionError) -> np.ndarray:
+    """Some entries of every group."""
+    groups = sorted({entry.group for entry in likelihood.row.entries})
+    return np.concatenate([likelihood.row.places(group)[:: 1 if group == "parameter" else 6] for group in groups])
+
+
+def test_the_gradient_is_the_slope_of_the_cost(likelihood: OutputError | PredictionError) -> None:
+    row = _somewhere(likelihood)
+    cost, gradient, information = likelihood.scores(row)
+    assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
+    size = np.sqrt(np.diag(information))
+    for place in _picked(likelihood):
+        step = np.zeros(row.size)
+        step[place] = 1e-4 / max(size[place], 1e-2)  # a ten-thousandth of its standard deviation
+        slope = (likelihood.cost(row + step) - likelihood.cost(row - step)) / (2.0 * step[place])
+        assert gradient[place] == pytest.approx(slope, rel=1e-3, abs=1e-3 * size[place]), likelihood.row.names[place]
+
+
+def test_derivatives_along_tangent_planes_are_those_of_the_filter() -> None:
+    """The two passes against derivatives that are carried through the equations sample by sample."""
+    likelihood = _prediction_error()
+    row = jnp.asarray(_somewhere(likelihood))
+    likely = (likelihood._plan, likelihood._data)
+    _, _, states = innovations(*likely, row)
+    by_row = tangents(*likely, row, states)
+    direction = jnp.asarray(np.random.default_rng(2).standard_normal(len(likelihood.row)))
+
+    def carried(row: jax.Array) -> object:
+        return jax.jvp(lambda r: innovations(*likely, r)[:2], (row,), (direction,))[1]
+
+    expected = jax.jit(carried, compiler_options=QUICK_TO_COMPILE)(row)
+    for found, exact in zip(by_row, expected, strict=True):
+        np.testing.assert_allclose(
+            jnp.tensordot(direction, found, 1), exact, rtol=1e-9, atol=1e-12 * np.abs(exact).max()
+        )
+
+
+def test_the_information_is_the_curvature_where_the_model_is_true(likelihood: OutputError | PredictionError) -> None:
+    """The Fisher information is the mean of the Hessian: along a few directions they agree as well as noise lets them.
+
+    At the best row, where the residuals are noise; the Hessian by differences of the gradient.
+    """
+    best = _best(likelihood).row
+    likelihood.refresh(best)
+    _, _, information = likelihood.scores(best)
+    for place in likelihood.row.places("parameter"):
+        step = np.zeros(best.size)
+        step[place] = 1e-2 / np.sqrt(information[place, place])
+        high, low = (likelihood.scores(best + side * step)[1] for side in (1.0, -1.0))
+        curvature = (high - low)[place] / (2.0 * step[place])
+        assert information[place, place] == pytest.approx(curvature, rel=0.1), likelihood.row.names[place]
+
+
+_FOUND: dict[int, object] = {}
+
+
+def _best(likelihood: OutputError | PredictionError):  # type: ignore[no-untyped-def]
+    if id(likelihood) not in _FOUND:
+        few = 40 if isinstance(likelihood, OutputError) else 15  # what is left to do is noise that shrinks to nothing
+        _FOUND[id(likelihood)] = minimise(likelihood, iterations=few)
+    return _FOUND[id(likelihood)]
+
+
+def test_both_find_the_truth_within_their_bounds(likelihood: OutputError | PredictionError) -> None:
+    found = _best(likelihood)
+    row = likelihood.row
+    plain = accuracy.covariance(row, found.information, row.prior(found.row)[2])
+    truth = sp.vehicle("coax").card.values()
+    for place in row.places("parameter"):
+        sigma = np.sqrt(plain[place, place]) * row.scale[place]
+        value = found.row[place] * row.scale[place]
+        assert abs(value - truth[row.names[place]]) < 4.0 * sigma, row.names[place]
+        assert sigma < 0.15 * truth[row.names[place]]
+
+
+def test_innovations_at_the_truth_are_as_large_as_promised() -> None:
+    """One-step errors over their own covariance: one on average, channel by channel."""
+    likelihood = _prediction_error()
+    white, sensitivities, _ = likelihood.whitened(_best(likelihood).row)
+    assert len(white) == 1
+    counted = int(likelihood.counted.sum())
+    assert white[0].shape == (counted, 6)
+    assert sensitivities[0].shape == (len(likelihood.row), counted, 6)
+    np.testing.assert_allclose(np.mean(white[0] ** 2, axis=0), 1.0, atol=0.25)
+
+
+def test_output_errors_are_as_large_as_their_covariance_says() -> None:
+    likelihood = _output_error()
+    best = _best(likelihood).row
+    likelihood.refresh(best)
+    residual = np.asarray(likelihood.residuals(best)[0]).reshape(-1, 6)
+    np.testing.assert_allclose(np.sqrt(np.diag(likelihood.covariance)), np.std(residual, axis=0), rtol=0.1)
+    white, _, _ = likelihood.whitened(best)
+    np.testing.assert_allclose(np.mean(np.concatenate(white) ** 2, axis=0), 1.0, atol=0.2)
+
+
+def test_an_outlier_costs_its_distance_and_not_its_square() -> None:
+    likelihood = _output_error()
+    row = _somewhere(likelihood)
+    residual = np.asarray(likelihood.residuals(row)[0])
+    push = np.zeros_like(residual)
+    push[0, 50, 2] = 1000.0 * np.sqrt(likelihood.covariance[2, 2])
+    costs = [likelihood._cost(residual + size * push) for size in (0.0, 1.0, 2.0)]
+    assert costs[2] - costs[1] == pytest.approx(costs[1] - costs[0], rel=0.05)
+
+
+def test_a_model_that_leaves_the_finite_numbers_costs_infinitely_much() -> None:
+    for likelihood in (_output_error(), _prediction_error()):
+        row = _somewhere(likelihood)
+        row[likelihood.row.places("parameter")[0]] = -1e-4  # a negative time constant: it explodes at once
+        assert likelihood.cost(row) == np.inf
+
+
+def test_windows_start_where_they_should_and_share_nothing_but_the_record() -> None:
+    likelihood = _output_error()
+    length = round(WINDOW * 100.0)
+    assert likelihood.places() == [(0, first) for first in range(0, 1001 - length, length)]
+    last = len(likelihood.places()) - 1
+    names = likelihood.row.names
+    assert names[:2] == ("tau_f_upper", "linkage_lower")
+    assert f"x at window {last}" in names
+    assert last > 0
+    _, sensitivities, _ = likelihood.whitened(_somewhere(likelihood))
+    for window, sensitivity in enumerate(sensitivities):
+        seen = {names[i] for i in np.flatnonzero(sensitivity.any(axis=(1, 2)))}
+        assert {name for name in seen if " at window " in name} <= {n for n in names if n.endswith(f"window {window}")}
+
+
+def test_a_record_shorter_than_a_window_is_refused() -> None:
+    with pytest.raises(IdentificationError, match=r"longest record has 10\.0 s, expected more than one"):
+        OutputError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [_record()], window=20.0)
+
+
+def test_records_of_different_lengths_stand_side_by_side() -> None:
+    one = _record()
+    short = Record(
+        one.name, one.time[:300], one.inputs[:300], one.outputs[:300], one.voltage[:300], one.output_names, True
+    )
+    stacked = stack_records([one, short])
+    assert stacked["outputs"].shape == (2, 1024, 6)
+    assert stacked["mask"].sum(axis=1).tolist() == [one.time.size, 300]
+    np.testing.assert_array_equal(stacked["inputs"][1, 299:], np.tile(one.inputs[299], (1024 - 299, 1)))
+
+
+def test_the_first_seconds_of_a_filter_are_not_counted() -> None:
+    counted = _prediction_error().counted[0]
+    assert not counted[:150].any()
+    assert counted[150:501].all()
+    assert not counted[501:].any()
+
+
+def test_innovations_turn_back_into_the_room() -> None:
+    """Their horizontal part is in heading axes; a nose to the east makes forward east."""
+    likelihood, record = _prediction_error(), _start()
+    outputs = record.outputs.copy()
+    outputs[:, 5] = np.pi / 2.0
+    east = Record(record.name, record.time, record.inputs, outputs, record.voltage, record.output_names, True)
+    ahead = np.tile([1.0, 0.0, 0.3, 0.1, 0.2, 0.3], (record.time.size, 1))
+    np.testing.assert_allclose(
+        likelihood.unturned(ahead, east), np.tile([0.0, 1.0, 0.3, 0.1, 0.2, 0.3], (record.time.size, 1)), atol=1e-15
+    )

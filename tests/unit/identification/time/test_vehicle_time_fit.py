@@ -1,0 +1,44 @@
+"""Any vehicle's equations fitted in time: against the linear route, and what is said where it cannot be done."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hfb320 import OUTPUTS, START, flight, hfb320
+from rolling import SAME, TRUTH, gusty, rolling
+from swashplate.errors import IdentificationError
+from swashplate.identification.time.linear_time_fit import fit_in_time
+from swashplate.identification.time.vehicle_time_fit import fit_vehicle
+from swashplate.models.linear.state_space_file import parse
+
+
+def test_a_linear_vehicle_is_fitted_as_the_linear_model() -> None:
+    """Runge-Kutta steps, series and forward derivatives against matrix exponentials and complex steps."""
+    flown, outputs = gusty(), ("p", "pdot", "ay")
+    found = fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=outputs, biases=["ay"])
+    other = fit_in_time(parse(SAME), flown, method="filter-error", shifts=False, biases=["ay"])
+    assert found.converged
+    assert other.converged
+    assert found.history[-1] == pytest.approx(other.history[-1], abs=0.05)
+    for name, value in TRUTH.items():
+        assert found[name].value == pytest.approx(other[name].value, abs=0.01 * other[name].sigma)
+        assert found[name].sigma == pytest.approx(other[name].sigma, rel=1e-3)
+        assert abs(found[name].value - value) < 3.0 * found[name].sigma
+    entry = found.model.card.parameters["tau"]
+    assert (entry.value, entry.status) == (found["tau"].value, "identified")
+    assert found.to_document()["estimates"][0]["name"] == "Lb"
+
+
+def test_what_cannot_be_fitted_is_said() -> None:
+    n = 100
+    columns = {name: np.linspace(1.0, 2.0, n) for name in ("elevator", "thrust", *OUTPUTS, "beta")}
+    flown = flight(columns)
+    with pytest.raises(IdentificationError, match="is no method"):
+        fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, method="magic")
+    with pytest.raises(IdentificationError, match="does not foretell it"):
+        fit_vehicle(hfb320(), flown, free=list(START), outputs=("V", "beta"))
+    with pytest.raises(IdentificationError, match="is none of the outputs"):
+        fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, biases=["ay"])
+    with pytest.raises(IdentificationError, match="has no such parameter"):
+        fit_vehicle(hfb320(), flown, free=["CYb"], outputs=OUTPUTS)

@@ -1,0 +1,454 @@
+"""The live page's server: who may ask, what may be said, and that nothing said breaks it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import random
+import shutil
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate import progress_lines
+from swashplate.errors import SwashError
+
+pytest.importorskip("starlette", reason="the extra `live` is not installed")
+
+import httpx
+import uvicorn
+import websockets
+from websockets.sync.client import connect
+
+from swashplate.links.live import connections, identifying, server
+from swashplate.links.live.identifying import busiest, commands
+from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
+from swashplate.links.live.session import LiveSession
+
+VALID: list[dict[str, Any]] = [
+    {"type": "stick", "roll": 0, "pitch": 0.5, "yaw": -1, "heave": 1.0, "number": 3},
+    {"type": "mode", "value": "position"},
+    {"type": "decoupled", "value": False},
+    {"type": "ghost", "value": True},
+    {"type": "bar", "value": True},
+    {"type": "wind", "north": 1, "east": -2.5, "down": 0},
+    {"type": "gusts", "value": 0.5},
+    {"type": "voltage", "value": 11.5},
+    {"type": "maneuver", "kind": "3211", "axis": "roll", "size": 1},
+    {"type": "pause", "value": True},
+    {"type": "step"},
+    {"type": "speed", "value": 0.25},
+    {"type": "reset"},
+    {"type": "record", "value": True},
+    {"type": "identify", "recording": 1, "how": "model"},
+    {"type": "stop_identifying"},
+]
+
+
+@pytest.mark.parametrize("message", VALID, ids=lambda m: m["type"])
+def test_what_the_page_says_is_understood(message: dict[str, Any]) -> None:
+    assert parse(json.dumps(message)) == message
+
+
+def test_every_type_is_tried() -> None:
+    assert {message["type"] for message in VALID} == set(SCHEMA)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "null",
+        '"stick"',
+        "{}",
+        '{"type": 3}',
+        '{"type": "exec", "value": "1"}',
+        '{"type": "pause"}',
+        '{"type": "pause", "value": 1}',
+        '{"type": "pause", "value": true, "also": 1}',
+        '{"type": "gusts", "value": NaN}',
+        '{"type": "gusts", "value": 1e999}',
+        '{"type": "gusts", "value": true}',
+        '{"type": "speed", "value": 0}',
+        '{"type": "mode", "value": ["raw"]}',
+        '{"type": "identify", "recording": "../1", "how": "model"}',
+        '{"type": "identify", "recording": 1.0, "how": "model"}',
+        '{"type": "identify", "recording": 1, "how": "rm"}',
+        "[" * 1500,
+        '{"type": "step"}' + " " * LONGEST,
+    ],
+)
+def test_what_the_schema_does_not_allow_is_refused(text: str) -> None:
+    with pytest.raises(MessageError):
+        parse(text)
+
+
+def test_mutated_messages_raise_nothing_else() -> None:
+    chance, refused = random.Random(5), 0
+    for _ in range(20_000):
+        text = list(json.dumps(chance.choice(VALID)))
+        for _ in range(chance.randint(1, 6)):
+            place = chance.randrange(len(text))
+            text[place : place + chance.randint(0, 3)] = chr(chance.choice([chance.randint(0, 255), 0x1F600, 0xD800]))
+        try:
+            message = parse("".join(text))
+        except MessageError:
+            refused += 1
+        else:
+            assert message.keys() == {"type", *SCHEMA[message["type"]]}
+    assert refused > 15_000
+
+
+# ---- a server that runs ----------------------------------------------------------------------------------------------
+class Running:
+    """A served session with its address."""
+
+    def __init__(self, folder: Path) -> None:
+        self.session = LiveSession(sp.vehicle("coax"), controller=None, folder=folder)
+        self.session.clock.start()
+        self.listening = server.listen("127.0.0.1", 0, allow_remote=False)
+        self.url = server.address_of(self.listening)
+        self.host = self.url.removeprefix("http://").rstrip("/")
+        self.server = uvicorn.Server(server.configured(server.live_app(self.session)))
+        self.thread = threading.Thread(target=lambda: asyncio.run(self.server.serve(sockets=[self.listening])))
+        self.thread.start()
+
+    def socket(self, origin: str | None = None) -> Any:
+        return connect(f"ws://{self.host}/socket", origin=origin or f"http://{self.host}")  # type: ignore[arg-type]
+
+    def close(self) -> None:
+        self.server.should_exit = True
+        self.thread.join(timeout=10.0)
+        self.session.close()
+        self.listening.close()
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    made = Running(tmp_path_factory.mktemp("live"))
+    yield made
+    made.close()
+
+
+def moments(page: Any, until: Any, *, most: int = 300) -> dict[str, Any]:
+    """The first moment of which something is true."""
+    for _ in range(most):
+        moment = json.loads(page.recv(timeout=5.0))
+        if moment["type"] == "moment" and until(moment):
+            return moment
+    raise AssertionError("never came")
+
+
+def test_a_page_is_greeted_and_told_what_flies(running: Running) -> None:
+    with running.socket() as page:
+        hello = json.loads(page.recv(timeout=5.0))
+        assert hello["type"] == "hello"
+        assert [entry["name"] for entry in hello["inputs"]] == list(running.session.world.vehicle.input_names)
+        begin = time.monotonic()
+        first = moments(page, lambda m: True)
+        last = moments(page, lambda m: m["t"] >= first["t"] + 1.0)
+        assert last["steps"] > first["steps"]
+        assert time.monotonic() - begin < 4.0
+
+
+def test_sticks_fly_and_a_lost_page_lets_them_go(running: Running) -> None:
+    with running.socket() as page:
+        page.send(json.dumps({"type": "stick", "roll": 0, "pitch": 0.4, "yaw": 0, "heave": 0, "number": 41}))
+        begun = moments(page, lambda m: m["stick"] == 41)
+        assert moments(page, lambda m: m["own"]["x"][0] > begun["own"]["x"][0] + 0.1)["own"]["x"][3] > 0.1
+    for _ in range(100):
+        if not running.session.clock.runs:
+            break
+        time.sleep(0.02)
+    assert not running.session.clock.runs, "time stands still while nobody looks"
+    assert set(running.session.world.setting.sticks.values()) == {0.0}
+
+
+def test_refused_messages_are_logged_once_and_end_the_connection(
+    running: Running, caplog: pytest.LogCaptureFixture
+) -> None:
+    before = running.session.world.setting
+    with caplog.at_level(logging.WARNING, logger="swashplate.live"), running.socket() as page:
+        for _ in range(server.MOST_BAD + 1):
+            page.send('{"type": "nonsense"}')
+        with pytest.raises(websockets.ConnectionClosed) as closed:
+            moments(page, lambda m: False)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+    assert [record.getMessage() for record in caplog.records] == ["A page's message was refused: unknown type."]
+    assert running.session.world.setting == before
+
+
+def test_recording_pausing_and_what_cannot_be_done(running: Running) -> None:
+    with running.socket() as page:
+        page.send(json.dumps({"type": "identify", "recording": 99, "how": "model"}))
+        assert moments(page, lambda m: m["notice"])["notice"] == "There is no recording 99."
+        page.send(json.dumps({"type": "record", "value": True}))
+        moments(page, lambda m: (m["recording"] or 0.0) > 2.2)
+        page.send(json.dumps({"type": "record", "value": False}))
+        number, seconds = moments(page, lambda m: m["recordings"])["recordings"][-1]
+        assert seconds > 2.0
+        assert (running.session.folder / f"recording-{number}.nc").is_file()
+        page.send(json.dumps({"type": "pause", "value": True}))
+        still = moments(page, lambda m: not m["runs"])
+        page.send(json.dumps({"type": "step"}))
+        later = moments(page, lambda m: m["t"] > still["t"])
+        assert later["t"] - still["t"] < 0.1
+        page.send(json.dumps({"type": "pause", "value": False}))
+        moments(page, lambda m: m["runs"])
+
+
+def test_what_a_recording_is_identified_with(tmp_path: Path) -> None:
+    raptor, coax = sp.vehicle("raptor50"), sp.vehicle("coax")
+    first, second = commands(raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")
+    assert first[3] == "identify"
+    cheap = ["--flight", str(tmp_path / "f.nc"), "--free", "rotor", "--method", "output-error", "--rate", "50"]
+    assert first[-8:] == cheap
+    (windowed, _) = commands(
+        raptor, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", window=(12.5, 32.5)
+    )
+    assert f"{tmp_path / 'f.nc'}@12.5-32.5" in windowed
+    assert second[3:5] == ["respond", str(tmp_path / "f.nc")]
+    assert "throttle" not in " ".join(second)
+    assert len(commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out")) == 2
+    (only,) = commands(coax, tmp_path / "f.nc", card=tmp_path / "c.toml", out=tmp_path / "out", how="responses")
+    assert only[3] == "respond"
+
+
+@pytest.mark.parametrize(
+    ("ways", "state", "words"),
+    [
+        (["exit 3", "touch out/report.html"], "done", "No model could be fitted to it"),
+        (
+            ["touch out/report.html; echo 'The fit failed: wide.' >&2; exit 2", "exit 9"],
+            "done",
+            "The fit failed: wide.",
+        ),
+        (["echo first >&2; exit 2", "echo second >&2; exit 2"], "failed", "second"),
+        (["touch out/report.html"], "done", ""),
+    ],
+)
+def test_the_second_way_is_taken_where_the_first_leaves_no_report(
+    ways: list[str], state: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "out").mkdir()
+    chosen = tuple(["sh", "-c", f"cd {tmp_path}; {way}"] for way in ways)
+    monkeypatch.setattr(identifying, "commands", lambda *_, **__: chosen)
+    monkeypatch.setattr(identifying.Identifying, "out", lambda self, number: tmp_path / "out")
+    job = identifying.Identifying(tmp_path)
+    asyncio.run(job.run(sp.vehicle("raptor50"), 1))
+    assert job.job is not None
+    assert job.job.state == state
+    assert job.job.words.startswith(words)
+    assert bool(job.job.words) == bool(words)
+
+
+def test_a_long_recording_is_identified_from_where_its_sticks_move() -> None:
+    inputs = np.zeros((6000, 3))  # a minute
+    inputs[3500:4500, 0] = 0.1 * np.sign(np.sin(0.1 * np.arange(1000)))
+    inputs[:, 1] = 1e-6 * np.sin(np.arange(6000))
+    window = busiest(inputs, period=0.01, seconds=20.0)
+    assert window is not None
+    assert window[1] - window[0] == pytest.approx(20.0)
+    assert window[0] <= 35.0
+    assert window[1] >= 45.0
+    assert busiest(inputs[:2000], period=0.01, seconds=20.0) is None
+
+
+def test_an_identification_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = [progress_lines.line(progress_lines.Told("fitting", k, 60)) for k in (1, 2, 3)]
+    script = "; sleep 0.2; ".join(f"echo '{line}' >&2" for line in said)
+    held = f"echo other words >&2; {script}; touch {tmp_path}/seen; sleep 0.5; exit 2"
+    monkeypatch.setattr(identifying, "commands", lambda *_, **__: (["sh", "-c", held],))
+    job = identifying.Identifying(tmp_path)
+
+    async def watched() -> identifying.Job:
+        task = asyncio.create_task(job.run(sp.vehicle("raptor50"), 1))
+        while not (tmp_path / "seen").exists():
+            await asyncio.sleep(0.02)
+        await asyncio.sleep(0.2)
+        assert job.job is not None
+        told = job.job
+        await task
+        return told
+
+    told = asyncio.run(watched())
+    assert told.doing == "fitting"
+    assert told.share == pytest.approx(3 / identifying.USUAL)
+    assert told.left is not None
+    assert 0.5 * 0.2 * 22 < told.left < 5.0 * 0.2 * 22
+    assert job.job is not None
+    assert job.job.words == "other words", "progress is no part of what went wrong"
+
+
+def test_lines_of_progress_are_read_back_and_others_are_left() -> None:
+    told = progress_lines.Told("fitting", 3, 60)
+    assert progress_lines.parse(progress_lines.line(told)) == told
+    assert progress_lines.parse(progress_lines.line(told._replace(total=None))) == told._replace(total=None)
+    for text in ("", "fitting", "swash-progress", "swash-progress {", 'swash-progress ["a"]', "swash-progress 3"):
+        assert progress_lines.parse(text) is None
+
+
+def test_the_bar_comes_off_and_everything_else_stays(running: Running) -> None:
+    with running.socket() as page:
+        for message in ({"type": "mode", "value": "velocity"}, {"type": "bar", "value": False}):
+            page.send(json.dumps(message))
+        off = moments(page, lambda m: not m["setting"]["bar"], most=3000)
+        assert off["setting"]["mode"] == "velocity"
+        assert off["own"]["bar"] is None
+        page.send(json.dumps({"type": "bar", "value": True}))
+        assert moments(page, lambda m: m["setting"]["bar"], most=3000)["version"] == off["version"] + 1
+
+
+def test_a_message_that_fails_is_told_to_the_pilot(running: Running) -> None:
+    with running.socket() as page:
+        page.send(json.dumps({"type": "record", "value": True}))
+        moments(page, lambda m: m["recording"] is not None)
+        page.send(json.dumps({"type": "record", "value": False}))
+        assert "expected at least 2 s" in moments(page, lambda m: m["notice"])["notice"]
+
+
+def test_other_pages_and_other_names_are_refused(running: Running) -> None:
+    port = running.host.rpartition(":")[2]
+    assert httpx.get(running.url).status_code == 200
+    assert "default-src 'self'" in httpx.get(running.url).headers["content-security-policy"]
+    assert httpx.get(running.url, headers={"host": f"localhost:{port}"}).status_code == 200
+    for host in ("evil.example", f"evil.example:{port}", "", "127.0.0.1.evil.example", "[::1", "10.0.0.7"):
+        assert httpx.get(running.url, headers={"host": host}).status_code in (400, 403)
+    assert httpx.get(running.url, headers={"origin": "http://evil.example"}).status_code == 403
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{int(port) + 1}", "file://"):
+        with pytest.raises(websockets.InvalidStatus), running.socket(origin):
+            pass
+
+
+def test_only_reports_and_the_page_are_served(running: Running) -> None:
+    for path in ("report/1", "report/-1", "report/x", "page/../server.py", "page/%2e%2e/server.py", "recording-1.nc"):
+        assert httpx.get(running.url + path).status_code == 404
+
+
+def test_a_name_of_this_machine_serves_others_only_when_asked_to() -> None:
+    guard, open_guard = (server.Guard(None, remote=remote) for remote in (False, True))  # type: ignore[arg-type]
+    assert not guard._ours("192.168.1.5:8017")
+    assert open_guard._ours("192.168.1.5:8017")
+    assert open_guard._ours(f"{socket.gethostname().lower()}:8017")
+    assert not open_guard._ours("rebound.example:8017")
+
+
+def test_listening_beyond_this_machine_must_be_meant() -> None:
+    with pytest.raises(SwashError, match=r"can be reached from other machines.*--allow-remote"):
+        server.listen("0.0.0.0", 0, allow_remote=False)
+    made = server.listen("0.0.0.0", 0, allow_remote=True)
+    assert server.address_of(made).startswith("http://127.0.0.1:")
+    made.close()
+
+
+def test_a_port_in_use_and_an_unknown_host_are_told() -> None:
+    taken = server.listen("127.0.0.1", 0, allow_remote=False)
+    with pytest.raises(SwashError, match="--port 0 takes any free port"):
+        server.listen("127.0.0.1", taken.getsockname()[1], allow_remote=False)
+    taken.close()
+    with pytest.raises(SwashError, match="no address of this machine"):
+        server.listen("no such host", 0, allow_remote=False)
+
+
+@pytest.mark.parametrize(
+    "begin", [b"", b"GET / HTTP/1.1\r\nHost: ", b"POST / HTTP/1.1\r\nHost: {}\r\ncontent-length: 9\r\n\r\nx"]
+)
+def test_a_request_that_is_never_complete_ends_in_time(
+    running: Running, monkeypatch: pytest.MonkeyPatch, begin: bytes
+) -> None:
+    monkeypatch.setattr(connections, "IN_TIME", 0.5)
+    host, port = running.host.split(":")
+    with socket.create_connection((host, int(port)), timeout=5.0) as half:
+        half.sendall(begin.replace(b"{}", running.host.encode()))
+        begun = time.monotonic()
+        closed = False
+        for _ in range(20):  # trickled bytes buy no time
+            half.settimeout(0.1)
+            try:
+                while not closed:
+                    closed = half.recv(4096) == b""
+            except TimeoutError:
+                if begin:
+                    half.sendall(b"x")
+            except ConnectionError:
+                closed = True
+            if closed:
+                break
+        assert closed
+        assert 0.4 < time.monotonic() - begun < 1.5
+
+
+def test_a_connection_that_has_asked_is_not_cut(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "IN_TIME", 0.3)
+    with running.socket() as page, httpx.Client() as client:
+        begun = time.monotonic()
+        assert client.get(running.url).status_code == 200
+        while time.monotonic() - begun < 1.0:
+            page.recv(timeout=5.0)
+        assert client.get(running.url).status_code == 200
+
+
+def test_half_open_connections_neither_pile_up_nor_keep_a_page_out(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "MOST_WAITING", 8)
+    host, port = running.host.split(":")
+    half = [socket.create_connection((host, int(port)), timeout=5.0) for _ in range(40)]
+    try:
+        assert httpx.get(running.url).status_code == 200
+        assert len(connections.Punctual._waiting) <= 8
+        with contextlib.suppress(ConnectionError):
+            assert half[0].recv(1) == b"", "the oldest is let go"
+    finally:
+        for each in half:
+            each.close()
+
+
+def test_a_frame_that_is_no_text_is_one_line_in_the_log(running: Running, caplog: pytest.LogCaptureFixture) -> None:
+
+    with caplog.at_level(logging.WARNING, logger="uvicorn.error"):
+        for _ in range(2):
+            with running.socket() as page:
+                page.recv(timeout=5.0)
+                with page.send_context():
+                    page.protocol.send_text(b"\xff\xfe{", fin=True)
+                with pytest.raises(websockets.ConnectionClosed) as closed:
+                    moments(page, lambda m: False)
+                assert closed.value.rcvd is not None
+                assert closed.value.rcvd.code == 1007
+    told = [record for record in caplog.records if "UTF-8" in record.getMessage()]
+    assert [record.getMessage() for record in told] == ["A page's message was refused: it is no UTF-8."]
+    assert all(record.exc_info is None for record in caplog.records)
+
+
+def test_a_library_that_was_changed_is_not_served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not (server.PAGE / "vendor" / "three.module.min.js").is_file():
+        pytest.skip("the page's libraries are not here: python scripts/vendor_page.py")
+    server.check_page()
+    shutil.copytree(server.PAGE, tmp_path / "page")
+    monkeypatch.setattr(server, "PAGE", tmp_path / "page")
+    server.check_page()
+    for name in server.LIBRARIES:
+        file = tmp_path / "page" / "vendor" / name
+        content = file.read_bytes()
+        file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+        with pytest.raises(SwashError, match=f"{name}: not the library that was pinned"):
+            server.check_page()
+        file.write_bytes(content)
+
+
+def test_a_checkout_without_the_libraries_says_what_to_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PAGE", tmp_path)
+    with pytest.raises(SwashError, match=r"python scripts/vendor_page\.py"):
+        server.check_page()

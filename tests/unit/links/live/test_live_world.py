@@ -1,0 +1,287 @@
+"""What is flown on the live page: the same equations as offline, sticks that mean what they say, recordings, time."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import swashplate as sp
+from flown_by_hand import U, X, Y, Z, fly, fresh, holds_what_is_held, moves_its_way
+from swashplate.control.laws.linear_decoupling import static_decoupling
+from swashplate.errors import ControllerError, FlightError
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.links.live.axes import STICKS
+from swashplate.links.live.clock import Clock
+from swashplate.links.live.picture import picture, pose_of
+from swashplate.links.live.pilots import MODES
+from swashplate.links.live.priority import come_first
+from swashplate.links.live.recording import save_recording
+from swashplate.links.live.world import World
+from swashplate.models.card import packaged_cards
+from swashplate.simulation.wind import Gusts, Turbulence, dryden
+
+
+@pytest.fixture(scope="module", params=["coax", "raptor50"])
+def world(request: pytest.FixtureRequest) -> World:
+    return World(sp.vehicle(request.param))
+
+
+@pytest.fixture(scope="module")
+def coax() -> World:
+    return World(sp.vehicle("coax"))
+
+
+def test_flies_as_the_offline_closed_loop(coax: World) -> None:
+    fresh(coax, "held")
+    found = [fly(coax, 0.01, pitch=0.3).copy() for _ in range(300)]
+    controller = sp.autopilot(coax.vehicle, coax.trim, mode="manual")
+    flown = sp.simulate_closed_loop(
+        coax.vehicle, controller, duration=3.0, reference={"pitch": 0.15}, start=coax.trim, rate=500.0
+    )
+    expected = flown.array(coax.vehicle.state_names)[5::5]
+    assert np.max(np.abs(np.array(found) - expected)) < 1e-9
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("axis", STICKS)
+def test_a_stick_moves_the_aircraft_its_way(world: World, mode: str, axis: str) -> None:
+    moves_its_way(world, mode, axis)
+
+
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_what_is_held_is_held(world: World, mode: str) -> None:
+    holds_what_is_held(world, mode)
+
+
+def test_velocity_mode_flies_the_speed_that_the_stick_asks_for(coax: World) -> None:
+    fresh(coax, "velocity")
+    assert fly(coax, 12.0, pitch=0.8)[U] == pytest.approx(0.8 * coax.pilot.speed, abs=0.1)
+
+
+def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(coax: World) -> None:
+    fresh(coax, "held", ghost=True)
+    own = fly(coax, 4.0, pitch=0.4).copy()
+    ghost = coax.moment().crafts["ghost"][0].copy()
+    fresh(coax, "held")
+    coax.setting.decoupled = False
+    alone = fly(coax, 4.0, pitch=0.4)
+    assert np.max(np.abs(ghost - alone)) < 1e-12
+    # Fankhauser et al., Fig. 10: without the decoupling the path bends away.
+    assert abs(ghost[Y] - own[Y]) > 0.3
+    assert own[X] > 3.0
+
+
+def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> None:
+    for name in ("raptor50", "lynx"):  # rotors of both senses
+        world = World(sp.vehicle(name, in_plane="blade-element"))
+        mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
+        model = sp.linearize(world.vehicle, world.trim)
+        matrix = static_decoupling(
+            model.to_control(), inputs=["A1", "B1", "theta0T", "theta0"], outputs=["p", "q", "r", "w"]
+        ).matrix
+        rows = [world.vehicle.input_names.index(entry) for entry in ("A1", "B1", "theta0T", "theta0")]
+        shares = np.linalg.solve(matrix, mixing[rows])
+        assert np.allclose(shares, np.diag(np.diag(shares)), atol=1e-12)
+        # Nose right and up, whatever the rotor's sense.
+        B = model.B[[world.vehicle.index("r"), world.vehicle.index("w")]] @ mixing[:, 2:]
+        assert B[0, 0] > 0.0
+        assert B[1, 1] < 0.0
+
+
+def test_axes_that_first_derivatives_do_not_tell_apart_are_decoupled_a_moment_later() -> None:
+    """With the thrust perpendicular to the disc collective pitches at once and the cyclic does not: half a second."""
+    world = World(sp.vehicle("lynx"))
+    mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
+    model = sp.linearize(world.vehicle, world.trim)
+    n, m = model.B.shape
+    step = scipy.linalg.expm(0.5 * np.block([[model.A, model.B], [np.zeros((m, n + m))]]))[:n, n:]
+    moved = step[[world.vehicle.index(name) for name in ("phi", "theta", "psi", "z")]] @ mixing
+    assert np.allclose(moved, np.diag(np.diag(moved)), atol=1e-9 * np.abs(moved).max())
+    assert (np.sign(np.diag(moved)) == [1.0, -1.0, 1.0, -1.0]).all()
+
+
+def test_modes_change_in_flight_without_a_jump(coax: World) -> None:
+    fresh(coax, "held")
+    fly(coax, 2.0, pitch=0.3)
+    for mode in ("position", "velocity", "held"):
+        before = coax.moment().crafts["own"][0].copy()
+        coax.set_mode(mode)  # type: ignore[arg-type]
+        after = fly(coax, coax.period)
+        assert np.max(np.abs(after[:3] - before[:3])) < 0.05
+    coax.set_mode("position")
+    there = coax.moment().crafts["own"][0][:2].copy()
+    assert np.hypot(*(fly(coax, 15.0)[:2] - there)) < 0.3
+
+
+def test_the_ground_ends_a_flight_and_reset_begins_another(coax: World) -> None:
+    fresh(coax, "raw")
+    fly(coax, 5.0, heave=-1.0)
+    assert coax.trouble.startswith("Touched the ground at")
+    ticks, state = coax.ticks, coax.moment().crafts["own"][0].copy()
+    assert np.array_equal(fly(coax, 0.5), state)
+    assert coax.ticks == ticks
+    coax.reset()
+    assert not coax.trouble
+    assert fly(coax, 0.1)[Z] == pytest.approx(-coax.start_height, abs=1e-3)
+
+
+def test_wind_gusts_and_voltage_reach_the_aircraft(coax: World) -> None:
+    calm = fly(fresh(coax, "held"), 2.0).copy()
+    fresh(coax, "held")
+    coax.setting.wind = (0.0, 2.0, 0.0)
+    assert fly(coax, 2.0)[Y] > calm[Y] + 0.05
+    fresh(coax, "held")
+    coax.set_gusts(1.0)
+    assert np.hypot(*(fly(coax, 2.0)[:2] - calm[:2])) > 0.005
+    fresh(coax, "raw")
+    coax.setting.voltage = 11.0
+    assert fly(coax, 1.0)[Z] > calm[Z] + 0.05, "an emptier battery lifts less"
+    coax.setting.voltage = coax.nominal_voltage or 0.0
+
+
+def test_turbulence_one_by_one_is_that_of_the_series() -> None:
+    gusts = Gusts((1.0, 1.0, 0.6), (5.0, 5.0, 5.0), 2.0)
+    source = Turbulence(gusts, rate=20.0, seed=1)
+    found = np.array([source.sample() for _ in range(20_000)])
+    series = dryden(gusts, samples=20_000, rate=20.0, seed=2)
+    assert np.std(found, axis=0) == pytest.approx([1.0, 1.0, 0.6], rel=0.15)
+    for i, name in enumerate(("wind_north", "wind_east", "wind_down")):
+        own, other = (np.corrcoef(wind[1:], wind[:-1])[0, 1] for wind in (found[:, i], series[name][:, 0]))
+        assert own == pytest.approx(other, abs=0.01)
+
+
+def test_a_maneuver_is_added_to_the_inputs_and_ends(coax: World) -> None:
+    fresh(coax, "held")
+    coax.fly_maneuver(Maneuver("doublet", ("roll",), 0.4, 0.1))
+    assert coax.maneuver_left == pytest.approx(0.4)
+    coax.step()
+    assert coax.moment().crafts["own"][1][2] == pytest.approx(coax.trim.inputs[2] + 0.1, abs=0.02)
+    fly(coax, 0.5)
+    assert coax.maneuver_left == 0.0
+
+
+def test_a_recording_is_a_flight(world: World, tmp_path: Path) -> None:
+    fresh(world, "position")
+    world.rows = []
+    fly(world, 3.0, pitch=0.3)
+    rows, world.rows = world.rows, None
+    (tmp_path / "identified-6").mkdir()  # of an earlier session
+    for number in range(1, 6):
+        (tmp_path / f"recording-{number}.nc").write_text("mine")
+    number, path = save_recording(world.vehicle, rows, period=world.period, folder=tmp_path)
+    assert (number, path) == (7, tmp_path / "recording-7.nc")
+    truth, log = Flight.load(tmp_path / "recording-7-truth.nc"), Flight.load(path)
+    names = (*world.vehicle.state_names, *world.vehicle.input_names)
+    assert np.array_equal(truth.array(names), np.array(rows)[:, : len(names)])
+    assert truth.rate("x") == pytest.approx(100.0)
+    assert truth.provenance.simulated
+    assert set(log.streams) >= {"motion", "inputs"}
+    again = sp.simulate(
+        world.vehicle,
+        {name: truth.values(name) for name in world.vehicle.input_names},
+        start=dict(zip(world.vehicle.state_names, rows[0], strict=False)),
+        substeps=5,
+    )
+    assert np.max(np.abs(again.array(names) - truth.array(names))) < 1e-9, "its inputs are those that flew it"
+    with pytest.raises(FlightError, match=r"0\.5 s, expected at least 2 s"):
+        save_recording(world.vehicle, rows[:50], period=0.01, folder=tmp_path)
+    threads = [
+        threading.Thread(target=save_recording, args=(world.vehicle, rows), kwargs={"period": 0.01, "folder": tmp_path})
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(path.name for path in tmp_path.glob("recording-*-truth.nc")) == [
+        f"recording-{k}-truth.nc" for k in (10, 11, 7, 8, 9)
+    ]
+    assert {(tmp_path / f"recording-{k}.nc").read_text() for k in range(1, 6)} == {"mine"}
+    assert not list(tmp_path.glob("*.growing"))
+
+
+def test_a_controller_of_another_vehicle_is_refused() -> None:
+    coax, raptor = sp.vehicle("coax"), sp.vehicle("raptor50")
+    controller = sp.autopilot(coax, sp.trim(coax))
+    with pytest.raises(ControllerError, match="is for 'coax', not for 'conventional'"):
+        World(raptor, controller=controller)
+
+
+@pytest.mark.parametrize("name", sorted(packaged_cards()))
+def test_every_card_has_a_picture_and_its_thrust_carries_the_weight(name: str) -> None:
+    vehicle = sp.vehicle(name)
+    hover = sp.trim(vehicle, height=20.0, voltage=vehicle.card.values().get("voltage_nominal"))
+    shape = picture(vehicle)
+    told = pose_of(vehicle)(hover.state.tolist(), hover.inputs.tolist(), hover.environment)
+    assert shape["size"] > 0.0
+    assert len(shape["rotors"]) == len(told["rotors"])
+    lift = -sum(rotor[5] for rotor in told["rotors"])
+    # A lean, the fin and the drag of the downwash take a few per cent.
+    assert lift == pytest.approx(shape["weight"], rel=0.12)
+    assert (shape["bar"] is None) == (told["bar"] is None)
+
+
+def test_the_clock_keeps_time_and_counts_what_is_late() -> None:
+    took = []
+
+    def step() -> None:
+        took.append(time.perf_counter())
+        if len(took) == 20:
+            time.sleep(0.06)  # several periods
+
+    clock = Clock(step, period=0.01, lock=threading.Lock())
+    clock.start()
+    clock.go(True)
+    time.sleep(0.6)
+    clock.go(False)
+    time.sleep(0.05)
+    stopped = len(took)
+    time.sleep(0.05)
+    clock.close()
+    assert len(took) == stopped, "time stands still"
+    assert 4 <= clock.punctuality.late < stopped
+    span = took[-1] - took[0]
+    assert stopped == pytest.approx(span / 0.01 + 1, abs=6), "lost time is made up for"
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_RR"), reason="this system has no SCHED_RR")
+def test_a_thread_comes_first_where_the_machine_allows_it_and_nothing_that_it_starts_does() -> None:
+    found: dict[str, object] = {}
+
+    def ask() -> None:
+        found["granted"] = come_first()
+        found["own"] = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
+        child = threading.Thread(target=lambda: found.setdefault("child", os.sched_getscheduler(0)))
+        child.start()
+        child.join()
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    assert found == {
+        "granted": found["granted"],
+        "own": os.SCHED_RR if found["granted"] else os.SCHED_OTHER,
+        "child": os.SCHED_OTHER,
+    }
+
+
+def test_what_fails_in_the_clock_is_told() -> None:
+    def step() -> None:
+        raise ZeroDivisionError("of the test")
+
+    clock = Clock(step, period=0.01, lock=threading.Lock())
+    clock.start()
+    clock.go(True)
+    for _ in range(100):
+        if clock.failure is not None:
+            break
+        time.sleep(0.01)
+    clock.close()
+    assert isinstance(clock.failure, ZeroDivisionError)

@@ -1,0 +1,203 @@
+"""Replay: the log as it is, a prediction that starts anew, films and pictures."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.errors import FlightError, SwashError
+from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.flights.flight import Flight
+from swashplate.links.live import film
+from swashplate.links.live.replay import Replay, as_json, floor, gaps, replay
+from swashplate.links.live.wireframe import Camera, helicopter
+from swashplate.simulation.sensors import QUIET
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    raptor = sp.vehicle("raptor50")
+    flown = sp.simulate_maneuver(raptor, "doublet:roll,0.5s,0.02", controller=sp.state_hold, lead=2, tail=3)
+    return flown.condition(rate=100, cutoff=0, outliers=False, trim_ground=False)
+
+
+@pytest.fixture(scope="module")
+def shown(flight: Flight) -> Replay:
+    return replay(flight, model=sp.vehicle("raptor50"), ahead=1.0)
+
+
+def test_shows_the_log_as_it_is(flight: Flight, shown: Replay) -> None:
+    raptor = sp.vehicle("raptor50")
+    times = flight.time("phi")
+    for i, name in enumerate(raptor.state_names):
+        assert np.allclose(shown.states[:, i], np.interp(shown.time, times, flight.values(name)), atol=1e-12)
+    assert shown.simulated
+    assert np.median(np.diff(shown.time)) == pytest.approx(0.02)
+
+
+def test_the_right_model_predicts_and_a_wrong_one_does_not(flight: Flight, shown: Replay) -> None:
+    raptor = sp.vehicle("raptor50")
+    assert shown.predicted is not None
+    there = np.isfinite(shown.predicted[:, 0])
+    assert np.mean(there) > 0.8
+    right = np.abs(shown.predicted - shown.states[:, :12])[there]
+    # The shown moments are half as many as the inputs that flew it, held: not exact at the doublet's edges.
+    assert np.max(right[:, 9]) < 0.05
+    heavy = raptor.with_values({"inertia_xx": 3.0 * raptor.card.values()["inertia_xx"]})
+    wrong = replay(flight, model=heavy, ahead=1.0)
+    assert wrong.predicted is not None
+    assert np.nanmax(np.abs(wrong.predicted[:, 9] - shown.states[:, 9])) > 0.1
+
+
+def test_a_prediction_starts_anew(shown: Replay) -> None:
+    assert shown.predicted is not None
+    first = 51  # one moment after the second start
+    assert np.allclose(shown.predicted[first], shown.states[first, :12], atol=1e-2)
+    with pytest.raises(SwashError, match="--ahead"):
+        replay(Flight({}), ahead=0.0)
+
+
+def without(flight: Flight, *names: str) -> Flight:
+    return flight.with_streams({key: data.drop_vars(names) for key, data in flight.streams.items()})
+
+
+def test_an_input_that_was_not_logged_is_never_made_up(flight: Flight, shown: Replay) -> None:
+    raptor = sp.vehicle("raptor50")
+    assert shown.notes == (), "everything was logged"
+    with pytest.raises(FlightError, match=r"lacks B1, A1: .* without them there is no prediction") as told:
+        replay(without(flight, "A1", "B1"), model=raptor, ahead=1.0)
+    assert "--hold-missing" in str(told.value)
+    held = replay(without(flight, "A1", "B1"), model=raptor, ahead=1.0, hold_missing=True)
+    (note,) = held.notes
+    assert note.startswith("The log has no B1, A1. They are held (B1 at ")
+    assert as_json(held)["notes"] == [note]
+    column = held.inputs[:, raptor.input_names.index("A1")]
+    assert np.ptp(column) == 0.0
+    assert float(note.split("A1 at ")[1].split(",")[0]) == pytest.approx(column[0], rel=1e-3)
+    assert held.predicted is not None
+    assert np.nanmax(np.abs(held.predicted - shown.predicted)) > 0.05, "the doublet was on it"
+
+
+def test_states_that_were_not_logged_are_told(flight: Flight) -> None:
+    bare = without(flight, "b1")
+    assert replay(bare, model=sp.vehicle("raptor50"), ahead=1.0).notes == (
+        "The log has no b1: every prediction starts with them as at hover.",
+    )
+    assert replay(bare).notes == ("The log has no b1: they are drawn as at hover.",)
+
+
+def test_a_logged_wind_blows_in_the_prediction(flight: Flight, shown: Replay) -> None:
+    windy = flight.with_channel("wind_north", np.full(flight.time("phi").size, 5.0), like="phi")
+    found = replay(windy, model=sp.vehicle("raptor50"), ahead=1.0)
+    assert found.predicted is not None
+    assert shown.predicted is not None
+    assert np.nanmax(np.abs(found.predicted[:, 3] - shown.predicted[:, 3])) > 0.1
+
+
+def test_without_a_model_it_is_drawn_as_the_vehicle_of_its_inputs(flight: Flight) -> None:
+    assert replay(flight).vehicle.card.title == sp.vehicle("raptor50").card.title
+    bare = flight.with_streams({name: data.drop_vars("B1") for name, data in flight.streams.items()})
+    with pytest.raises(FlightError, match=r"Say what flies with --model\."):
+        replay(bare)
+
+
+def test_a_coax_is_predicted_by_its_observer(monkeypatch: pytest.MonkeyPatch) -> None:
+    # The calibration itself is the validation's, and minutes of compiling; this log has no delays to find.
+    monkeypatch.setattr("swashplate.links.live.replay.calibrate", lambda *_, **__: Nuisance())
+    coax = sp.vehicle("coax")
+    flown = sp.simulate_maneuver(coax, "doublet:pitch,0.5s,0.1", controller=sp.hover_hold, lead=3, tail=3)
+    log = sp.observe(flown, coax, sensors=QUIET, seed=1).condition(rate=100, cutoff=0)
+    found = replay(log, model=coax, ahead=1.0)
+    assert found.predicted is not None
+    assert any("drawn as at hover" in note for note in found.notes)
+    assert any("no battery voltage" in note for note in found.notes) == ("voltage" not in log)
+    there = np.isfinite(found.predicted[:, 0])
+    assert found.time[there][0] == pytest.approx(log.start + 1.75, abs=0.05), "a quarter of a short log settles"
+    assert np.all(there[np.argmax(there) :])
+    error = (found.predicted - found.states[:, :12])[there]
+    assert np.sqrt(np.mean(error[:, 6:8] ** 2)) < np.radians(1.5)
+    assert np.sqrt(np.mean(error[:, :2] ** 2)) < 0.05
+
+
+@pytest.mark.proof
+def test_real_flights_have_the_observers_prediction(flight_july: Path) -> None:
+    log = sp.read(flight_july).condition(rate=100, cutoff=0).between(0.0, 8.0)
+    found = replay(log, model=sp.vehicle("coax"), ahead=0.5)
+    assert found.predicted is not None
+    there = np.isfinite(found.predicted[:, 0])
+    assert found.time[there][0] == pytest.approx(log.start + 2.0, abs=0.1), "a quarter of a short log calibrates"
+    assert np.sqrt(np.mean((found.predicted - found.states[:, :12])[there][:, 6:8] ** 2)) < np.radians(3.0)
+
+
+def test_the_page_gets_everything_it_draws(shown: Replay) -> None:
+    told = as_json(shown)
+    assert len(told["moments"]) == len(told["time"]) == shown.time.size
+    assert told["time"][0] == 0.0
+    low, high = shown.vehicle.input_limits[0]
+    assert told["inputs"][0] == {"name": "theta0", "unit": "rad", "low": low, "high": high}
+    body, inputs, rotors, bar, tail, ghost = told["moments"][60]
+    assert body == pytest.approx(shown.states[60, :12].tolist(), rel=1e-4, abs=1e-6)
+    assert (len(inputs), len(rotors), bar, len(tail), len(ghost)) == (4, 1, None, 2, 12)
+    assert floor(shown) > np.max(shown.states[:, 2])
+
+
+def test_gaps_are_seen() -> None:
+    assert gaps(np.array([0.0, 0.1, 0.2, 1.0, 1.1])).tolist() == [False, False, False, True, False]
+
+
+def test_the_camera_sees_ahead_as_up_and_east_as_right() -> None:
+    camera = Camera(np.zeros(3), heading=0.0, distance=10.0, lift=0.3)
+    middle, ahead, right, above = camera.project(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1.0]]))
+    assert np.allclose(middle, 0.0)
+    assert ahead[1] > 0.0
+    assert abs(ahead[0]) < 1e-12
+    assert right[0] > 0.0
+    assert above[1] > ahead[1]
+    assert np.all(np.isnan(camera.project(np.array([[-50.0, 0.0, -20.0]]))))
+
+
+def test_the_drawn_disc_leans_with_the_rotor(shown: Replay) -> None:
+    from swashplate.links.live.picture import picture
+
+    shape = picture(shown.vehicle)
+    x = np.zeros(12)
+    parts = {"rotors": [[0.1, 0.0, 100.0, 0.0, 0.0, -10.0]], "bar": None, "tail": None}
+    disc = next(points for kind, points in helicopter(shape, x, parts, time=0.0) if kind == "disc")
+    east = disc[np.argmax(disc[:, 1])]
+    west = disc[np.argmin(disc[:, 1])]
+    assert east[2] > west[2] + 0.1 * shape["size"], "a disc that leans right is low on the right"
+
+
+def test_a_film_is_a_film(shown: Replay, tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
+    told: list[tuple[int, int]] = []
+    count = film.write_film(shown, tmp_path / "flight.mp4", rate=2.0, tell=lambda done, of: told.append((done, of)))
+    assert told[-1] == (count, count) == (12, 12)
+    probed = subprocess.run(
+        [ffmpeg.get_ffmpeg_exe(), "-i", tmp_path / "flight.mp4", "-f", "null", "-"], capture_output=True, text=True
+    ).stderr
+    assert "1280x720" in probed
+    assert "h264" in probed
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.mp4"]
+
+
+def test_pictures_change_with_the_flight(shown: Replay, tmp_path: Path) -> None:
+    assert film.write_pictures(shown, tmp_path / "frames", rate=1.0) == 6
+    names = sorted(path.name for path in (tmp_path / "frames").iterdir())
+    assert names == [f"frame-{n:05d}.png" for n in range(1, 7)]
+    assert len({(tmp_path / "frames" / name).read_bytes() for name in names}) == 6
+
+
+def test_what_ffmpeg_cannot_write_is_told(shown: Replay, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg is not installed")
+    with pytest.raises(SwashError, match=r"ends in '\.avi'"):
+        film.write_film(shown, tmp_path / "flight.avi")
+    monkeypatch.setattr(ffmpeg, "get_ffmpeg_exe", lambda: shutil.which("false"))
+    with pytest.raises(SwashError, match="ffmpeg could not write it"):
+        film.write_film(shown, tmp_path / "flight.mp4", rate=2.0)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,225 @@
+"""The multirotor against independent routes: by hand, by conservation laws, by its mirror image, by its C export."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from exported import compiled
+from swashplate.errors import CardError
+from swashplate.export.compiler import compiler
+from swashplate.export.model_c import model_code
+from swashplate.export.traced import trace_vehicle
+from swashplate.flights.flight import Flight, Provenance, stream
+from swashplate.identification.core.records import records
+from swashplate.models.card import Card, Parameter, packaged_cards
+from swashplate.models.catalogue import from_card
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import FloatBackend
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.physics.frames import Euler, Vector, body_to_local
+from swashplate.physics.inflow import momentum_inflow
+
+XP = FloatBackend()
+STATE = [0.1, -0.2, -1.0, 0.7, -0.5, 0.3, 0.2, -0.1, 0.6, 0.8, -0.6, 0.4]  # a body that moves in every way
+RESISTANCE = {"battery_resistance": (0.08, "ohm"), "tau_battery": (0.05, "s"), "drive_efficiency": (0.4, "1")}
+
+
+def crazyflie(**values: float) -> Vehicle:
+    return sp.vehicle("crazyflie").with_values(values)
+
+
+def with_resistance(name: str = "crazyflie") -> Vehicle:
+    card = packaged_cards()[name]
+    more = {key: Parameter(value, unit, "test", "assumed") for key, (value, unit) in RESISTANCE.items()}
+    options = {**card.options, "battery": "resistance"}
+    return from_card(replace(card, options=options, parameters={**card.parameters, **more}))
+
+
+def rates(vehicle: Vehicle, x: Any, u: Any, env: Environment | None = None) -> np.ndarray:
+    return np.array(vehicle.rates(x, u, vehicle.values(), env or Environment(voltage=3.7), XP))
+
+
+@pytest.mark.parametrize(("name", "voltage"), [("crazyflie", 3.7), ("x8", 22.2)])
+def test_hover_by_hand_is_a_trim(name: str, voltage: float) -> None:
+    vehicle = sp.vehicle(name)
+    par = vehicle.values()
+    states, inputs = vehicle.traits.hover(par, voltage, XP)  # type: ignore[misc]
+    x = [states.get(state, 0.0) for state in vehicle.state_names]
+    assert np.max(np.abs(rates(vehicle, x, inputs, Environment(voltage=voltage)))) < 1e-10
+    if name == "crazyflie":  # four rotors alike: a quarter of the weight each
+        omega = math.sqrt(par.mass * LABORATORY_GRAVITY / (4.0 * par.k_thrust))
+        assert states["omega_1"] == pytest.approx(omega, rel=1e-12)
+        assert inputs[0] == pytest.approx((omega - par.o_drive) / par.k_drive, rel=1e-12)
+
+
+def test_a_rotor_that_is_weaker_turns_faster_in_hover() -> None:
+    vehicle = crazyflie(gain_2=0.8)
+    states, inputs = vehicle.traits.hover(vehicle.values(), 3.7, XP)  # type: ignore[misc]
+    x = [states.get(state, 0.0) for state in vehicle.state_names]
+    assert np.max(np.abs(rates(vehicle, x, inputs))) < 1e-10
+    assert states["omega_2"] == pytest.approx(states["omega_4"] / math.sqrt(0.8), rel=1e-12)
+
+
+def test_half_the_voltage_needs_twice_the_command() -> None:
+    vehicle = crazyflie()
+    full, half = (vehicle.traits.hover(vehicle.values(), volts, XP)[1][0] for volts in (4.0, 2.0))  # type: ignore[misc]
+    assert half == pytest.approx(2.0 * full, rel=1e-12)
+
+
+def test_angular_momentum_stays_where_no_air_acts() -> None:
+    """Rotors that speed up, in a tumbling body without air: what they gain the body loses, about every axis."""
+    none = dict.fromkeys(("k_thrust", "k_torque", "thrust_damping", "rotor_drag", "flap_back"), 0.0)
+    card = sp.vehicle("crazyflie").card
+    vehicle = from_card(
+        replace(card, parameters={k: replace(v, lower=None) for k, v in card.parameters.items()})
+    ).with_values({"inertia_drive": 5e-7})
+    vehicle = replace(vehicle, card=vehicle.card.with_values(none))
+    par, u = vehicle.values(), (0.9, 0.2, 0.7, 0.1)
+    senses = vehicle.card.options["senses"]
+
+    def momentum(x: np.ndarray) -> np.ndarray:
+        spin = par.inertia_drive * sum(s * omega for s, omega in zip(senses, x[12:16], strict=True))
+        own = Vector(par.inertia_xx * x[9], par.inertia_yy * x[10], par.inertia_zz * x[11] + spin)
+        return np.array(body_to_local(own, Euler(*x[6:9]), XP))
+
+    x, dt = np.array([*STATE, 300.0, 900.0, 1500.0, 700.0]), 1e-3
+    before = momentum(x)
+    for _ in range(100):
+        k1 = rates(vehicle, x, u)
+        k2 = rates(vehicle, x + 0.5 * dt * k1, u)
+        k3 = rates(vehicle, x + 0.5 * dt * k2, u)
+        k4 = rates(vehicle, x + dt * k3, u)
+        x = x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    assert np.max(np.abs(x[12:16] - (300.0, 900.0, 1500.0, 700.0))) > 300.0  # the rotors did speed up
+    assert momentum(x) == pytest.approx(before, rel=1e-6)
+
+
+def test_the_airs_forces_take_the_power_that_they_cost() -> None:
+    """d/dt of kinetic and potential energy = thrust and drag at each rotor's own velocity, and its shaft's moments."""
+    vehicle = crazyflie()
+    par, env, u = vehicle.values(), Environment(voltage=3.7), (0.5, 0.6, 0.4, 0.7)
+    x = np.array([*STATE, 1500.0, 1700.0, 1600.0, 1800.0])
+    dx = rates(vehicle, x, u, env)
+    energy = par.mass * x[3:6] @ dx[3:6] - par.mass * env.gravity * dx[2]
+    energy += par.inertia_xx * x[9] * dx[9] + par.inertia_yy * x[10] * dx[10] + par.inertia_zz * x[11] * dx[11]
+    expected = 0.0
+    for i, (omega, sense) in enumerate(zip(x[12:16], vehicle.card.options["senses"], strict=True), start=1):
+        arm = np.array([getattr(par, f"rotor_{i}_{axis}") for axis in "xyz"])
+        at = x[3:6] + np.cross(x[9:12], arm)
+        expected += -par.k_thrust * omega**2 * at[2] - par.thrust_damping * omega * at[2] ** 2
+        expected += -par.rotor_drag * omega * (at[0] ** 2 + at[1] ** 2)
+        expected += par.flap_back * omega * (x[10] * at[0] - x[9] * at[1])
+        expected += -sense * x[11] * (par.k_torque * omega**2 + par.inertia_drive * dx[11 + i])
+    assert energy == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_mirrored_vehicle_flies_the_mirrored_flight() -> None:
+    vehicle = crazyflie(gain_1=0.9, inertia_drive=2e-7)
+    card = vehicle.card
+    turned = {name: -p.value for name, p in card.parameters.items() if name.startswith("rotor_") and name[-1] == "y"}
+    mirrored = from_card(
+        replace(card.with_values(turned), options={**card.options, "senses": [-s for s in card.options["senses"]]})
+    )
+    sign = np.array([1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1, 1, 1, 1])
+    x, u = np.array([*STATE, 1500.0, 1700.0, 1600.0, 1800.0]), (0.5, 0.6, 0.4, 0.7)
+    wind = Environment(voltage=3.7, wind_north=0.4, wind_east=0.3)
+    expected = sign * rates(vehicle, x, u, wind)
+    found = rates(mirrored, sign * x, u, wind._replace(wind_east=-0.3))
+    assert np.max(np.abs(found - expected)) < 1e-9 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize(("name", "solidity", "card_says"), [("crazyflie", 0.19, 3.5e-6), ("x8", 0.09, 1.8e-3)])
+def test_thrust_damping_is_of_the_size_that_momentum_theory_gives(name: str, solidity: float, card_says: float) -> None:
+    """The slope of thrust by sink in hover from the toolkit's own inflow, blades with a lift slope of 5."""
+    vehicle = sp.vehicle(name)
+    par = vehicle.values()
+    omega = vehicle.traits.hover(par, par.voltage_nominal, XP)[0]["omega_1"]  # type: ignore[misc]
+    scale = par.air_density * math.pi * par.rotor_radius**4
+    CT, loss = par.k_thrust / scale, 5.0 * solidity / 4.0
+    free = CT + loss * math.sqrt(CT / 2.0)
+
+    def thrust(sink: float) -> float:
+        mu_z = sink / (omega * par.rotor_radius)
+        lam0 = momentum_inflow(free + loss * mu_z, loss, mu_z, 0.0, XP)
+        return float((free + loss * mu_z - loss * lam0) * scale * omega**2)
+
+    # Climbing: sink meets the recirculation's term.
+    slope = (thrust(0.0) - thrust(-0.02)) / 0.02 / omega
+    assert card_says == pytest.approx(slope, rel=0.15)
+
+
+def test_the_battery_gives_what_its_resistance_leaves() -> None:
+    vehicle = with_resistance()
+    par = vehicle.values()
+    states, inputs = vehicle.traits.hover(par, 4.0, XP)  # type: ignore[misc]
+    x = [states.get(state, 0.0) for state in vehicle.state_names]
+    assert np.max(np.abs(rates(vehicle, x, inputs, Environment(voltage=4.0)))) < 1e-9
+    power = 4.0 * par.k_torque * states["omega_1"] ** 3 / par.drive_efficiency
+    terminal = 4.0 - states["voltage_sag"]
+    assert states["voltage_sag"] == pytest.approx(par.battery_resistance * power / terminal, rel=1e-9)
+    plain = crazyflie().traits.hover(crazyflie().values(), terminal, XP)  # type: ignore[misc]
+    assert inputs == pytest.approx(plain[1], rel=1e-12)  # behind the resistance it is the same aircraft
+    assert not vehicle.choices  # a log's voltage lies behind the resistance: nothing is offered to be fitted
+
+
+def _broken(**changes: Any) -> Card:
+    card = packaged_cards()["crazyflie"]
+    return replace(card, options={**card.options, **changes})
+
+
+@pytest.mark.parametrize("changes", [{"senses": [1, 1, 2, -1]}, {"senses": "xx"}, {"battery": "big"}, {"arms": 4}])
+def test_wrong_options_are_named(changes: dict[str, Any]) -> None:
+    with pytest.raises(CardError, match="senses"):
+        from_card(_broken(**changes))
+
+
+def test_rotors_that_cannot_turn_the_body_are_refused() -> None:
+    # A quadrotor in x whose diagonal pairs turn alike has yaw; one whose side pairs do has not, besides roll.
+    with pytest.raises(CardError, match="independently"):
+        from_card(_broken(senses=[1, 1, 1, 1]))
+    with pytest.raises(CardError, match="independently"):
+        from_card(_broken(senses=[1, 1, -1, -1]))
+    with pytest.raises(CardError, match="is missing"):
+        from_card(_broken(senses=[1, -1, 1, -1, 1]))
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("kind", ["measured", "resistance"])
+def test_exported_c_has_the_same_rates(kind: str, tmp_path: Path) -> None:
+    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    vehicle = with_resistance() if kind == "resistance" else sp.vehicle("crazyflie")
+    env = Environment(wind_north=0.5, wind_east=-0.3, wind_down=0.1, air_density=1.15, gravity=9.80665, voltage=3.9)
+    trim = sp.trim(vehicle, environment=env)
+    model = trace_vehicle(vehicle, trim, name="multirotor")
+    run = compiled(model_code(model), tmp_path)
+    s, p = (np.array([v.start for v in getattr(model, part)]) for part in ("surroundings", "parameters"))
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        x = trim.state + 0.1 * rng.standard_normal(trim.state.size) * np.maximum(1.0, np.abs(trim.state))
+        u = np.clip(trim.inputs + 0.1 * rng.standard_normal(trim.inputs.size), 0.0, 1.0)
+        (found,) = run.call("rates", x, u, s, p, out=(x.size,))
+        np.testing.assert_allclose(found, rates(vehicle, x, u, env), rtol=1e-11, atol=1e-9)
+
+
+def test_a_logged_voltage_keeps_the_sags_that_the_commands_are_shares_of() -> None:
+    """Half a second of load: averaged away for a vehicle whose battery only runs down, kept for a multirotor."""
+    t = np.arange(1000) * 0.01
+    voltage = np.where((t > 5.0) & (t < 5.5), 3.2, 3.7)
+    wave = 0.5 + 0.1 * np.sin(t)
+    data: dict[str, np.ndarray] = {name: 0.01 * np.sin(t) for name in ("x", "y", "z", "phi", "theta", "psi")}
+    data |= {f"motor_{i}": wave for i in (1, 2, 3, 4)} | {"voltage": voltage}
+    flight = Flight({"uniform": stream(t, data)}, Provenance(source="made", sha256="", reader="", reader_version=""))
+    vehicle = sp.vehicle("crazyflie")
+    (record,) = records(flight, vehicle)
+    assert record.voltage_known
+    assert record.voltage[525] == pytest.approx(3.2, abs=0.02)
+    slow = replace(vehicle, traits=replace(vehicle.traits, voltage_seconds=8.0))
+    (record,) = records(flight, slow)
+    assert record.voltage[525] > 3.6

@@ -1,0 +1,120 @@
+"""Figures of flights, responses, trims and derivatives: what is on them, with units; and their notebook form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights.flight import Flight, stream
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.conventional.derivative_table import DerivativeTable
+from swashplate.physics.environment import Environment
+from swashplate.simulation.derivatives_over_speed import Derivatives
+from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim_curve import TrimCurve, trim_curve
+
+TIME = np.arange(400) / 100.0
+
+
+@pytest.fixture
+def flight() -> Flight:
+    return Flight.from_arrays(TIME, {"phi": 0.1 * np.sin(TIME), "p": 0.1 * np.cos(TIME), "knob": TIME}, source="<mine>")
+
+
+@pytest.fixture
+def response() -> FrequencyResponse:
+    omega = np.geomspace(0.6, 60.0, 50)
+    h = (1.0 / (1.0 + 1j * omega / 10.0)).reshape(-1, 1, 1)
+    coherence = np.where(omega < 30.0, 0.95, 0.3).reshape(-1, 1, 1)
+    none = np.full((50, 1), np.nan)
+    return FrequencyResponse(
+        omega, ("servo_roll",), ("p",), h, coherence, coherence[..., 0], np.full(h.shape, 0.05), none, none, coherence
+    )
+
+
+def _labels(figure: Any) -> list[str]:
+    return [panel.get_ylabel() for panel in figure.axes]
+
+
+def test_a_flight_is_drawn_in_the_units_of_pilots(flight: Flight) -> None:
+    figure = flight.plot()
+    assert _labels(figure) == ["phi [deg]", "p [deg/s]"]
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata().max(), np.degrees(0.1), rtol=1e-3)
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    assert _labels(flight.plot(channels=["knob", "p"])) == ["knob", "p [deg/s]"]
+    with pytest.raises(FlightError, match="no such channel"):
+        flight.plot(channels=["pp"])
+    with pytest.raises(FlightError, match="nothing to draw"):
+        flight.plot(channels=[])
+
+
+def test_a_gap_stays_open_and_a_peak_stays_seen() -> None:
+    time = np.concatenate([np.arange(20_000) / 1000.0, 30.0 + np.arange(20_000) / 1000.0])
+    values = np.zeros(time.size)
+    values[777] = 5.0
+    drawn = Flight({"a": stream(time, {"u": values})}).plot().axes[0].lines[0]
+    x, y = np.asarray(drawn.get_xdata()), np.asarray(drawn.get_ydata())
+    assert x.size < 6000
+    assert np.nanmax(y) == 5.0
+    opened = np.flatnonzero(np.isnan(y))
+    assert opened.size == 1
+    assert x[opened[0] - 1] < 20.0
+    assert x[opened[0] + 1] >= 30.0
+
+
+def test_responses_are_drawn_with_coherence_and_only_where_it_holds_in_colour(response: FrequencyResponse) -> None:
+    figure = response.plot()
+    assert _labels(figure) == ["magnitude [dB]", "phase [deg]", "coherence"]
+    whole, good = (np.asarray(line.get_ydata()) for line in figure.axes[0].lines[:2])
+    assert np.isfinite(whole).all()
+    np.testing.assert_array_equal(np.isfinite(good), response.coherence[:, 0, 0] >= 0.6)
+    with pytest.raises(SwashError, match="is no output"):
+        response.plot(pairs=[("q", "servo_roll")])
+
+
+@pytest.fixture(scope="module")
+def curve() -> TrimCurve:
+    return trim_curve(sp.vehicle("coax"), (0.0, 0.5))
+
+
+def test_a_trim_curve_tells_its_numbers_in_every_form(curve: TrimCurve) -> None:
+    columns = curve.columns()
+    np.testing.assert_allclose(columns["phi [deg]"], [np.degrees(at.states()["phi"]) for at in curve.trims])
+    assert [panel.get_title() for panel in curve.plot().axes if panel.get_visible()] == list(columns)[1:]
+    assert "0.500" in repr(curve)
+    assert [at["speed"] for at in curve.as_dict()["trims"]] == [0.0, 0.5]
+    assert "theta [deg]" in curve._repr_html_()
+    with pytest.raises(SwashError, match="at least one speed"):
+        trim_curve(curve.vehicle, ())
+
+
+def test_derivatives_are_drawn_in_total_and_by_contributor() -> None:
+    made = np.arange(60.0).reshape(6, 10)
+    table = DerivativeTable({"main_rotor": made, "fin": -0.5 * made}, np.zeros((2, 10)), "build-up")
+    none = np.zeros(1)
+    trims = tuple(Trim(none, none, ("u",), ("theta0",), Environment(), v, 0.0, 0.0, 0.0) for v in (0.0, 5.0))
+    found = Derivatives(sp.vehicle("raptor50"), trims, (table, table), imperial=True)
+    panel = found.plot(row="X").axes[6]
+    assert panel.get_title() == "Xtheta0 [ft/s²/rad]"
+    main, fin, total = (float(np.asarray(line.get_ydata())[0]) for line in panel.lines)
+    assert main + fin == pytest.approx(total)
+    assert total == pytest.approx(3.0 / 0.3048)
+    assert found.as_dict()["tables"][1]["derivatives"]["Xtheta0"]["value"] == pytest.approx(total)
+    with pytest.raises(SwashError, match="expected one of X, Y, Z, L, M, N"):
+        found.plot(row="Q")
+    assert "Derivatives of Thunder Tiger Raptor 50" in found._repr_html_()
+
+
+def test_notebooks_show_a_table_and_a_picture_and_no_markup_of_others(
+    flight: Flight, response: FrequencyResponse
+) -> None:
+    page = flight._repr_html_()
+    assert "&lt;mine&gt;" in page
+    assert "<mine>" not in page
+    assert "roll rate" in page
+    assert 'src="data:image/png;base64,' in page
+    assert "p / servo_roll" in response._repr_html_()

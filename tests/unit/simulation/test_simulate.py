@@ -1,0 +1,186 @@
+"""The compiled loop: order of accuracy, repeatability, batches, divergence, bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swashplate.errors import DivergenceError, FlightError, SwashError, TrimError
+from swashplate.flights.flight import Flight
+from swashplate.models.catalogue import vehicle
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.simulation import trigonometry
+from swashplate.simulation.adaptive import simulate_adaptive
+from swashplate.simulation.batch import BLOCK, simulate_batch
+from swashplate.simulation.integrate import simulate, trajectory
+from swashplate.simulation.sensors import Sensors
+from swashplate.simulation.trim import trim
+
+
+@pytest.fixture(scope="module")
+def coax() -> Vehicle:
+    return vehicle("coax")
+
+
+def excited(coax: Vehicle, samples: int, rate: float = 100.0) -> dict[str, object]:
+    """Hover inputs with smooth servo and voltage changes."""
+    time = np.arange(samples) / rate
+    moving = {"servo_pitch": 0.1 * np.sin(3.0 * time), "servo_roll": 0.05 * np.cos(2.0 * time)}
+    return {**trim(coax).commands(), **moving, "voltage": 12.22 - 0.02 * time, "wind_north": 0.3 * np.sin(time)}
+
+
+def largest_difference(a: Flight, b: Flight, names: tuple[str, ...]) -> float:
+    return float(np.max(np.abs(a.array(names) - b.array(names))))
+
+
+def test_hover_stays_where_it_is(coax: Vehicle) -> None:
+    flight = simulate(coax, {**trim(coax).commands(), "servo_roll": np.zeros(201)})
+    assert flight.provenance.simulated
+    assert largest_difference(flight, flight.between(0.0, 0.0).with_streams(flight.streams), coax.state_names) == 0.0
+    moved = flight.array(coax.state_names) - trim(coax).state
+    assert np.max(np.abs(moved)) < 1e-9
+
+
+@pytest.mark.parametrize("interpolation", ["held", "linear"])
+def test_the_fixed_step_converges_with_order_four(coax: Vehicle, interpolation: str) -> None:
+    """Against Dormand-Prince of order 8: halving the step divides the error by 16.
+
+    Without terms such as p |p|, whose second derivative jumps at zero: no method keeps its order across that.
+    """
+    rough = [name for name in coax.parameter_names if name.startswith(("a_alpha", "a_beta", "drag"))]
+    smooth = coax.with_values(dict.fromkeys(rough, 0.0))
+    inputs = excited(coax, 16, rate=20.0)
+    start = {**trim(coax).states(), "p": 0.5, "q": -0.3, "r": 0.2, "u": 0.7, "phi": 0.1}
+    truth, *found = (
+        simulate_adaptive(smooth, inputs, rate=20.0, interpolation=interpolation, start=start),
+        *(
+            simulate(smooth, inputs, rate=20.0, interpolation=interpolation, start=start, substeps=substeps)
+            for substeps in (4, 8, 16)
+        ),
+    )
+    errors = [largest_difference(flight, truth, coax.state_names) for flight in found]
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / np.array(errors[1:])), 4.0, atol=0.2)
+
+
+def test_the_usual_step_is_accurate(coax: Vehicle) -> None:
+    """10 ms with the card's own non-smooth terms: far below what a motion-capture system resolves."""
+    inputs = excited(coax, 201)
+    truth = simulate_adaptive(coax, inputs)
+    flight = simulate(coax, inputs, interpolation="linear")
+    assert largest_difference(flight, truth, ("x", "y", "z")) < 1e-6
+    assert largest_difference(flight, truth, ("phi", "theta", "psi", "p", "q", "r")) < 1e-5
+
+
+def test_the_same_call_gives_the_same_bits(coax: Vehicle) -> None:
+    inputs = excited(coax, 201)
+    first, second = (simulate(coax, inputs, sensors=Sensors(), seed=3) for _ in range(2))
+    other = simulate(coax, inputs, sensors=Sensors(), seed=4)
+    np.testing.assert_array_equal(first.values("x"), second.values("x"))
+    assert not np.array_equal(first.values("x")[:50], other.values("x")[:50])
+    with pytest.raises(SwashError, match="need a seed"):
+        simulate(coax, inputs, sensors=Sensors())
+
+
+@pytest.mark.parametrize("interpolation", ["held", "linear"])
+def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> None:
+    """To 1e-11 of each state's largest value, over two seconds and with other masses and starts."""
+    inputs, masses, rolls = excited(coax, 201), np.array([0.302, 0.31, 0.333]), np.array([0.0, 0.1, -0.1])
+    batch = simulate_batch(coax, inputs, parameters={"mass": masses}, start={"phi": rolls}, interpolation=interpolation)
+    for i in range(3):
+        start = {"phi": float(rolls[i])}
+        hover = {name: value for name, value in trim(coax).states().items() if name != "phi"}
+        single = simulate(
+            coax.with_values({"mass": masses[i]}), inputs, start={**hover, **start}, interpolation=interpolation
+        )
+        scale = np.maximum(np.abs(single.array(coax.state_names)).max(axis=0), 1.0)
+        apart = np.abs(batch.flight(i).array(coax.state_names) - single.array(coax.state_names)) / scale
+        assert apart.max() < 1e-11
+
+
+def test_a_batch_in_blocks_is_the_batch(coax: Vehicle) -> None:
+    """More vehicles than a block holds, kept every tenth step, inputs of their own."""
+    count = BLOCK + 3
+    inputs = {**trim(coax).commands(), "servo_roll": np.linspace(-0.1, 0.1, count) * np.ones((11, 1))}
+    batch = simulate_batch(coax, inputs, keep=10)
+    assert batch.states.shape == (2, 18, count)
+    some = [0, BLOCK - 1, -1]  # of the first block and of the rest, as many as the rest so that nothing more compiles
+    few = simulate_batch(coax, {**inputs, "servo_roll": inputs["servo_roll"][:, some]}, keep=10)
+    np.testing.assert_allclose(batch.states[:, :, some], few.states, atol=1e-13)
+    assert len(batch) == count
+
+
+def test_single_precision_is_near(coax: Vehicle) -> None:
+    inputs, masses = excited(coax, 201), {"mass": np.array([0.302, 0.31, 0.333])}
+    double, single = (
+        simulate_batch(coax, inputs, parameters=masses, precision=kind) for kind in ("float64", "float32")
+    )
+    assert single.states.dtype == np.float32
+    assert 0.0 < np.max(np.abs(double["theta"] - single["theta"])[:101]) < 1e-5
+
+
+@pytest.mark.parametrize(("kind", "tolerance"), [("float64", 3e-16), ("float32", 2e-7)])
+def test_polynomial_trigonometry(kind: str, tolerance: float) -> None:
+    angles = np.linspace(-50.0, 50.0, 20_001).astype(kind)
+    exact = angles.astype(np.longdouble)
+    assert np.max(np.abs(np.asarray(trigonometry.sin(angles)) - np.sin(exact))) < tolerance
+    assert np.max(np.abs(np.asarray(trigonometry.cos(angles)) - np.cos(exact))) < tolerance
+    near = np.abs(np.cos(exact)) > 0.3
+    apart = np.abs(np.asarray(trigonometry.tan(angles)) - np.tan(exact)) / (1.0 + np.tan(exact) ** 2)
+    assert np.max(apart[near]) < 4.0 * tolerance
+
+
+def test_another_card_does_not_compile_again(coax: Vehicle) -> None:
+    inputs = excited(coax, 201)
+    simulate(coax, inputs)
+    compiled = trajectory._cache_size()
+    simulate(vehicle("coax").with_values({"mass": 0.333}), inputs)
+    assert trajectory._cache_size() == compiled
+    simulate(vehicle("coax", mixing="as_printed"), inputs)
+    assert trajectory._cache_size() == compiled + 1
+
+
+def test_a_flight_drives_its_own_simulation(coax: Vehicle) -> None:
+    """What `simulate` returns is a flight like any other: its inputs give it again, also from other rates."""
+    flight = simulate(coax, excited(coax, 201))
+    again = simulate(coax, flight)
+    assert largest_difference(flight, again, coax.state_names) == 0.0
+    assert simulate(coax, flight, rate=50.0).values("x").size == 101
+
+
+def test_wind_carries_a_trimmed_vehicle(coax: Vehicle) -> None:
+    """Hover in 1 m/s of wind is forward flight at 1 m/s in calm air."""
+    windy = trim(coax, environment=Environment(wind_north=-1.0))
+    calm = trim(coax, speed=1.0)
+    assert windy.commands() == pytest.approx(calm.commands(), abs=1e-10)
+    assert windy.states()["u"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_divergence_says_when_and_what(coax: Vehicle) -> None:
+    inputs = {**trim(coax).commands(), "servo_pitch": np.full(6001, 1.0)}
+    with pytest.raises(DivergenceError, match="left the flyable range after") as caught:
+        simulate(vehicle("coax", bar=False), {**inputs, "motor_upper": 1.0})
+    assert caught.value.state in coax.state_names
+    assert isinstance(caught.value.flight, Flight)
+    assert caught.value.flight.stop == pytest.approx(caught.value.time)
+    assert np.all(np.isfinite(caught.value.flight.array(("phi", "theta", "p", "q", "r"))))
+
+
+def test_bad_input_is_named(coax: Vehicle) -> None:
+    good = excited(coax, 21)
+    with pytest.raises(FlightError, match="motor_upper: is missing"):
+        simulate(coax, {name: value for name, value in good.items() if name != "motor_upper"})
+    with pytest.raises(FlightError, match="rudder: is not an input"):
+        simulate(coax, {**good, "rudder": 0.0})
+    with pytest.raises(FlightError, match="servo_roll: is not a number at sample 4"):
+        simulate(coax, {**good, "servo_roll": np.where(np.arange(21) == 4, np.nan, 0.0)})
+    with pytest.raises(FlightError, match="servo_roll: has 20 samples, others have 21"):
+        simulate(coax, {**good, "servo_roll": np.zeros(20)})
+    with pytest.raises(TrimError, match="roll: is not a state"):
+        simulate(coax, good, start={"roll": 1.0})
+    with pytest.raises(SwashError, match="rate is 0"):
+        simulate(coax, good, rate=0.0)
+    with pytest.raises(FlightError, match="expected \\(n, 4\\)"):
+        simulate(coax, np.zeros((10, 3)))
+    with pytest.raises(SwashError, match="number of vehicles is not given"):
+        simulate_batch(coax, good)

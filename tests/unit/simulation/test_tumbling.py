@@ -1,0 +1,121 @@
+"""Aircraft that pitch through the vertical, where Euler angles have no rates: stepped, on a link, on the live page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import swashplate as sp
+from flown_by_hand import fly, fresh
+from heli_autopilot import servo_packet
+from link_bench import bench
+from swashplate.links.live.world import World
+from swashplate.models.catalogue import vehicle
+from swashplate.physics.backend import FloatBackend
+from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, euler_rates
+from swashplate.physics.quaternion import euler_of, quaternion_of, quaternion_rates
+from swashplate.simulation.stepping import Stepping
+from swashplate.simulation.tumbling import from_euler, to_euler
+
+FLOATS = FloatBackend()
+ANGLES = slice(6, 9)
+RUNNING = [1460, 1460, 1460, 1500, 0, 0, 0, 1660]
+
+
+def test_quaternions_are_scipys_and_their_rates_those_of_euler_angles() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        attitude = Euler(*(random.uniform(-1.0, 1.0, 3) * (3.1, 1.55, 3.1)).tolist())
+        rates = Vector(*random.standard_normal(3).tolist())
+        q = quaternion_of(attitude, FLOATS)
+        expected = np.roll(Rotation.from_euler("ZYX", attitude[::-1]).as_quat(), 1)
+        np.testing.assert_allclose(np.array(q) * np.sign(q.w), expected * np.sign(expected[0]), atol=1e-14)
+        np.testing.assert_allclose(euler_of(q, FLOATS), attitude, atol=1e-12)
+        long = type(q)(*(3.0 * part for part in q))
+        np.testing.assert_allclose(euler_of(long, FLOATS), attitude, atol=1e-12)
+        h = 1e-6  # by the Euler angles' own rates, to first order
+        moved = quaternion_of(
+            Euler(*(a + h * d for a, d in zip(attitude, euler_rates(rates, attitude, FLOATS), strict=True))), FLOATS
+        )
+        back = quaternion_of(
+            Euler(*(a - h * d for a, d in zip(attitude, euler_rates(rates, attitude, FLOATS), strict=True))), FLOATS
+        )
+        slope = (np.array(moved) - np.array(back)) / (2.0 * h)
+        np.testing.assert_allclose(quaternion_rates(q, rates), slope, atol=1e-6 * (1.0 + np.abs(slope).max() ** 3))
+
+
+def test_rows_keep_counting_turns() -> None:
+    before = np.arange(15.0)
+    before[ANGLES] = 7.0, 0.3, -9.0
+    np.testing.assert_allclose(to_euler(from_euler(before), before), before, atol=1e-12)
+
+
+@pytest.mark.parametrize("start", [1.2, np.pi / 2.0], ids=["through", "from"])
+def test_attitude_through_the_vertical_is_what_the_gyros_add_up_to(start: float) -> None:
+    flown = vehicle("raptor50", rotor_speed="throttle")
+    hover = sp.trim(flown)
+    x = np.array(hover.state)
+    x[2], x[7], x[flown.index("q")] = -200.0, start, 6.0
+    stepping = Stepping(flown, x, Environment())
+    rows = [x, *(stepping.advance(hover.inputs, 1e-3).states for _ in range(800))]
+    assert np.isfinite(rows).all()
+    attitude = np.array(rows)[:, ANGLES]
+    up = np.cos(attitude[:, 0]) * np.cos(attitude[:, 1])
+    assert up[0] > -1e-9
+    assert up.min() < -0.5, "it goes over"
+    gyros = np.array(rows)[:, 9:12]
+    turned = Rotation.from_euler("ZYX", attitude[0, ::-1])
+    for now, then in zip(gyros[1:], gyros[:-1], strict=True):
+        turned *= Rotation.from_rotvec(0.5e-3 * (now + then))
+    away = turned.inv() * Rotation.from_euler("ZYX", attitude[-1, ::-1])
+    assert np.degrees(away.magnitude()) < 0.01
+
+
+def test_an_autopilot_that_flips_is_answered_with_numbers_until_the_ground_and_can_begin_again(tmp_path: Path) -> None:
+    at = bench("raptor50", record=tmp_path / "flip.nc", record_rate=100.0)
+    at.send(servo_packet(200, 0, RUNNING))
+    high = np.array(sp.trim(at.plant.vehicle, height=25.0).state)
+    at.plant._stepping.place(high)
+    answers = []
+    for count in range(1, 2400):
+        # Elevator up, collective at its middle: nose up, over, and down.
+        told = json.loads(at.send(servo_packet(200, count, [1450, 1450, 1800, 1500, 0, 0, 0, 1660])) or b"")
+        answers.append(told)
+        if at.plant.broken:
+            break
+    pitch = np.array([told["attitude"] for told in answers])
+    assert (np.cos(pitch[:, 0]) * np.cos(pitch[:, 1])).min() < -0.9, "upside down"
+    assert np.abs(pitch[:, 1]).max() > np.radians(80.0), "near the vertical"
+    speeds = [np.linalg.norm(told["velocity"]) for told in answers]
+    assert np.abs(np.diff(speeds)).max() < 60.0, "no leap before the ground"
+    assert at.plant.broken.startswith("it went over and its centre of gravity touched the ground")
+    flight = sp.read(tmp_path / "flip.growing")  # while it is flown
+    assert np.isfinite(flight.array(("phi", "theta", "psi", "u", "w", "q"))).all()
+    for more in range(1, 50):
+        told = json.loads(at.send(servo_packet(200, count + more, RUNNING)) or b"")
+        assert told["imu"]["gyro"] == [0.0, 0.0, 0.0]
+    fresh_start = json.loads(at.send(servo_packet(200, 0, RUNNING)) or b"")
+    np.testing.assert_allclose(fresh_start["attitude"], 0.0, atol=1e-6)
+    np.testing.assert_allclose(fresh_start["position"], 0.0, atol=1e-6)
+    assert not at.plant.broken
+
+
+def test_the_live_page_flies_through_the_vertical_and_begins_again() -> None:
+    world = fresh(World(sp.vehicle("raptor50")), "raw")
+    world._crafts["own"].x[2] = -300.0
+    lowest = 1.0
+    for _ in range(40):
+        x = fly(world, 0.1, pitch=-1.0)
+        assert np.isfinite(x).all()
+        lowest = min(lowest, float(np.cos(x[6]) * np.cos(x[7])))
+        if world.trouble:
+            break
+    assert lowest < -0.3, "it has been upside down"
+    world.reset()
+    assert not world.trouble
+    assert np.abs(fly(world, 0.2)[ANGLES]).max() < 0.1

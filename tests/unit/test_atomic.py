@@ -1,0 +1,248 @@
+"""Files and folders that are complete or not there: full disks, hard kills, and what those leave."""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from proof_page import leave
+from swashplate import atomic
+from swashplate.errors import WriteError
+
+SMALL_DISK = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from swashplate.errors import WriteError
+from swashplate.flights.csv_export import write_csv
+from swashplate.flights.flight import Flight, stream
+from swashplate.bench.record import BenchRecord
+from swashplate.atomic import folder_when_complete, write_bytes
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+folder = Path(sys.argv[1])
+flight = Flight({"motion": stream(np.arange(4000.0), {"x": np.arange(4000.0)})})
+n = 300
+one = np.ones((n, 1, 1))
+response = FrequencyResponse(
+    omega=np.arange(1.0, n + 1), inputs=("a",), outputs=("p",), response=one + 0j, coherence=one, error=one,
+    multiple=one[..., 0], input_power=one[..., 0], output_power=one[..., 0], input_coherence=one,
+    input_units=("1",), output_units=("rad/s",), method="", windows=(), sources=(), warnings=(), problems=(),
+    settings={},
+)
+
+def in_a_folder(path):
+    with folder_when_complete(path, ours=()) as here:
+        write_bytes(here / "small", b"x")
+        write_bytes(here / "large", bytes(10_000))
+
+for name, write in {
+    "a.nc": flight.save,
+    "a.csv": lambda path: write_csv(flight, path),
+    "response.nc": response.save,
+    "a.bin": lambda path: write_bytes(path, bytes(10_000)),
+    "result": in_a_folder,
+}.items():
+    try:
+        write(folder / name)
+    except WriteError as error:
+        print(name, str(error).replace(str(folder), "").split(":")[-1].strip())
+print("alive")
+"""
+
+
+def test_a_full_disk_ends_in_words_and_leaves_nothing(tmp_path: Path) -> None:
+    """A limit on the size of files stands for the full disk: the system refuses the same write with another number."""
+    done = subprocess.run(
+        [sys.executable, "-c", SMALL_DISK, str(tmp_path)], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["a.nc", "a.csv", "response.nc", "a.bin", "result", "alive"]
+    assert all("File too large. Free some space" in line for line in lines[:-1])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_device_is_written_to_and_not_replaced() -> None:
+    before = os.stat("/dev/full")
+    with pytest.raises(WriteError, match=r"/dev/full: cannot be written: No space left on device\. Free some space"):
+        atomic.write_bytes("/dev/full", b"text")
+    assert os.path.samestat(before, os.stat("/dev/full"))
+
+
+@pytest.mark.parametrize(("number", "advice"), [(errno.ENOSPC, "space"), (errno.EDQUOT, "space"), (errno.EROFS, "may")])
+@pytest.mark.parametrize("call", ["open", "fsync", "replace"])
+def test_trouble_at_every_call_is_named_and_leaves_the_old_file(
+    call: str, number: int, advice: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = atomic.write_text(tmp_path / "a.toml", "old")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number), "a temporary name")
+
+    monkeypatch.setattr(atomic.os, call, fail)
+    with pytest.raises(WriteError, match=rf"a\.toml: cannot be written: {os.strerror(number)}.*{advice}"):
+        atomic.write_text(path, "new")
+    monkeypatch.undo()
+    assert path.read_text() == "old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.toml"]
+
+
+def test_text_keeps_permissions_and_bytes(tmp_path: Path) -> None:
+    plain = tmp_path / "plain.txt"
+    plain.write_text("x")
+    path = atomic.write_text(tmp_path / "a.txt", "one\r\ntwo\nü")
+    assert path.read_bytes() == "one\r\ntwo\nü".encode()
+    assert path.stat().st_mode == plain.stat().st_mode
+    path.chmod(0o640)
+    assert atomic.write_bytes(path, b"new").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_block_that_fails(tmp_path: Path) -> None:
+    def write_half() -> None:
+        with atomic.replaced_when_complete(tmp_path / "a.txt") as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_half()
+    assert list(tmp_path.iterdir()) == []
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from swashplate import atomic
+
+target, stop = Path(sys.argv[1]), int(sys.argv[2])
+calls = 0
+
+def counted(function):
+    def call(*arguments, **named):
+        global calls
+        calls += 1
+        if calls == stop:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return function(*arguments, **named)
+    return call
+
+for module, names in ((os, ("open", "mkdir", "replace", "unlink", "fsync", "rmdir")), (Path, ("unlink", "mkdir"))):
+    for name in names:
+        setattr(module, name, counted(getattr(module, name)))
+with atomic.folder_when_complete(target, ours=("report", "model", "fit", "gone")) as here:
+    for name in ("report", "model", "fit"):
+        atomic.write_text(here / name, "new")
+atomic.write_text(target.parent / "single", "new")
+"""
+
+
+def _killed(target: Path, stop: int) -> int:
+    return subprocess.run([sys.executable, "-c", KILLED, str(target), str(stop)], check=False, timeout=60).returncode
+
+
+def _results(target: Path) -> dict[str, str]:
+    return {p.name: p.read_text() for p in target.iterdir() if p.is_file()}
+
+
+def _litter(folder: Path) -> list[str]:
+    return sorted(p.name for p in folder.rglob(".swash-*"))
+
+
+def _kills(tmp_path: Path, stops: range) -> int:
+    """Kills a writer at each of the given system calls; returns how many kills there were."""
+    old = dict.fromkeys(("report", "model", "fit", "gone"), "old") | {"mine": "mine"}
+    kills = 0
+    for stop in stops:
+        parent = tmp_path / str(stop)
+        target = parent / "out"
+        target.mkdir(parents=True)
+        for name, text in old.items():
+            (target / name).write_text(text)
+        if _killed(target, stop) != -signal.SIGKILL:
+            break
+        kills += 1
+        found = _results(target)
+        assert found.pop("mine") == "mine"
+        assert len(set(found.values())) <= 1, f"call {stop}: old and new lie side by side: {found}"
+        begun = set(found.values()) != {"old"} or len(found) < 4
+        atomic.sweep(target)
+        new = dict.fromkeys(("report", "model", "fit"), "new") | {"mine": "mine"}
+        assert _results(target) in ([new] if begun else [old, new]), f"call {stop}"
+        atomic.sweep(parent)
+        assert _litter(parent) == []
+    return kills
+
+
+def test_kills_never_mix_old_and_new_and_their_litter_is_swept(tmp_path: Path) -> None:
+    assert _kills(tmp_path, range(20, 80, 7)) >= 4
+
+
+@pytest.mark.proof
+def test_kills_at_every_call(tmp_path: Path) -> None:
+    kills = _kills(tmp_path, range(1, 1000))
+    assert kills > 30
+    leave(
+        "siege-kills",
+        {
+            "title": "Hard kills while a folder of results is written",
+            "text": "One kill at each call that opens, makes, renames, removes or flushes: old and new never lie side "
+            "by side, other people's files stay, and the next run leaves no temporary file.",
+            "columns": ["kills", "mixed results", "temporary files after the next run"],
+            "rows": [[kills, 0, 0]],
+            "passed": True,
+        },
+    )
+
+
+def test_what_a_living_process_writes_is_not_swept(tmp_path: Path) -> None:
+    with (
+        atomic.folder_when_complete(tmp_path / "out", ours=()) as here,
+        atomic.replaced_when_complete(tmp_path / "file") as temporary,
+    ):
+        atomic.sweep(tmp_path)
+        atomic.sweep(tmp_path / "out")
+        assert here.is_dir()
+        assert temporary.exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
+
+
+@pytest.mark.parametrize("name", ["../precious", "..", ".", "", "a/../../precious"])
+@pytest.mark.parametrize("key", ["remove", "move"])
+def test_a_forged_note_cannot_reach_outside_its_folder(name: str, key: str, tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("mine")
+    forged = tmp_path / "out" / ".swash-0"
+    (forged / "new").mkdir(parents=True)
+    (forged / "commit").write_text(json.dumps({"remove": [], "move": []} | {key: [name]}))
+    atomic.sweep(tmp_path / "out")
+    assert (tmp_path / "precious").read_text() == "mine"
+
+
+def test_an_interrupt_while_swapping_finishes_the_swap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a").write_text("old")
+    moves = itertools.count()
+    replace = os.replace
+
+    def interrupted(source: Path, target: Path) -> None:
+        if Path(target).parent == tmp_path and next(moves) == 1:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    def write() -> None:
+        with atomic.folder_when_complete(tmp_path, ours=()) as here:
+            for name in "abc":
+                atomic.write_text(here / name, "new")
+
+    monkeypatch.setattr(atomic.os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert _results(tmp_path) == dict.fromkeys("abc", "new")
+    assert _litter(tmp_path) == []
