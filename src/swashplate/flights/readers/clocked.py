@@ -28,7 +28,7 @@ def longest_increasing(time: Array) -> Mask:
     One wild stamp, high or low, costs itself and nothing else (Fredman, 1975: n log n).
     """
     keep = np.ones(time.size, dtype=np.bool_)
-    if time.size < 2 or bool(np.all(np.diff(time) > 0.0)):
+    if time.size < 2 or bool(np.all(time[1:] > time[:-1])):
         return keep
     values = time.tolist()
     ends: list[float] = []  # smallest end of an increasing run of each length

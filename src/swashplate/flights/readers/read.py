@@ -109,6 +109,15 @@ def read(
         )
     if analogue.is_calibration(options.mapping):
         return rebased(analogue.read(source, options))
+    if "channels" in options.mapping:  # columns are named, so it is a table, whichever reader would know its head
+        if not READERS[_LAST].recognises(source):
+            raise FlightError(
+                f"is no table of text, and the mapping names columns; it starts with {source.content[:8]!r}.",
+                where=source.path,
+                channel="mapping",
+                hint="Leave the mapping out: the log says itself what its channels are.",
+            )
+        return rebased(READERS[_LAST].read(source, options))
     for name in (*(name for name in READERS if name != _LAST), _LAST):
         reader = READERS[name]
         if reader.recognises(source):
