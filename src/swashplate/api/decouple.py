@@ -29,6 +29,7 @@ from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.straightness import compose_straightness
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
 
@@ -91,7 +92,7 @@ class FlownStep:
 
 
 @dataclass(frozen=True, repr=False)
-class DecouplingDesign:
+class DecouplingDesign(Shown):
     """The controller of a coaxial helicopter: height and yaw held, roll and pitch decoupled.
 
     Attributes:

@@ -11,10 +11,10 @@ from swashplate.filtering.disturbed_model import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
-from swashplate.public import resolve
+from swashplate.shown import Shown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
 
@@ -90,7 +90,7 @@ class Example:
 
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Shown):
     """Predictions of unseen flights, judged.
 
     Attributes:
@@ -145,15 +145,6 @@ class Validation:
                 for record, told in zip(self.records, self.calibrated, strict=False)
             ],
         }
-
-    def plot(self) -> Figure:
-        """Fit of every predictor on every channel, as a matplotlib figure."""
-        figure: Figure = resolve("plot_validation")(self)
-        return figure
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of_validation")(self)
-        return page
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

@@ -25,6 +25,7 @@ from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
 from swashplate.validation.noise_filter import Piece
 from swashplate.validation.refutation import REFUTED, STANDS, Judgement, judge
 
@@ -74,7 +75,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Shown):
     """How an identified model follows unseen records.
 
     Attributes:

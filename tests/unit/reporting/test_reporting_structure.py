@@ -284,5 +284,12 @@ def test_theils_best_is_bold_by_itself_and_residuals_are_in_units_that_can_be_re
 
 
 def test_phase_axes_have_marks_at_multiples_of_45_degrees() -> None:
-    assert [phase_ticks([0.0, -span])["dtick"] for span in (90.0, 400.0, 700.0, 3000.0)] == [45, 90, 180, 360]
+    assert [phase_ticks([0.0, -span])["dtick"] for span in (60.0, 90.0, 200.0, 400.0, 700.0, 3000.0)] == [
+        15,
+        30,
+        45,
+        90,
+        180,
+        360,
+    ]
     assert phase_ticks([np.nan])["dtick"] == 45

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -185,13 +185,33 @@ class FrequencyResponse:
             "settings": dict(self.settings),
         }
 
-    def plot(self, *, pairs: Sequence[tuple[str, str]] | None = None) -> Figure:
-        """Bode plots with coherence as a matplotlib figure: of (output, input) pairs, or of those that are coherent."""
-        figure: Figure = resolve("plot_responses")(self, pairs=pairs)
+    def plot(
+        self,
+        *,
+        pairs: Sequence[tuple[str, str]] | None = None,
+        theme: Literal["paper", "light", "dark"] = "paper",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Figure:
+        """Bode diagrams with coherence as a matplotlib figure: (output, input) pairs side by side.
+
+        Where no pairs are given, the matrix of all outputs and inputs that answer coherently: outputs down, inputs
+        across.
+        """
+        figure: Figure = resolve("plot_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
         return figure
 
+    def explore(
+        self,
+        *,
+        pairs: Sequence[tuple[str, str]] | None = None,
+        theme: Literal["paper", "light", "dark"] = "light",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Any:
+        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
+        return resolve("explore_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
+
     def _repr_html_(self) -> str:
-        page: str = resolve("html_of_responses")(self)
+        page: str = resolve("html_of")(self)
         return page
 
     # ---- looking -----------------------------------------------------------------------------------------------
