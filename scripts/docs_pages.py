@@ -31,6 +31,7 @@ from typing import Any
 from unittest import mock
 
 from own_package import EXAMPLES, installed
+from real_results import results_text, trusted_text
 
 from swashplate.atomic import write_bytes, write_text
 
@@ -387,6 +388,13 @@ def ducted_fan_text() -> str:
     return f"```python\n{code}```\n\nIts `pyproject.toml` names it:\n\n```toml\n{points}\n```"
 
 
+def decisions_text() -> str:
+    """Every decision's page by its heading, in the order of their numbers."""
+    pages = sorted(page for page in (DOCS / "decisions").glob("*.md") if page.name != "index.md")
+    headings = [page.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ") for page in pages]
+    return "\n".join(f"* [{heading}]({page.name})" for heading, page in zip(headings, pages, strict=True))
+
+
 _DUCTED_FAN = ("ducted_fan.py", "pyproject.toml")
 
 
@@ -400,6 +408,9 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "bench_columns": bench_columns_text,
     "bench_procedures": bench_procedures_text,
     "ducted_fan": ducted_fan_text,
+    "decisions": decisions_text,
+    "results": results_text,
+    "trusted": trusted_text,
 }
 
 

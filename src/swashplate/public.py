@@ -117,8 +117,17 @@ NAMES = tuple(sorted((*_LIGHT, *_COMPUTING)))
 """What `swashplate` offers by name, `read` and the version besides."""
 
 
-def _load(place: str) -> Any:
-    module, _, attribute = place.partition(":")
+def place(name: str) -> str:
+    """Where a name of the tables is defined, as "package.module:name".
+
+    Raises:
+        KeyError: where no table has the name.
+    """
+    return {**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name]
+
+
+def _load(where: str) -> Any:
+    module, _, attribute = where.partition(":")
     return getattr(import_module(module), attribute)
 
 
@@ -129,6 +138,6 @@ def resolve(name: str) -> Any:
         KeyError: where no table has the name.
     """
     if name in _COMPUTING:
-        for place in _SET_UP:
-            _load(place)()
-    return _load({**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name])
+        for step in _SET_UP:
+            _load(step)()
+    return _load(place(name))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.validation.validation import AxisVerdict, Score
 
 THRESHOLDS = {"good": 50.0, "usable": 20.0}
 """Prediction fit [%] of every channel of an axis at its horizon; both must also beat every rival."""
+
+LEVELS = ("good", "usable", "poor", "cannot be judged")
+"""Every level, from the best to the one that says nothing about the model."""
 
 _AXES = {
     # axis: channels, horizon [s]
@@ -35,6 +38,13 @@ def verdict(scores: Sequence[Score], excitation: Sequence[AxisExcitation]) -> tu
         judged = [item for item in excitation if item.axis == axis]
         made.append(_one(axis, channels, horizon, rows, judged))
     return tuple(made)
+
+
+def in_brief(verdicts: Iterable[AxisVerdict]) -> str:
+    """The axes by level in one line, as "good: roll, horizontal; cannot be judged: pitch"."""
+    judged = list(verdicts)
+    by_level = {level: [v.axis for v in judged if v.level == level] for level in LEVELS}
+    return "; ".join(f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes)
 
 
 def _one(
