@@ -29,13 +29,21 @@ _LIGHT: Mapping[str, str] = {
     "equation_error": "swashplate.identification.time.equation_error:equation_error",
     "evaluate_bench": "swashplate.api.bench:evaluate_bench",
     "export_controller": "swashplate.api.export:export_controller",
+    "export_flight": "swashplate.api.export:export_flight",
+    "fetch_dataset": "swashplate.flights.datasets:fetch",
+    "film_replay": "swashplate.links.live.film:film_replay",
     "fit_in_frequency": "swashplate.identification.time.linear_frequency_fit:fit_in_frequency",
     "fit_state_space": "swashplate.identification.frequency.state_space_fit:fit_state_space",
+    "fit_tf": "swashplate.api.fit_tf:fit_tf",
     "fit_transfer_function": "swashplate.identification.frequency.transfer_function_fit:fit_transfer_function",
+    "handling_qualities": "swashplate.identification.frequency.handling_readings:handling_lines",
     "inspect": "swashplate.flights.inspect:inspect",
     "load": "swashplate.identification.core.result_file:load",
     "maneuver": "swashplate.flights.maneuvers.series:parse",
     "merge": "swashplate.flights.conditioning.synchronise:merge",
+    "new_card": "swashplate.models.conventional.new_card:new_card",
+    "plan_maneuver": "swashplate.flights.maneuvers.planned:plan_maneuver",
+    "read": "swashplate.flights.readers.read:read",
     "read_control": "swashplate.export.control_json:read_control",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
@@ -43,7 +51,9 @@ _LIGHT: Mapping[str, str] = {
     "structure": "swashplate.models.catalogue:structure",
     "suggest_gains": "swashplate.api.gains:suggest_gains",
     "synchronise": "swashplate.flights.conditioning.synchronise:synchronise",
+    "uniform_records": "swashplate.flights.conditioning.uniform_records:uniform_records",
     "vehicle": "swashplate.models.catalogue:vehicle",
+    "vehicles": "swashplate.models.catalogue:cards_by_name",
     "verify": "swashplate.validation.verification:verify",
 }
 _COMPUTING: Mapping[str, str] = {
@@ -51,17 +61,23 @@ _COMPUTING: Mapping[str, str] = {
     "Sensors": "swashplate.simulation.sensors:Sensors",
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",
+    "compare_derivatives": "swashplate.simulation.published:compare_derivatives",
     "decouple": "swashplate.api.decouple:decouple",
     "decouple_axes": "swashplate.api.decouple_axes:decouple_axes",
+    "demo": "swashplate.api.demo:demo",
     "derivatives": "swashplate.simulation.derivatives_over_speed:derivatives",
     "design_controller": "swashplate.api.design_controller:design_controller",
     "excitation": "swashplate.api.excitation:excitation",
     "export_model": "swashplate.api.export:export_model",
     "fit_in_time": "swashplate.identification.time.linear_time_fit:fit_in_time",
+    "fit_ss": "swashplate.api.fit_ss:fit_ss",
+    "fit_time": "swashplate.api.fit_time:fit_time",
     "fit_vehicle": "swashplate.identification.time.vehicle_time_fit:fit_vehicle",
     "fly_maneuver": "swashplate.api.fly_maneuver:fly_maneuver",
     "hover_hold": "swashplate.control.laws.hold:hover_hold",
     "identify": "swashplate.identification.identify:identify",
+    "identify_and_validate": "swashplate.api.identification:identify_and_validate",
+    "in_form": "swashplate.simulation.reduction:in_form",
     "linearize": "swashplate.simulation.linearize:linearize",
     "link_ardupilot": "swashplate.api.link:link_ardupilot",
     "link_px4": "swashplate.api.link:link_px4",
@@ -71,6 +87,7 @@ _COMPUTING: Mapping[str, str] = {
     "observability": "swashplate.api.observability:observability",
     "observe": "swashplate.simulation.sensors:observe",
     "observer_trial": "swashplate.control.lqg.observer_trial:trial",
+    "omit_derivatives": "swashplate.simulation.reduction:omit_derivatives",
     "plan_bench": "swashplate.bench.plan:plan",
     "replay": "swashplate.links.live.replay:replay",
     "show_replay": "swashplate.api.live:show_replay",
@@ -85,6 +102,8 @@ _COMPUTING: Mapping[str, str] = {
     "trim": "swashplate.simulation.trim:trim",
     "trim_curve": "swashplate.simulation.trim_curve:trim_curve",
     "validate": "swashplate.validation.verb:validate",
+    "validate_linear": "swashplate.api.validate_linear:validate_linear",
+    "write_ardupilot_parameters": "swashplate.api.link:write_ardupilot_parameters",
 }
 """Names that set JAX up when they are first used; the others leave it alone."""
 
@@ -114,7 +133,7 @@ _SET_UP = (
     "swashplate.simulation.compilation:enable_compilation_cache",
 )
 NAMES = tuple(sorted((*_LIGHT, *_COMPUTING)))
-"""What `swashplate` offers by name, `read` and the version besides."""
+"""What `swashplate` offers by name, the version besides."""
 
 
 def place(name: str) -> str:

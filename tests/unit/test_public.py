@@ -11,7 +11,6 @@ import pytest
 import swashplate as sp
 from swashplate import public
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.read import read
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.shown import Shown
 from swashplate.simulation.derivatives_over_speed import Derivatives
@@ -29,7 +28,6 @@ METHODS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "Shown.explore": (Shown.explore, public.resolve("explore")),
     "Flight.from_arrays": (Flight.from_arrays, public.resolve("flight_from_arrays")),
     "Flight.from_dataframe": (Flight.from_dataframe, public.resolve("flight_from_dataframe")),
-    "read": (sp.read, read),
 }
 
 
@@ -54,7 +52,7 @@ def test_every_name_behind_a_method_is_there() -> None:
 
 
 def test_the_tables_and_the_public_list_agree() -> None:
-    assert {*public.NAMES, "read", "__version__"} == set(sp.__all__)
+    assert {*public.NAMES, "__version__"} == set(sp.__all__)
 
 
 def test_a_name_of_no_table_is_a_key_error() -> None:

@@ -18,12 +18,15 @@ from swashplate.reporting.compose import compose
 from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.speed_page import compose_speeds
 from swashplate.reporting.structure import Report
+from swashplate.simulation.derivatives_over_speed import Derivatives
 from swashplate.simulation.linearize import Mode
+from swashplate.simulation.trim_curve import TrimCurve
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse | TrimCurve | Derivatives
 
 
 @runtime_checkable
@@ -48,6 +51,7 @@ def report(
     Args:
         results: of any identification, a validation or a verification of it, measured responses; None is left out. A
             page is about one vehicle's fit and validation, or about linear models, their responses and verification.
+            Trims or derivatives over a range of speeds make a page of their own.
             One that knows its own page (`check_controller`, `decouple`, `monte_carlo` ...) goes alone.
         path: where to write; the folder is made where it is missing.
         title: heading; made from the models and the flights where None.
@@ -71,12 +75,14 @@ def structure_of(
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []
     for one in asked:
-        if not isinstance(one, HasPage):
+        if not isinstance(one, HasPage | TrimCurve | Derivatives):
             given.append(one)
         elif len(asked) > 1 or modes is not None:
             raise SwashError("has a page of its own.", channel=type(one).__name__, hint="Write a report of each.")
-        else:
+        elif isinstance(one, HasPage):
             return one.page(title=title)
+        else:
+            return compose_speeds(one, title=title)
     of_vehicles = [one for one in given if isinstance(one, Validation) or _is_of(one, Vehicle)]
     if not of_vehicles:
         return _of_linear_models(given, title)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from swashplate.errors import SwashError
-from swashplate.models.conventional.derivative_table import COLUMNS, ROWS, DerivativeTable, split_name
+from swashplate.models.conventional.derivative_table import COLUMNS, ROWS, split_name
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Figure, Key, Points, Report, Section
 from swashplate.reporting.theme import (
     BLACK,
@@ -52,28 +49,15 @@ _WIDE = 860
 """px: below this width the derivatives' small panels scroll."""
 
 
-def speed_page(
-    vehicle: Vehicle,
-    trims: Sequence[Trim],
-    *,
-    path: str | os.PathLike[str],
-    tables: Sequence[DerivativeTable] = (),
-    remarks: Sequence[str] = (),
-    imperial: bool = False,
-) -> Path:
-    """Write one self-contained HTML page.
-
-    Args:
-        vehicle: whose trims they are.
-        trims: at two speeds or more.
-        path: where to write.
-        tables: derivatives at the same speeds (none: no such section).
-        imperial: derivatives in feet.
-        remarks: what may not be believed.
+def compose_speeds(found: TrimCurve | Derivatives, *, title: str | None = None) -> Report:
+    """The page's structure: trims and modes over speed, and derivatives where they were asked for.
 
     Raises:
-        SwashError: where there are fewer than two speeds, or the place cannot be written to.
+        SwashError: where there are fewer than two speeds.
     """
+    vehicle, trims = found.vehicle, found.trims
+    tables, imperial = (found.tables, found.imperial) if isinstance(found, Derivatives) else ((), False)
+    remarks = TrimCurve(vehicle, trims).remarks
     if len(trims) < 2:
         raise SwashError("a plot over speed needs a range of speeds.", channel="--speed", hint='Give one, e.g. "0-15".')
     sections = [
@@ -88,8 +72,9 @@ def speed_page(
     if remarks:
         sections.append(Section("doubts", "Where the equations do not hold", (Points(tuple(remarks)),)))
     first, last = trims[0].speed, trims[-1].speed
-    report = Report(
-        title=f"{'Trim and derivatives' if tables else 'Trim'} from {first:g} to {last:g} m/s: {vehicle.card.title}",
+    return Report(
+        title=title
+        or f"{'Trim and derivatives' if tables else 'Trim'} from {first:g} to {last:g} m/s: {vehicle.card.title}",
         banners=(("caution", "Some of these speeds lie outside what the equations cover; see the last section."),)
         if remarks
         else (),
@@ -98,7 +83,6 @@ def speed_page(
         sections=tuple(sections),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
-    return write_page(path, report)
 
 
 def controls(curve: TrimCurve) -> Figure:

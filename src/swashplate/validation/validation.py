@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swashplate.arrays import Array
+from swashplate.atomic import write_json
 from swashplate.filtering.disturbed_model import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
@@ -145,6 +148,10 @@ class Validation(Shown):
                 for record, told in zip(self.records, self.calibrated, strict=False)
             ],
         }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the document as a JSON file."""
+        return write_json(path, self.as_dict())
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

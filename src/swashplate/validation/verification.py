@@ -9,13 +9,16 @@ controls do nothing. Everything else that moves has to come from the model and t
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.atomic import write_json
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.filters import filtered
 from swashplate.flights.flight import Flight
@@ -162,6 +165,10 @@ class Verification(Shown):
             "band_hz": self.settings.get("band_hz"),
             "inside_band": None if self.inside is None else self.inside.as_dict() | {"flights": []},
         }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the document as a JSON file."""
+        return write_json(path, self.as_dict())
 
     def __repr__(self) -> str:
         band = self.settings.get("band_hz")

@@ -10,6 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
+from swashplate.flights.conditioning.uniform_records import renamed_channels
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
@@ -214,6 +215,7 @@ def respond(
             "overlap": overlap,
             "references": list(references),
             "averages": [m.averages for m in matrices],
+            **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),
             "means": means(flights, (*inputs, *outputs)),
         },
