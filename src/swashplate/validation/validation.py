@@ -12,6 +12,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
+from swashplate.validation.floors import ROWS, Floor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,6 +105,7 @@ class Validation:
         flights: the conditioned flights.
         settings: observer, horizons.
         calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
+        floors: what the model's scores stand beside, per channel and horizon.
     """
 
     vehicle: Vehicle
@@ -119,6 +121,7 @@ class Validation:
     flights: tuple[Flight, ...]
     settings: Mapping[str, Any]
     calibrated: tuple[Nuisance, ...] = ()
+    floors: tuple[Floor, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -128,12 +131,17 @@ class Validation:
             if s.channel == channel and abs(s.horizon - horizon) < 1e-9 and s.predictor == predictor
         )
 
+    def floor(self, channel: str, horizon: float) -> Floor:
+        """What the model's score on one channel at one horizon stands beside."""
+        return next(f for f in self.floors if f.channel == channel and abs(f.horizon - horizon) < 1e-9)
+
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "validation",
             "vehicle": self.vehicle.name,
             "scores": [vars(score) for score in self.scores],
+            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -166,4 +174,8 @@ class Validation:
             for predictor in PREDICTORS:
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
+            beside = {f.channel: f for f in self.floors if f.horizon == horizon}
+            for words, cell in ROWS if beside else ():
+                row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
+                lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
         return "\n".join([*lines, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])
