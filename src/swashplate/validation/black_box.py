@@ -217,7 +217,7 @@ def _predicted(
         if len(X) < _FEWEST * X.shape[1]:
             return None
         for (rows, wanted), error in zip(asked, errors, strict=True):
-            error[:] = _ridge(X, Y, rows) - wanted
+            error[:] = ridge(X, Y, rows) - wanted
     else:
         times = [r.time[_rows(r, ahead)] for r in records]
         for place, record in enumerate(records):
@@ -233,8 +233,13 @@ def _predicted(
                 if len(X) < _FEWEST * X.shape[1]:
                     return None
                 rows, wanted = asked[place]
-                errors[place][:, inside] = _ridge(X, Y, rows[inside]) - wanted[inside]
+                errors[place][:, inside] = ridge(X, Y, rows[inside]) - wanted[inside]
     squares = [_out_of_heading(e, r) ** 2 for e, r in zip(errors, records, strict=True)]
+    return best_of_strengths(squares)
+
+
+def best_of_strengths(squares: Sequence[Array]) -> list[Array]:
+    """Squared errors (s, k) by record of the strength that is best for each column, from (strengths, s, k)."""
     best = np.argmin(np.concatenate(squares, axis=1).mean(axis=1), axis=0)
     return [np.take_along_axis(s, best[None, None, :], axis=0)[0] for s in squares]
 
@@ -252,8 +257,8 @@ def _out_of_heading(errors: Array, record: Motion) -> Array:
     return np.stack([_in_heading(rows, -heading) for rows in errors])
 
 
-def _ridge(X: Array, Y: Array, asked: Array) -> Array:
-    """Predictions (strengths, s, 12) by standardised columns; their means are free."""
+def ridge(X: Array, Y: Array, asked: Array) -> Array:
+    """Predictions (strengths, s, k) of ridge regressions by standardised columns; their means are free."""
     mean, size, level = X.mean(axis=0), X.std(axis=0), Y.mean(axis=0)
     size = np.where(size > 1e-12, size, np.inf)
     Z = (X - mean) / size

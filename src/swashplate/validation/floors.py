@@ -30,7 +30,7 @@ class Floor:
     """One channel at one horizon, with all that its fit % must be read with.
 
     Attributes:
-        channel, unit: which. horizon: seconds ahead.
+        channel, unit: which. horizon: seconds ahead; infinite for a model that is flown along the inputs.
         fit, low, high: the model's fit [%] and its 95 % interval (block bootstrap; NaN with fewer than three blocks).
         rms: of its error [unit]. moved: rms of what the flight moved over the horizon [unit], the excitation.
         rival: the best predictor but the model; lead, lead_low, lead_high: points by which the model is ahead of it,
@@ -75,6 +75,11 @@ class Floor:
         return math.isfinite(self.ceiling) and near
 
     @property
+    def scatter(self) -> str:
+        """The interval of the fit in words; empty where there is none."""
+        return f"{_percent(self.low)} to {_percent(self.high)} %, " if math.isfinite(self.low) else ""
+
+    @property
     def words(self) -> str:
         """Whether the model or the flight is poor."""
         unit = known(self.channel)
@@ -82,7 +87,7 @@ class Floor:
         promise = f", the filter itself expects {_percent(self.expected)} %" if math.isfinite(self.expected) else ""
         moves = f"the flight moves {moved} {unit.shown_unit} rms{promise}"
         if not math.isfinite(self.ceiling):
-            return f"{moves}. {self._without_ceiling} No ceiling: {self.refused}."
+            return f"{moves}. {self._without_ceiling}No ceiling: {self.refused}."
         if self.reached and self.ceiling < _LOW:
             unforeseen = self.moved * (1.0 - self.ceiling / 100.0) * factor
             return (
@@ -97,14 +102,12 @@ class Floor:
     def _without_ceiling(self) -> str:
         if not math.isfinite(self.seen):
             return ""
-        if self.past - self.fit > _CLOSE:
-            return f"The model is poor: the past alone foretells {_percent(self.past)} %."
+        if math.isfinite(self.past) and self.past - self.fit > _CLOSE:
+            return f"The model is poor: the past alone foretells {_percent(self.past)} %. "
         if self.seen - self.fit <= _CLOSE:
-            return f"Even a black box that reads a controller's answers reaches {_percent(self.seen)} %."
-        return (
-            f"The past alone foretells {_percent(self.past)} %, a black box that reads a controller's answers "
-            f"{_percent(self.seen)} %."
-        )
+            return f"Even a black box that reads a controller's answers reaches {_percent(self.seen)} %. "
+        alone = f"The past alone foretells {_percent(self.past)} %, a" if math.isfinite(self.past) else "A"
+        return f"{alone} black box that reads a controller's answers {_percent(self.seen)} %. "
 
 
 def _shown(floor: Floor, value: float) -> str:
@@ -142,7 +145,8 @@ def floors(
 
     Args:
         channels: names of the columns. horizon: seconds ahead. times: start times [s] by record.
-        squares: squared errors by predictor and record (s, channels); the first predictor is the model.
+        squares: squared errors by predictor and record (s, channels); the first predictor is the model. A channel that
+            the schema does not know has no unit here.
         moved: squared changes since the start, the same way.
         expected: standard deviation of the prediction that the filter promises, by channel [unit]; NaN for none.
         ceilings: candidates; by channel the best of those that pass the leak test counts.
@@ -152,7 +156,7 @@ def floors(
     stacked = [
         np.stack(
             [part for name in names for part in (squares[name][r], moved[name][r])]
-            + [part for box in boxes for part in (box.squares[r], box.past[r])],
+            + [part for box in boxes for part in (box.squares[r], box.past[r] if box.past else _none(box.squares[r]))],
             axis=1,
         )
         for r in range(len(times))
@@ -210,6 +214,10 @@ def floors(
             )
         )
     return tuple(made)
+
+
+def _none(like: Array) -> Array:
+    return np.full_like(like, NAN)
 
 
 def _fit(squares: Array, moved: Array) -> Array:
