@@ -51,6 +51,7 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
             "record.",
         )
     )
+    blocks += [Text(f"{f.channel}: fit {f.fit:.0f} %, {f.scatter}{f.words}", tone="quiet") for f in v.floors]
     if rival is not None:
         theirs = tuple(
             (Cell(o.output), Cell(f"{o.theil:.2f}", number=True), Cell(f"{o.fit:.0f}", number=True))

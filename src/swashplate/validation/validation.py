@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_json
@@ -15,9 +15,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
-
-if TYPE_CHECKING:
-    pass
+from swashplate.validation.floors import ROWS, Floor
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
 
@@ -107,6 +105,7 @@ class Validation(Shown):
         flights: the conditioned flights.
         settings: observer, horizons.
         calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
+        floors: what the model's scores stand beside, per channel and horizon.
     """
 
     vehicle: Vehicle
@@ -122,6 +121,7 @@ class Validation(Shown):
     flights: tuple[Flight, ...]
     settings: Mapping[str, Any]
     calibrated: tuple[Nuisance, ...] = ()
+    floors: tuple[Floor, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -131,12 +131,17 @@ class Validation(Shown):
             if s.channel == channel and abs(s.horizon - horizon) < 1e-9 and s.predictor == predictor
         )
 
+    def floor(self, channel: str, horizon: float) -> Floor:
+        """What the model's score on one channel at one horizon stands beside."""
+        return next(f for f in self.floors if f.channel == channel and abs(f.horizon - horizon) < 1e-9)
+
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "validation",
             "vehicle": self.vehicle.name,
             "scores": [vars(score) for score in self.scores],
+            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -164,4 +169,8 @@ class Validation(Shown):
             for predictor in PREDICTORS:
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
+            beside = {f.channel: f for f in self.floors if f.horizon == horizon}
+            for words, cell in ROWS if beside else ():
+                row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
+                lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
         return "\n".join([*lines, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

@@ -24,6 +24,7 @@ from swashplate.reporting.structure import Cell, Report, Section, Table
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
+from swashplate.validation.prediction import HORIZONS
 
 
 @given(
@@ -221,6 +222,18 @@ def test_parameter_row_says_where_its_value_comes_from() -> None:
 def test_examples_that_overlap_are_not_drawn_over_each_other() -> None:
     chosen = apart(validation().examples)
     assert [example.start for example in chosen] == [2.0, 6.0, 9.0, 13.0]
+
+
+def test_every_horizon_says_what_its_scores_stand_beside() -> None:
+    (section,) = (s for s in compose(None, validation(), modes=modes()).sections if s.identifier == "prediction")
+    beside = [b for b in section.blocks if isinstance(b, Table) and "stand beside" in b.caption]
+    assert len(beside) == len(HORIZONS)
+    cells = {row[0].words: [cell.words for cell in row] for row in beside[0].rows}
+    assert cells["psi"][9] == "refused"
+    assert cells["phi"][9] != "refused"
+    assert "No ceiling" in cells["psi"][-1]
+    without = compose(None, replace(validation(), floors=()), modes=modes())
+    assert not any("stand beside" in getattr(b, "caption", "") for s in without.sections for b in s.blocks)
 
 
 def test_tables_refuse_ragged_rows() -> None:
