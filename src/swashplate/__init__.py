@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
+    from swashplate.api.open_logs import open_logs
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
@@ -127,6 +128,7 @@ __all__ = [
     "observability",
     "observe",
     "observer_trial",
+    "open_logs",
     "plan_bench",
     "read",
     "read_control",

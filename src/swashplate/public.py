@@ -36,6 +36,7 @@ _LIGHT: Mapping[str, str] = {
     "load": "swashplate.identification.core.result_file:load",
     "maneuver": "swashplate.flights.maneuvers.series:parse",
     "merge": "swashplate.flights.conditioning.synchronise:merge",
+    "open_logs": "swashplate.api.open_logs:open_logs",
     "read_control": "swashplate.export.control_json:read_control",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
