@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
+    from swashplate.api.open_logs import open_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.laws.autopilot import autopilot
@@ -154,6 +155,7 @@ __all__ = [
     "observe",
     "observer_trial",
     "omit_derivatives",
+    "open_logs",
     "plan_bench",
     "plan_maneuver",
     "read",

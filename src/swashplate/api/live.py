@@ -65,7 +65,7 @@ def live(
         session = LiveSession(vehicle, controller=chosen, folder=place)
         session.clock.start()
         try:
-            _announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+            announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
             serving.serve(server.live_app(session, remote=allow_remote), listening, frame=server.FRAME)
         finally:
             session.close()
@@ -98,11 +98,12 @@ def show_replay(
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         made = shown if isinstance(shown, Replay) else shown()
         check_page()
-        _announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+        announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
         serving.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
 
 
-def _announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+    """Tell where a page is, and open it where that was asked for."""
     ready(address)
     if open_page and not webbrowser.open(address):
         say(f"No browser was found; open {address} yourself.")

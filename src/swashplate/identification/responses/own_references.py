@@ -19,6 +19,7 @@ from swashplate.flights.maneuvers.sweeps import all_rising
 from swashplate.flights.provenance import Event
 from swashplate.identification.responses.spectra import Signals
 
+
 @dataclass(frozen=True)
 class OwnReferences:
     """What serves as references.
@@ -62,7 +63,9 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
         for one in found
     ]
     power = np.array([np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(found, followed, strict=True)])
-    whole = np.array([np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found])
+    whole = np.array(
+        [np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found]
+    )
     size = np.sqrt(power)
     largest = np.maximum(size.max(axis=0), 1e-300)
     with np.errstate(divide="ignore", invalid="ignore"):
