@@ -60,8 +60,7 @@ proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
 
 site: $(STAMP)
-	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet \
-	-c docs/site -d build/site-pages docs build/site
+	$(BIN)/python scripts/build_site.py
 
 clean:
 	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

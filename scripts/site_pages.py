@@ -2,6 +2,7 @@
 
 * A page with `<!-- navigation -->` gives its children by its own lists: every item that begins with a link to a page,
   under its heading of the second level. So the list that a person reads and the navigation are the same.
+* `<!-- include -->` before a link to a file of the repository's root shows that file there, with links that hold.
 * `<!-- python reference -->` becomes every public name with its signature and docstring (`site_reference`).
 * A page of docs/notebooks is offered as a Jupyter notebook too.
 """
@@ -9,17 +10,30 @@
 from __future__ import annotations
 
 import json
+import posixpath
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import docs_pages
 import site_reference
 from pygments.lexers.special import TextLexer
+from sphinx.search.en import SearchEnglish
 
 NAVIGATION = "<!-- navigation -->"
 REFERENCE = "<!-- python reference -->"
 NOTEBOOKS = "notebooks/"
+OF_THE_ROOT = {
+    "README.md": "index.md",
+    "ARCHITECTURE.md": "developers/architecture.md",
+    "CONTRIBUTING.md": "developers/contributing.md",
+    "CHANGELOG.md": "developers/changes.md",
+}
+"""Where files of the repository's root stand on the site."""
+
+_INCLUDE = re.compile(r"^<!-- include -->\[[^\]]+\]\((?:\.\./)+(\w+\.md)\)$", re.MULTILINE)
+_LINK = re.compile(r"\[([^\[\]]*)\]\((?!https?:|#)([^)\s]+)\)")
 _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 _ITEM = re.compile(r"^(?:[*-]|\d+\.) +\**\[[^\]]+\]\(([^)#]+)\.md\)", re.MULTILINE)
 
@@ -35,6 +49,25 @@ def navigation(text: str) -> str:
             caption = f":caption: {title}\n" if title else ""
             made.append("```{toctree}\n:hidden:\n" + caption + "\n" + "\n".join(items) + "\n```")
     return "\n\n".join(made)
+
+
+def included(name: str, page: str) -> str:
+    """A file of the repository's root as part of a page, with links and pictures relative to that page.
+
+    Args:
+        name: of the file.
+        page: the page's path below docs/.
+    """
+    here = posixpath.dirname(page)
+
+    def relative(match: re.Match[str]) -> str:
+        path, mark, anchor = match[2].partition("#")
+        target = path.removeprefix("docs/") if path.startswith("docs/") else OF_THE_ROOT.get(path)
+        if target is None:
+            return match[1]  # a file that is no page
+        return f"[{match[1]}]({posixpath.relpath(target, here or '.')}{mark}{anchor})"
+
+    return _LINK.sub(relative, (docs_pages.ROOT / name).read_text(encoding="utf-8"))
 
 
 def notebook(text: str) -> dict[str, Any]:
@@ -64,10 +97,10 @@ def notebook(text: str) -> dict[str, Any]:
 
 
 def _read(app: Any, name: str, source: list[str]) -> None:
-    text = source[0]
+    text = _INCLUDE.sub(lambda match: included(match[1], f"{name}.md"), source[0])
     if REFERENCE in text:
         text = text.replace(REFERENCE, site_reference.reference())
-    if name.startswith(NOTEBOOKS) and name != "notebooks/index":
+    if name.startswith(NOTEBOOKS):
         link = f'<a href="{Path(name).name}.ipynb" download>Download this page as a Jupyter notebook</a>'
         text += f"\n\n```{{raw}} html\n<p>{link}</p>\n```\n"
     if NAVIGATION in text:
@@ -79,12 +112,22 @@ def _finish(app: Any, exception: Exception | None) -> None:
     if exception is not None or app.builder.format != "html":
         return
     for page in sorted((Path(app.srcdir) / NOTEBOOKS).glob("*.md")):
-        if page.stem != "index":
-            made = json.dumps(notebook(page.read_text(encoding="utf-8")), indent=1)
-            (Path(app.outdir) / NOTEBOOKS / f"{page.stem}.ipynb").write_text(made + "\n", encoding="utf-8")
+        made = json.dumps(notebook(page.read_text(encoding="utf-8")), indent=1)
+        (Path(app.outdir) / NOTEBOOKS / f"{page.stem}.ipynb").write_text(made + "\n", encoding="utf-8")
+
+
+_stem = lru_cache(maxsize=None)(SearchEnglish({}).stemmer.stemWord)
+
+
+class _Search(SearchEnglish):
+    """Sphinx's English search, which stems each word once and not once a page."""
+
+    def stem(self, word: str) -> str:
+        return _stem(word.lower())
 
 
 def setup(app: Any) -> dict[str, Any]:
+    app.add_search_language(_Search)
     app.add_lexer("csv", TextLexer)
     app.connect("source-read", _read)
     app.connect("build-finished", _finish)

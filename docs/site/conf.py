@@ -12,8 +12,6 @@ author = "The swashplate developers"
 extensions = ["myst_parser", "site_pages"]
 exclude_patterns = ["site"]
 myst_heading_anchors = 4
-myst_enable_extensions = ["colon_fence"]
-nitpicky = False
 python_maximum_signature_line_length = 80
 toc_object_entries_show_parents = "hide"
 
@@ -23,11 +21,13 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
+html_show_search_summary = False  # it is fetched, which browsers refuse for files
+html_context = {"default_mode": "auto"}
 html_show_sphinx = False
 html_show_copyright = False
 html_sidebars = {"index": [], "search": []}
 html_theme_options = {
-    "header_links_before_dropdown": 5,
+    "header_links_before_dropdown": 7,
     "navbar_align": "left",
     "show_prev_next": False,
     "show_nav_level": 1,
