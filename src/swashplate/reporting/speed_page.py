@@ -36,7 +36,8 @@ from swashplate.reporting.theme import (
     unit_words,
 )
 from swashplate.reporting.versions import date, versions
-from swashplate.simulation.linearize import Mode, linearize
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
 
 _PART_COLORS = {

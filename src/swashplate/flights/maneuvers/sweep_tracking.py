@@ -5,8 +5,8 @@ time. The signal is turned back by the sweep's phase, smoothed over a few cycles
 demodulation (Bloomfield 2000, ch. 7), counted in cycles instead of seconds, so that its bandwidth is a share of the
 frequency. The phase is at first that of the ridge of the signal's scalogram, then the signal's own, smoothed.
 
-Programs sweep by a law. All usual ones (linear, exponential, Tischler's) have a frequency a + b exp(c t); where it holds,
-the phase is the law's, the window is long, and the sweep is followed beyond the ridge's ends. Hands keep no law.
+Programs sweep by a law. All usual ones (linear, exponential, Tischler's) have a frequency a + b exp(c t); where it
+holds, the phase is the law's, the window is long, and the sweep is followed beyond the ridge's ends. Hands keep no law.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ _SMOOTH = 4.0
 """Standard deviation [points] over which a ridge's steps of an eighth of an octave are rounded off."""
 _STEADY = 0.8
 """Share of a sweep's power that must be left in the long window for its law to hold."""
+_CLEAR = 3.0
+"""Amplitude of a sweep over that of the same frequency at other times: a ninth of the power may be the loop's."""
 _FADED = 0.25
 """Of a lawful sweep's median amplitude: there it ends."""
 
@@ -38,13 +40,26 @@ class Ridge:
     Attributes:
         time: of its points [s], rising, shape (n,).
         frequency: there [Hz], shape (n,). amplitude: there, shape (n,).
+        elsewhere: amplitude at the same frequency while the sweep is elsewhere, shape (n,).
         share: of the power around it that it holds, on average.
     """
 
     time: Array
     frequency: Array
     amplitude: Array
+    elsewhere: Array
     share: float
+
+    def clear(self) -> Ridge | None:
+        """The ridge from where it first stands out of what is at its frequency otherwise, to where it last does.
+
+        Before a sweep begins, the strongest slow motion passes for its beginning. None where it never stands out.
+        """
+        out = np.flatnonzero(self.amplitude >= _CLEAR * self.elsewhere)
+        if out.size < 2:
+            return None
+        part = slice(int(out[0]), int(out[-1]) + 1)
+        return Ridge(self.time[part], self.frequency[part], self.amplitude[part], self.elsewhere[part], self.share)
 
     @property
     def start(self) -> float:

@@ -19,6 +19,10 @@ from swashplate.flights.maneuvers.sweeps import all_rising
 from swashplate.flights.provenance import Event
 from swashplate.identification.responses.spectra import Signals
 
+_LEAST_SECONDS = 4.0
+"""That a sweep must stand out of what is there otherwise."""
+
+
 @dataclass(frozen=True)
 class OwnReferences:
     """What serves as references.
@@ -62,7 +66,9 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
         for one in found
     ]
     power = np.array([np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(found, followed, strict=True)])
-    whole = np.array([np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found])
+    whole = np.array(
+        [np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found]
+    )
     size = np.sqrt(power)
     largest = np.maximum(size.max(axis=0), 1e-300)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -103,7 +109,10 @@ def _sweeps_in(k: int, piece: Signals, inputs: int, events: Sequence[Event]) -> 
         return told
     seen: list[tuple[float, int, Ridge]] = []
     for i in range(inputs):
-        for ridge in all_rising(time, piece.values[:, i]):
+        for whole in all_rising(time, piece.values[:, i]):
+            ridge = whole.clear()
+            if ridge is None or ridge.stop - ridge.start < _LEAST_SECONDS:
+                continue
             octaves = float(np.log2(ridge.frequency[-1] / ridge.frequency[0]))
             seen.append((ridge.share * octaves, i, ridge))
     kept: list[tuple[int, Ridge]] = []
