@@ -35,6 +35,9 @@ def respond(
     windows: Annotated[
         str | None, typer.Option("--windows", help="Window lengths in s, separated by commas; by the book's rules.")
     ] = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="The direct estimate: sweeps found in the inputs are no references.")
+    ] = False,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -71,7 +74,13 @@ def respond(
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
             found = answer(
-                flights, inputs=tuple(ins), outputs=tuple(outs), references=refs, band=limits, windows=lengths
+                flights,
+                inputs=tuple(ins),
+                outputs=tuple(outs),
+                references=refs,
+                band=limits,
+                windows=lengths,
+                direct=direct,
             )
             renamed = {name: source for name, source in how.channels.items() if name != source}
             found = replace(found, settings={**found.settings, "channels": renamed})

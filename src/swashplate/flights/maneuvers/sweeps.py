@@ -190,18 +190,7 @@ def rising(time: Array, values: Array) -> Ridge | None:
     if np.unique(rows).size < 0.6 * (rows[-1] - rows[0]):
         return None
     at = time[0] + grid[np.minimum(frames * hop, grid.size - 1)]
-    return Ridge(at, band, strength, _elsewhere(amplitude, rows, frames), float(np.mean(share[rows, frames])))
-
-
-def _elsewhere(amplitude: Array, rows: NDArray[np.int64], frames: NDArray[np.int64]) -> Array:
-    """Median amplitude at each of a ridge's frequencies while the ridge is half an octave away or more."""
-    course = np.full(amplitude.shape[1], -np.inf)
-    course[frames] = rows
-    levels = np.zeros(amplitude.shape[0])
-    for row in np.unique(rows):
-        away = np.abs(course - row) >= _PER_OCTAVE / 2
-        levels[row] = np.median(amplitude[row, away]) if away.any() else 0.0
-    return levels[rows]
+    return Ridge(at, band, strength, float(np.mean(share[rows, frames])))
 
 
 def _thinned(time: Array, values: Array, rate: float) -> Array:

@@ -1,7 +1,8 @@
 """Sweeps as their own references: what a loop makes of gusts is not in the part of a stick that follows its sweep.
 
-Autopilots say when they sweep and by which law: the reference is that law. Every other sweep is looked for in the inputs
-themselves, and followed there (`sweep_tracking`). Doublets, steps and what a pilot does between sweeps are no part of it.
+Autopilots say when they sweep and by which law: the reference is that law. Every other sweep is looked for in the
+inputs themselves, and followed there (`sweep_tracking`). Doublets, steps and what a pilot does between sweeps are no
+part of it.
 """
 
 from __future__ import annotations
@@ -18,9 +19,6 @@ from swashplate.flights.maneuvers.sweep_tracking import Course, Ridge, course_of
 from swashplate.flights.maneuvers.sweeps import all_rising
 from swashplate.flights.provenance import Event
 from swashplate.identification.responses.spectra import Signals
-
-_LEAST_SECONDS = 4.0
-"""That a sweep must stand out of what is there otherwise."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +64,8 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
         for one in found
     ]
     power = np.array([np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(found, followed, strict=True)])
-    whole = np.array(
-        [np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found]
-    )
+    own = [pieces[one.piece].values[one.course.inside, : len(inputs)] for one in found]
+    whole = np.array([np.mean(part**2, axis=0) for part in own])
     size = np.sqrt(power)
     largest = np.maximum(size.max(axis=0), 1e-300)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -109,10 +106,7 @@ def _sweeps_in(k: int, piece: Signals, inputs: int, events: Sequence[Event]) -> 
         return told
     seen: list[tuple[float, int, Ridge]] = []
     for i in range(inputs):
-        for whole in all_rising(time, piece.values[:, i]):
-            ridge = whole.clear()
-            if ridge is None or ridge.stop - ridge.start < _LEAST_SECONDS:
-                continue
+        for ridge in all_rising(time, piece.values[:, i]):
             octaves = float(np.log2(ridge.frequency[-1] / ridge.frequency[0]))
             seen.append((ridge.share * octaves, i, ridge))
     kept: list[tuple[int, Ridge]] = []
