@@ -116,6 +116,7 @@ _BEHIND_METHODS: Mapping[str, str] = {
     "explore": "swashplate.reporting.figures.views:explore",
     "explore_derivatives": "swashplate.reporting.figures.views:explore_derivatives",
     "explore_flight": "swashplate.reporting.figures.views:explore_flight",
+    "compose_speeds": "swashplate.reporting.speed_page:compose_speeds",
     "explore_responses": "swashplate.reporting.figures.views:explore_responses",
     "figure_names": "swashplate.reporting.figures.views:figure_names",
     "html_of": "swashplate.reporting.figures.notebook:html_of",

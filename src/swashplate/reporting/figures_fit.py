@@ -26,7 +26,7 @@ from swashplate.reporting.theme import (
     stacked,
     unit_words,
 )
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 
 LAGS = 50
 """Samples of autocorrelation that are drawn."""

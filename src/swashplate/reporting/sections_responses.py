@@ -29,7 +29,7 @@ from swashplate.reporting.structure import Block, Cell, Points, Section, Table, 
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 from swashplate.validation.verification import Verification
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.sources import Source
