@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
+    from swashplate.api.plot_logs import plot_logs
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
@@ -74,6 +75,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
+    from swashplate.validation.compare import compare
+    from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
     from swashplate.validation.verification import verify
@@ -96,6 +99,7 @@ __all__ = [
     "__version__",
     "autopilot",
     "check_controller",
+    "compare",
     "datasets",
     "decouple",
     "decouple_axes",
@@ -128,10 +132,12 @@ __all__ = [
     "observe",
     "observer_trial",
     "plan_bench",
+    "plot_logs",
     "read",
     "read_control",
     "replay",
     "report",
+    "residuals",
     "respond",
     "show_replay",
     "simulate",

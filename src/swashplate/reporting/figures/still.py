@@ -81,10 +81,9 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
             figsize=(width, scale * sum(shares) + sum(legends)), layout="constrained", facecolor=ground
         )
         heights = np.add(shares, legends)
-        several = (
-            made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0] if len(shares) > 1 else ()
-        )
-        parts: Sequence[Any] = several if len(shares) > 1 else (made,)
+        apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
+        several = made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0] if apart else ()
+        parts: Sequence[Any] = several if apart else (made,)
         for part, figure in zip(parts, figures, strict=True):
             part.set_facecolor(ground)
             _Sheet(part, coloured(in_unit(figure.spec, frequency), look), look).draw(figure.keys)
