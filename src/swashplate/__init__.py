@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
+    from swashplate.api.plot_logs import plot_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.laws.autopilot import autopilot
@@ -89,6 +90,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
+    from swashplate.validation.compare import compare
+    from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
     from swashplate.validation.verification import verify
@@ -111,6 +114,7 @@ __all__ = [
     "__version__",
     "autopilot",
     "check_controller",
+    "compare",
     "compare_derivatives",
     "datasets",
     "decouple",
@@ -158,10 +162,12 @@ __all__ = [
     "open_logs",
     "plan_bench",
     "plan_maneuver",
+    "plot_logs",
     "read",
     "read_control",
     "replay",
     "report",
+    "residuals",
     "respond",
     "show_replay",
     "simulate",

@@ -102,10 +102,28 @@ def validate(
         raise SwashError(
             "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"
         )
-    if isinstance(held, Vehicle):
+    return along_inputs(model, flown, outputs=outputs)
+
+
+def along_inputs(
+    model: Result[Any, Any] | Vehicle | StateSpaceModel,
+    flights: Flight | Sequence[Flight],
+    *,
+    outputs: Sequence[str] | None = None,
+) -> Verification:
+    """Any model flown along recorded inputs: start states, shifts and biases are solved for.
+
+    Args:
+        model: what an identification returned, or a model. flights: conditioned. outputs: see `validate`.
+
+    Raises:
+        FlightError: an input that the flights lack, or no output that both have.
+    """
+    held = model.model if isinstance(model, Result) else model
+    if isinstance(held, Vehicle) and held.structure is None:
         from swashplate.validation.vehicle_verification import verify_vehicle
 
-        return verify_vehicle(held, flown, outputs=outputs)
+        return verify_vehicle(held, flights, outputs=outputs)
     if isinstance(held, tuple) and isinstance(model, Result) and isinstance(model.details, TransferFunctionDetails):
         held = as_state_space(model)
-    return verify(held, flown, outputs=outputs)
+    return verify(held, flights, outputs=outputs)

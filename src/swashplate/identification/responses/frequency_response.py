@@ -127,7 +127,8 @@ class FrequencyResponse:
         import control
 
         data = np.moveaxis(self.response, 0, -1)
-        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs))
+        name = ", ".join(self.sources) or "responses"  # python-control's plots fail without one
+        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name=name)
 
     @staticmethod
     def from_control(frd: Any) -> FrequencyResponse:
