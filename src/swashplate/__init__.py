@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
     from swashplate.flights.readers.read import read
+    from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
@@ -140,6 +141,7 @@ __all__ = [
     "fit_vehicle",
     "fly_maneuver",
     "handling_qualities",
+    "harmonics",
     "hover_hold",
     "identify",
     "identify_and_validate",
@@ -176,6 +178,8 @@ __all__ = [
     "simulate_closed_loop",
     "simulate_lpv",
     "simulate_maneuver",
+    "spectrogram",
+    "spectrum",
     "speed_schedule",
     "state_hold",
     "stepwise",
