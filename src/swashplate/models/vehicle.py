@@ -13,6 +13,7 @@ from swashplate.models.choices import Choice
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.traits import Traits
+from swashplate.models.usual_axes import usual_axes
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 
@@ -63,6 +64,13 @@ class Vehicle:
     def called(self) -> str:
         """What a reader should see: its equations' name, or its own title where many models share such a name."""
         return self.card.title if self.traits.linear else self.name
+
+    @property
+    def stick_axes(self) -> Mapping[str, Mapping[str, float]]:
+        """Inputs by the axis that moves them, roll, pitch, yaw and heave: the largest share is one."""
+        axes = self.traits.axes or usual_axes(self.input_names)
+        largest = {axis.name: max(abs(share) for share in axis.inputs.values()) for axis in axes}
+        return {axis.name: {name: share / largest[axis.name] for name, share in axis.inputs.items()} for axis in axes}
 
     @property
     def choices(self) -> Mapping[str, Choice]:

@@ -92,6 +92,7 @@ TRAITS = Traits(
     axes=_AXES,
     heavy=True,
     rotorcraft=True,
+    servo_layout="swashplate",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
     choices=helicopter_choices,
     recording=RecordingFit(_RECORDED, longest=20.0),
