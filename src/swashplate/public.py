@@ -124,6 +124,7 @@ _BEHIND_METHODS: Mapping[str, str] = {
     "plot_validation": "swashplate.reporting.paper_figures:plot_validation",
     "result_from_document": "swashplate.identification.core.result_file:from_document",
     "result_to_document": "swashplate.identification.core.result_file:to_document",
+    "vehicle_of_result": "swashplate.identification.frequency.transfer_function_fit:vehicle_of",
     "save_result": "swashplate.identification.core.result_file:save",
 }
 """Verbs that are reached as methods (`flight.condition(...)`) and have no name in `swashplate`."""

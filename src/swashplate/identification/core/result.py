@@ -217,6 +217,15 @@ class Result(Generic[Model, Details]):
         """The model's name."""
         return str(getattr(self.model, "name", "transfer functions"))
 
+    @property
+    def vehicle(self) -> Any:
+        """The model as `swashplate.vehicle` loads it from its file: it trims, flies, exports and is controlled.
+
+        Raises:
+            IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
+        """
+        return resolve("vehicle_of_result")(self)
+
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
         """Parameters of models that the data cannot tell from the identified one, shape (count,) each.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +66,33 @@ def source_of(flight: Flight) -> Source:
 
 def sources_of(flights: Iterable[Flight]) -> tuple[Source, ...]:
     return tuple(source_of(flight) for flight in flights)
+
+
+def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, str]]:
+    """Hashes of flights by their names, as settings keep them: of the file, and of the conditioned signals.
+
+    Where two flights have one name (windows of a log, simulations) only what both share is told.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for flight in flights:
+        name = flight.provenance.source or "flight"
+        own = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
+        before = found.get(name, own)
+        found[name] = {key: value if before[key] == value else "" for key, value in own.items()}
+    return found
+
+
+_INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
+
+
+def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> tuple[Source, ...]:
+    """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
+    made = []
+    for name in names:
+        found = _INTERVAL.fullmatch(name)
+        own = known.get(name if found is None else found["name"], {})
+        made.append(Source(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
+    return tuple(made)
 
 
 def _signals(flight: Flight) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.sources import Source, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.public import resolve
 
@@ -62,6 +63,11 @@ class FrequencyResponse:
     warnings: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def data(self) -> tuple[Source, ...]:
+        """The records with the hashes of their files and signals, "" where they came from elsewhere."""
+        return sources_named(self.sources, self.settings.get("hashes", {}))
 
     def place(self, output: str, input: str) -> tuple[int, int]:
         """Indices of a pair.
