@@ -40,7 +40,7 @@ from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
 from swashplate.identification.core.accuracy import blind_directions
 from swashplate.identification.core.result import Direction, Estimate, Result, correlation_of
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 from swashplate.models.card import Card
 from swashplate.models.vehicle import Vehicle
 
@@ -195,7 +195,7 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
             tuple(results), tuple(name for name in MEASURED if name not in joint.measured), tuple(disagreements)
         ),
         warnings=tuple(dict.fromkeys(doubts)),
-        data=tuple(Source(record.name, sha256=record.sha256) for record in records),
+        data=tuple(DataSource(record.name, sha256=record.sha256) for record in records),
     )
 
 

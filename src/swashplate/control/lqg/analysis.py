@@ -25,7 +25,7 @@ from swashplate.control.lqg.weights import typical
 from swashplate.errors import ControllerError
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import DISTURBED
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sampled_observer_model import SampledObserverModel, sampled_observer_model
 from swashplate.simulation.closed_loop import REFERENCES
 from swashplate.simulation.dynamics import equations_of, parameter_row
@@ -87,7 +87,7 @@ def analyse(
 
 
 def analyse_loop(
-    plan: Plan,
+    plan: ObserverPlan,
     numbers: Numbers,
     model: LinearModel,
     gains: Array,
@@ -139,7 +139,9 @@ class Watched:
         plan, numbers, model, place, where: as in `analyse_loop`.
     """
 
-    def __init__(self, plan: Plan, numbers: Numbers, model: LinearModel, *, place: bool, where: str = "") -> None:
+    def __init__(
+        self, plan: ObserverPlan, numbers: Numbers, model: LinearModel, *, place: bool, where: str = ""
+    ) -> None:
         self.plan, self.model, self.place = plan, model, place
         self.known = sampled_observer_model(plan, numbers, model, without=() if place else ("x", "y"))
         self.covariance = np.zeros_like(self.known.F)
@@ -208,7 +210,7 @@ class SteadyLoop(NamedTuple):
 
 
 def steady_loop(
-    plan: Plan,
+    plan: ObserverPlan,
     numbers: Numbers,
     model: LinearModel,
     gains: Array,
@@ -324,7 +326,7 @@ def sensitivity(
     return np.asarray(1.0 + _response(z, closed, drive[:, None], pick, None)[:, 0, 0], dtype=np.complex128)
 
 
-def _channels(plan: Plan, model: SampledObserverModel) -> list[tuple[str, int]]:
+def _channels(plan: ObserverPlan, model: SampledObserverModel) -> list[tuple[str, int]]:
     """Of every reading its channel and how many samples late it is; without sensors the states."""
     if not plan.sensors:
         return [(model.names[i], 0) for i in model.vehicle]
@@ -344,7 +346,7 @@ def _trim_of(controller: Lqg, at: int) -> Trim:
 
 
 def _gains(
-    plan: Plan, linear: LinearModel, gains: Array, model: SampledObserverModel, place: bool
+    plan: ObserverPlan, linear: LinearModel, gains: Array, model: SampledObserverModel, place: bool
 ) -> tuple[Array, Array]:
     """Gains over the model's states and the four integrals, and what the integrals are fed with."""
     of = [

@@ -137,7 +137,7 @@ def _spread(correlation: Array, sensitivity: Array) -> Array:
     return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
 
 
-def marginal_information(information: Array, prior: Array, places: NDArray[np.int64]) -> Array:
+def marginal_information(information: Array, prior: Array, places: Array | NDArray[np.int64]) -> Array:
     """What the data say about some entries when all others are unknown (Schur complement), scaled.
 
     The others keep their priors, so that a nuisance nobody can see does not make the rest blind.

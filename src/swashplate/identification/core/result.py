@@ -18,7 +18,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 from swashplate.public import resolve
 
 APART = 3.0
@@ -169,7 +169,7 @@ class Result(Generic[Model, Details]):
     noise: Noise | None = None
     nuisance: Nuisance | None = None
     comparisons: tuple[Compared, ...] = ()
-    data: tuple[Source, ...] = ()
+    data: tuple[DataSource, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 

@@ -14,7 +14,7 @@ from swashplate.flights.provenance import ProcessingStep
 
 
 @dataclass(frozen=True)
-class Source:
+class DataSource:
     """A flight, or a piece of one, without its signals.
 
     Attributes:
@@ -40,17 +40,17 @@ class Source:
     segments: tuple[tuple[float, float], ...] = ()
     rate: float = float("nan")
 
-    def same_log(self, other: Source) -> bool:
+    def same_log(self, other: DataSource) -> bool:
         """True for two parts of one log: equal hashes of the file, or equal signals where there is no file."""
         if self.sha256 or other.sha256:
             return self.sha256 == other.sha256
         return self.signals == other.signals != ""
 
 
-def source_of(flight: Flight) -> Source:
+def source_of(flight: Flight) -> DataSource:
     """What a result keeps of a flight."""
     said = flight.provenance
-    return Source(
+    return DataSource(
         name=said.source,
         sha256=said.sha256,
         signals=_signals(flight),
@@ -64,7 +64,7 @@ def source_of(flight: Flight) -> Source:
     )
 
 
-def sources_of(flights: Iterable[Flight]) -> tuple[Source, ...]:
+def sources_of(flights: Iterable[Flight]) -> tuple[DataSource, ...]:
     return tuple(source_of(flight) for flight in flights)
 
 
@@ -85,13 +85,13 @@ def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, str]]:
 _INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
 
 
-def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> tuple[Source, ...]:
+def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> tuple[DataSource, ...]:
     """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
     made = []
     for name in names:
         found = _INTERVAL.fullmatch(name)
         own = known.get(name if found is None else found["name"], {})
-        made.append(Source(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
+        made.append(DataSource(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
     return tuple(made)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
@@ -144,7 +144,7 @@ def fit_targets(
     seed: int = 0,
     progress: Callable[[int, float], None] | None = None,
     began: float | None = None,
-    data: Sequence[Source] = (),
+    data: Sequence[DataSource] = (),
     settings: Mapping[str, Any] | None = None,
 ) -> StateSpaceFit:
     """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""

@@ -66,7 +66,7 @@ TransferFunctionFit = Result[tuple[TransferFunction, ...], TransferFunctionDetai
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedStructure:
     """One structure that was tried: its form, number of parameters, mean J and the fit."""
 
     form: Form
@@ -143,7 +143,7 @@ def suggest(
     forms: Sequence[Form] = USUAL,
     least_coherence: float = 0.6,
     seed: int = 0,
-) -> tuple[Trial, tuple[Trial, ...]]:
+) -> tuple[TriedStructure, tuple[TriedStructure, ...]]:
     """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
 
     Hardly: J within 10 of, or within 1.5 times, the least J of all (the pair of Tischler and Remple's "acceptable" and
@@ -156,7 +156,7 @@ def suggest(
     trials = []
     for form in forms:
         fit = _as_told(_fit(wanted, form, fixed={}, seed=seed), responses)
-        trials.append(Trial(form, len(fit.estimates), fit.cost, fit))
+        trials.append(TriedStructure(form, len(fit.estimates), fit.cost, fit))
     trials.sort(key=lambda trial: (trial.parameters, trial.cost))
     least = min(trial.cost for trial in trials)
     good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]

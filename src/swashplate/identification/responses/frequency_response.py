@@ -12,7 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
-from swashplate.identification.core.sources import Source, sources_named
+from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.public import resolve
 
@@ -65,7 +65,7 @@ class FrequencyResponse:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def data(self) -> tuple[Source, ...]:
+    def data(self) -> tuple[DataSource, ...]:
         """The records with the hashes of their files and signals, "" where they came from elsewhere."""
         return sources_named(self.sources, self.settings.get("hashes", {}))
 
