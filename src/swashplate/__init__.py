@@ -39,8 +39,11 @@ if TYPE_CHECKING:
     from swashplate.api.observability import observability
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
+    from swashplate.control.analysis.stability import loop_margins, loop_modes
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
+    from swashplate.control.laws.hover_trim import hover_trim
+    from swashplate.control.laws.linear_decoupling import coupling, dynamic_decoupling, static_decoupling
     from swashplate.control.laws.state_hold import state_hold
     from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
@@ -74,6 +77,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
     from swashplate.simulation.adaptive import simulate_adaptive
@@ -98,6 +102,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Environment",
     "Flight",
     "FrequencyResponse",
     "Parameter",
@@ -111,12 +116,14 @@ __all__ = [
     "autopilot",
     "check_controller",
     "compare_derivatives",
+    "coupling",
     "datasets",
     "decouple",
     "decouple_axes",
     "demo",
     "derivatives",
     "design_controller",
+    "dynamic_decoupling",
     "equation_error",
     "evaluate_bench",
     "excitation",
@@ -136,6 +143,7 @@ __all__ = [
     "fly_maneuver",
     "handling_qualities",
     "hover_hold",
+    "hover_trim",
     "identify",
     "identify_and_validate",
     "in_form",
@@ -146,6 +154,8 @@ __all__ = [
     "live",
     "load",
     "load_controller",
+    "loop_margins",
+    "loop_modes",
     "maneuver",
     "merge",
     "monte_carlo",
@@ -170,6 +180,7 @@ __all__ = [
     "simulate_maneuver",
     "speed_schedule",
     "state_hold",
+    "static_decoupling",
     "stepwise",
     "structure",
     "suggest_gains",

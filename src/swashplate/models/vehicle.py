@@ -14,9 +14,10 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.traits import Traits
 from swashplate.models.usual_axes import usual_axes
-from swashplate.physics.backend import Backend
+from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment
 
+_CALM, _FLOATS = Environment(), FloatBackend()
 Derivatives = Callable[[Any, Any, Any, Environment, Backend], Any]
 
 
@@ -86,8 +87,13 @@ class Vehicle:
         numbers = self.card.values()
         return self.parameters(*(numbers[name] for name in self.parameter_names))
 
-    def rates(self, x: Any, u: Any, parameters: Any, environment: Environment, xp: Backend) -> list[Any]:
-        """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states."""
+    def rates(
+        self, x: Any, u: Any, parameters: Any, environment: Environment = _CALM, xp: Backend = _FLOATS
+    ) -> list[Any]:
+        """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states.
+
+        In calm air and on plain floats where nothing else is said.
+        """
         nested = rebuild(self.state, [x[i] for i in range(len(self.state_names))])
         commands = self.inputs(*(u[i] for i in range(len(self.input_names))))
         return list(leaves(self.derivatives(nested, commands, parameters, environment, xp)))
