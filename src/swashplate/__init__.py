@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
+    from swashplate.flights.conditioning.reconstruction import reconstruct
     from swashplate.flights.conditioning.synchronise import merge, synchronise
     from swashplate.flights.conditioning.uniform_records import uniform_records
     from swashplate.flights.datasets import fetch as fetch_dataset
@@ -168,6 +169,7 @@ __all__ = [
     "plan_maneuver",
     "read",
     "read_control",
+    "reconstruct",
     "replay",
     "report",
     "respond",

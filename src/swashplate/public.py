@@ -46,6 +46,7 @@ _LIGHT: Mapping[str, str] = {
     "plan_maneuver": "swashplate.flights.maneuvers.planned:plan_maneuver",
     "read": "swashplate.flights.readers.read:read",
     "read_control": "swashplate.export.control_json:read_control",
+    "reconstruct": "swashplate.flights.conditioning.reconstruction:reconstruct",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",

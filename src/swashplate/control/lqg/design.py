@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.analysis import Watched
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.law import Feedback
 from swashplate.control.lqg.optimal import regulator
+from swashplate.control.lqg.steady_loop import Watched
 from swashplate.control.lqg.weights import (
     ALLOWED,
     EFFORT,
@@ -41,7 +41,6 @@ from swashplate.simulation.discretisation import with_late_inputs, zero_order_ho
 from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.speeds import trims_over_speed
-from swashplate.simulation.trim import Trim
 
 Holding = Literal["place", "speed"]
 HOLDINGS: tuple[Holding, ...] = ("place", "speed")
@@ -254,10 +253,3 @@ def require_rate(model: LinearModel, rate: float, *, where: str) -> None:
                 channel="rate",
                 hint=f"Run the controller at {np.ceil(_SAMPLES * frequency):.0f} Hz or more.",
             )
-
-
-def start_of(vehicle: Vehicle, trim: Trim) -> Trim:
-    """The trim itself, if it is one of the vehicle's."""
-    if trim.state_names != vehicle.state_names:
-        raise ControllerError("the start is a trim of another vehicle.", where=vehicle.name)
-    return trim

@@ -14,7 +14,7 @@ from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, IdentificationError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.core.result import Estimate, percent
-from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_transfer_functions
+from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.state_space_words import words
 from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
@@ -334,11 +334,11 @@ def test_unusable_questions_are_refused() -> None:
         model.with_values({"Lbb": 1.0})
 
 
-def test_start_values_from_transfer_functions() -> None:
+def test_start_values_from_models() -> None:
     true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
     responses = exact(true)
     fit = fit_transfer_function(responses, "0/1-1s", input="mixer_collective")
-    start = from_transfer_functions(structure("heave"), [fit])
+    start = from_models(structure("heave"), [as_state_space(fit)], responses)
     for name in ("Zw", "Zcol", "tau_collective"):
         assert start.parameters[name].value == pytest.approx(true.parameters[name].value, rel=0.02)
 
