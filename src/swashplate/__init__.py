@@ -41,12 +41,16 @@ if TYPE_CHECKING:
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
+    from swashplate.control.analysis.stability import loop_margins, loop_modes
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
+    from swashplate.control.laws.hover_trim import hover_trim
+    from swashplate.control.laws.linear_decoupling import coupling, dynamic_decoupling, static_decoupling
     from swashplate.control.laws.state_hold import state_hold
     from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
+    from swashplate.flights.conditioning.reconstruction import reconstruct
     from swashplate.flights.conditioning.synchronise import merge, synchronise
     from swashplate.flights.conditioning.uniform_records import uniform_records
     from swashplate.flights.datasets import fetch as fetch_dataset
@@ -77,6 +81,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
     from swashplate.simulation.adaptive import simulate_adaptive
@@ -103,6 +108,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Environment",
     "Flight",
     "FrequencyResponse",
     "Parameter",
@@ -117,12 +123,14 @@ __all__ = [
     "check_controller",
     "compare",
     "compare_derivatives",
+    "coupling",
     "datasets",
     "decouple",
     "decouple_axes",
     "demo",
     "derivatives",
     "design_controller",
+    "dynamic_decoupling",
     "equation_error",
     "evaluate_bench",
     "excitation",
@@ -143,6 +151,7 @@ __all__ = [
     "handling_qualities",
     "harmonics",
     "hover_hold",
+    "hover_trim",
     "identify",
     "identify_and_validate",
     "in_form",
@@ -153,6 +162,8 @@ __all__ = [
     "live",
     "load",
     "load_controller",
+    "loop_margins",
+    "loop_modes",
     "maneuver",
     "merge",
     "monte_carlo",
@@ -167,6 +178,7 @@ __all__ = [
     "plot_logs",
     "read",
     "read_control",
+    "reconstruct",
     "replay",
     "report",
     "residuals",
@@ -182,6 +194,7 @@ __all__ = [
     "spectrum",
     "speed_schedule",
     "state_hold",
+    "static_decoupling",
     "stepwise",
     "structure",
     "suggest_gains",

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import options
-from swashplate.cli.reading import Reading
+from swashplate.cli.reading import asked
 from swashplate.errors import SwashError
 
 _ALIGNMENTS = ("auto", "motion", "clock", "start", "none")
@@ -46,7 +46,7 @@ def plot(
             raise SwashError(f"'{value}' is unknown, expected one of {', '.join(known)}.", channel=option)
     if spectrum and spectrogram:
         raise SwashError("and --spectrum are two figures.", channel="--spectrogram", hint="Give one of them.")
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    how = asked(mapping, unit, drop_bad_stamps)
     flights = [read(log, how=how) for log in logs]
     drawn, aligned = plot_logs(
         flights,

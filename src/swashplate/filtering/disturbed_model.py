@@ -38,7 +38,7 @@ from swashplate.simulation.runge_kutta import rk4_step
 N_DISTURBANCES = len(DISTURBED)
 
 
-class Gain(NamedTuple):
+class FilterGain(NamedTuple):
     """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance."""
 
     state: Any
@@ -181,11 +181,11 @@ class StochasticModel:
         )
         return A, C, Q, jnp.diag(self._sensor_variances(noise))
 
-    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> Gain:
+    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
         n, g = x.shape[0], self.n_gusts
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
-        return Gain(K[:n], K[n : n + g], K[n + g :], S)
+        return FilterGain(K[:n], K[n : n + g], K[n + g :], S)
 
     def _fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
@@ -206,7 +206,7 @@ class StochasticModel:
     def n_outputs(self) -> int:
         return len(self.output_names)
 
-    def correct(self, state: FilterState, y: Any, gain: Gain, nuisance: Nuisance) -> tuple[FilterState, Any]:
+    def correct(self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance) -> tuple[FilterState, Any]:
         """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
         innovation = _turn(y - self.measure(state.x, nuisance), self.output_names, -psi)
@@ -223,7 +223,14 @@ class StochasticModel:
         return FilterState(advance(state.x, self.acting(state), now), self._fade(noise) * state.gust, state.drift)
 
     def run(
-        self, start: FilterState, y: Any, advance: Advance, along: Any, noise: Noise, nuisance: Nuisance, gain: Gain
+        self,
+        start: FilterState,
+        y: Any,
+        advance: Advance,
+        along: Any,
+        noise: Noise,
+        nuisance: Nuisance,
+        gain: FilterGain,
     ) -> tuple[Any, FilterState]:
         """Innovations (n, n_outputs) and the states after each measurement.
 

@@ -21,6 +21,7 @@ from swashplate.identification.core.record_facts import (
     slowest_of,
     unit_of,
 )
+from swashplate.identification.core.sources import hashes
 from swashplate.identification.responses import response_warnings
 from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
@@ -236,6 +237,7 @@ def respond(
             "averages": [m.averages for m in matrices],
             **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),
+            "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),
         },
     )
