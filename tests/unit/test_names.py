@@ -16,7 +16,6 @@ WAITING = {
     "Gain": "results and controllers",
     "Loads": "models",
     "Margins": "results and controllers",
-    "Method": "command line of results and controllers",
     "Mode": "command line of controllers",
     "Plan": "results and controllers",
     "Reading": "results",

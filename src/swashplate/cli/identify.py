@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,10 +27,8 @@ FILES = ("report.html", "model.toml", "fit.json", "validation.json")
 """What `--out` gets."""
 
 
-class Method(StrEnum):
-    PREDICTION_ERROR = "prediction-error"
-    OUTPUT_ERROR = "output-error"
-    NELDER_MEAD = "nelder-mead"
+TRACKED = ("prediction-error", "output-error", "nelder-mead")
+"""Methods that are checked for a tracked pose before anything is computed."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ class AskedIdentification:
 
     Attributes:
         free: a ready choice or parameter names.
-        method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as in `swashplate.identify`.
+        method, ties, fixed, priors, prior_card, outputs, iterations, keep_unexcited, wind: as in `swashplate.identify`.
     """
 
     free: str | Sequence[str] = "full"
@@ -49,6 +46,7 @@ class AskedIdentification:
     fixed: Mapping[str, float] | None = None
     priors: Mapping[str, tuple[float, float]] | None = None
     prior_card: Card | None = None
+    outputs: Sequence[str] | None = None
     iterations: int = 60
     keep_unexcited: bool = False
     wind: bool = False
@@ -62,7 +60,18 @@ def identify(
     free: Annotated[
         str, typer.Option("--free", help="Ready choice (full, flight) or parameter names separated by commas.")
     ] = "full",
-    method: Annotated[Method, typer.Option("--method", help="How to estimate.")] = Method.PREDICTION_ERROR,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            help="prediction-error, output-error, nelder-mead, collocation (any equations, unstable ones and start "
+            "values of zero too), or another package's.",
+        ),
+    ] = "prediction-error",
+    outputs: Annotated[
+        str | None,
+        typer.Option("--outputs", help="Channels to fit, separated by commas; the method's own choice by default."),
+    ] = None,
     fix: Annotated[
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")
     ] = None,
@@ -104,11 +113,12 @@ def identify(
     names = [name.strip() for name in free.split(",") if name.strip()]
     question = AskedIdentification(
         free=names[0] if len(names) == 1 else names,
-        method=method.value,
+        method=method,
         ties=tuple(tie or ()),
         fixed=options.fixed_values(fix) or None,
         priors=options.prior_values(texts) or None,
         prior_card=None if card is None else find(card).card,
+        outputs=None if outputs is None else [name.strip() for name in outputs.split(",") if name.strip()],
         iterations=iterations,
         keep_unexcited=keep_unexcited,
         wind=wind,
@@ -149,12 +159,18 @@ def run(
     import swashplate as sp
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.core.parameters import parameterize
-    from swashplate.identification.core.records import records
+    from swashplate.identification.core.records import POSE, records
+    from swashplate.identification.estimators import check_method
 
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     free, ties = question.free, question.ties
-    parameterize(vehicle, free, ties=ties, fixed=question.fixed, priors=question.priors, prior_card=question.prior_card)
-    records([*flights, *hold_outs], vehicle)
+    check_method(question.method)
+    if vehicle.structure is None or question.method in TRACKED:
+        parameterize(
+            vehicle, free, ties=ties, fixed=question.fixed, priors=question.priors, prior_card=question.prior_card
+        )
+    if question.method in TRACKED:
+        records([*flights, *hold_outs], vehicle, outputs=question.outputs or POSE)
     with folder_when_complete(out, ours=FILES) as folder:
         line.say("preparing the fit (compiling takes longest the first time)")
         fit = sp.identify(
@@ -166,6 +182,7 @@ def run(
             fixed=question.fixed,
             priors=question.priors,
             prior_card=question.prior_card,
+            outputs=question.outputs,
             iterations=question.iterations,
             keep_unexcited=question.keep_unexcited,
             wind=question.wind,
@@ -192,13 +209,16 @@ def write(fit: Result[Vehicle, FlightDetails], validation: Validation | None, *,
     import swashplate as sp
     from swashplate.atomic import write_text
     from swashplate.cli.console import as_json
+    from swashplate.models.linear.linear_vehicle import linear_vehicle
+    from swashplate.models.vehicle import Vehicle
 
     sp.report(fit, validation, path=folder / "report.html")
     fit.save(folder / "fit.json")
     if validation is not None:
         write_text(folder / "validation.json", as_json(validation.as_dict()) + "\n")
     if not fit.failed:
-        fit.model.save(folder / "model.toml")
+        model = fit.model if isinstance(fit.model, Vehicle) else linear_vehicle(fit.model)
+        model.save(folder / "model.toml")
 
 
 def show(
@@ -213,6 +233,8 @@ def show(
         typer.echo(
             as_json({"fit": fit.to_document(comparisons=False), "validation": validation and validation.as_dict()})
         )
+    elif not quiet and not hasattr(fit.model, "card"):
+        typer.echo(f"{fit!r}\nReport:     {out / 'report.html' if out else 'not written (give --out DIR)'}")
     elif not quiet:
         console().print(fit_table(fit))
         lines = [f"! {text}" for _, text in banners(fit, validation)]

@@ -67,7 +67,7 @@ class CollocationEstimator:
         refuse_lowpassed(data)
         if isinstance(model, StateSpaceModel):
             return _of_structure(model, data, question)
-        if model.structure is not None and question.free is None:
+        if model.structure is not None and question.free in (None, "full"):
             return _of_structure(model.structure, data, question)
         return _of_vehicle(model, data, question)
 
@@ -148,7 +148,8 @@ def _of_structure(
     model: StateSpaceModel, flights: Sequence[Flight], question: Question
 ) -> Result[StateSpaceModel, TimeDetails]:
     began = time.perf_counter()
-    told = [n for n in ("free", "ties", "fixed", "priors", "prior_card", "environment") if n in question.asked]
+    held: Sequence[str] = ("ties", "fixed", "priors", "prior_card", "environment")
+    told = [*([] if question.free in (None, "full") else ["free"]), *(name for name in held if name in question.asked)]
     if told:
         raise IdentificationError(
             f"'{model.name}' says itself what is free, tied and held.",
