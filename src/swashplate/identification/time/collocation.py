@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import jax.numpy as jnp
 
@@ -22,8 +22,8 @@ from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.parameter_row import Entry
-from swashplate.identification.core.parameters import parameterize
-from swashplate.identification.core.records import records
+from swashplate.identification.core.parameters import Parameterization, parameterize
+from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, solve
@@ -67,10 +67,13 @@ class CollocationEstimator:
         refuse_lowpassed(data)
         if isinstance(model, StateSpaceModel):
             return _of_structure(model, data, question)
-        if model.structure is not None and question.free is None:
+        if model.structure is not None and question.free in (None, "full"):
             return _of_structure(model.structure, data, question)
         return _of_vehicle(model, data, question)
 
+
+COARSE = 0.02
+"""Share of a mode by which a step may be wrong: about 1.7 / dt [1/s]."""
 
 COLLOCATION = CollocationEstimator()
 _METHOD = "collocation"
@@ -90,30 +93,54 @@ def _of_vehicle(vehicle: Vehicle, flights: Sequence[Flight], question: Question)
         prior_card=question.prior_card,
     )
     pieces = records(flights, vehicle, outputs=outputs)
-    environment = question.environment or Environment()
-    likelihood = CollocationErrors(
-        ForetellingVehicle(equations_of(table.vehicle), table.layout, outputs),
-        parameter_entries(table),
-        states=vehicle.state_names,
-        outputs=outputs,
-        records=pieces,
-        given={
-            "card": jnp.asarray(table.card_row),
-            "constants": jnp.asarray([getattr(environment, name) for name in CONSTANTS], dtype=float),
-        },
-        driving=[driving_rows(piece, environment) for piece in pieces],
-        rest=dict(zip(vehicle.state_names, map(float, leaves(vehicle.state)), strict=True)),
+    likelihood = vehicle_errors(
+        table,
+        pieces,
+        question.environment or Environment(),
         shifts=bool(question.shifts),
         biases=question.biases,
     )
-    return vehicle_result(
+    solved = _solve(likelihood, question)
+    found = vehicle_result(
         vehicle,
         table,
-        _solve(likelihood, question),
+        solved,
         method=_METHOD,
         data=sources_of(flights),
         settings={"outputs": list(outputs), "shifts": bool(question.shifts), "biases": list(question.biases)},
         seconds=time.perf_counter() - began,
+    )
+    return _warned(found, likelihood, solved)
+
+
+def vehicle_errors(
+    table: Parameterization,
+    pieces: Sequence[Record],
+    environment: Environment,
+    *,
+    shifts: bool,
+    biases: Sequence[str],
+) -> CollocationErrors:
+    """The likelihood of a vehicle's records.
+
+    Args:
+        table: free parameters and ties. pieces: with what `measurable` names as outputs.
+        environment: wind, density and gravity; the records have the voltage.
+        shifts, biases: see `CollocationErrors`, which tells its errors.
+    """
+    vehicle, outputs = table.vehicle, pieces[0].output_names
+    constants = [getattr(environment, name) for name in CONSTANTS]
+    return CollocationErrors(
+        ForetellingVehicle(equations_of(vehicle), table.layout, outputs),
+        parameter_entries(table),
+        states=vehicle.state_names,
+        outputs=outputs,
+        records=pieces,
+        given={"card": jnp.asarray(table.card_row), "constants": jnp.asarray(constants, dtype=float)},
+        driving=[driving_rows(piece, environment) for piece in pieces],
+        rest=dict(zip(vehicle.state_names, map(float, leaves(vehicle.state)), strict=True)),
+        shifts=shifts,
+        biases=biases,
     )
 
 
@@ -121,7 +148,8 @@ def _of_structure(
     model: StateSpaceModel, flights: Sequence[Flight], question: Question
 ) -> Result[StateSpaceModel, TimeDetails]:
     began = time.perf_counter()
-    told = [n for n in ("free", "ties", "fixed", "priors", "prior_card", "environment") if n in question.asked]
+    held: Sequence[str] = ("ties", "fixed", "priors", "prior_card", "environment")
+    told = [*([] if question.free in (None, "full") else ["free"]), *(name for name in held if name in question.asked)]
     if told:
         raise IdentificationError(
             f"'{model.name}' says itself what is free, tied and held.",
@@ -144,14 +172,16 @@ def _of_structure(
         shifts=shifts,
         biases=question.biases,
     )
-    return linear_result(
+    solved = _solve(likelihood, question)
+    found = linear_result(
         model,
-        _solve(likelihood, question),
+        solved,
         method=_METHOD,
         data=sources_of(flights),
         settings={"outputs": list(outputs), "shifts": shifts, "biases": list(question.biases)},
         seconds=time.perf_counter() - began,
     )
+    return _warned(found, likelihood, solved)
 
 
 def _solve(likelihood: CollocationErrors, question: Question) -> Solved:
@@ -161,3 +191,21 @@ def _solve(likelihood: CollocationErrors, question: Question) -> Solved:
         iterations=80 if question.iterations is None else question.iterations,
         progress=question.progress,
     )
+
+
+_Model = TypeVar("_Model")
+
+
+def _warned(
+    found: Result[_Model, TimeDetails], likelihood: CollocationErrors, solved: Solved
+) -> Result[_Model, TimeDetails]:
+    """The result with what is said of steps that are too long for the model."""
+    fast, error = likelihood.fastest(solved.optimum.row)
+    if error <= COARSE:
+        return found
+    step = likelihood.records[0].dt
+    words = (
+        f"a mode at {abs(fast):.3g} 1/s is too fast for samples every {step:.3g} s: a step of collocation is wrong by "
+        f"{100.0 * error:.2g} % of it. Condition the flight to a higher rate, or use a method that integrates."
+    )
+    return replace(found, warnings=(*found.warnings, words))

@@ -6,7 +6,7 @@ and Paris 1987), of fourth order in the step.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple, Protocol
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 
 from swashplate.identification.core.banded_least_squares import Chain
 from swashplate.identification.core.parameters import Layout
-from swashplate.identification.time.vehicle_likelihood import measurable
+from swashplate.identification.time.vehicle_likelihood import FORCES, measurable
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
@@ -26,6 +26,13 @@ _DIFFUSE = 1e3
 """Sizes of a state by which the filter's first guess may be wrong."""
 
 Numbers = Mapping[str, jax.Array]
+Pair = tuple[jax.Array, jax.Array]
+
+
+Rates = Callable[[jax.Array, jax.Array], jax.Array]
+"""From a state and what drives it."""
+Seen = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
+"""From a state, its rate and what drives it."""
 
 
 class Foretelling(Protocol):
@@ -35,12 +42,8 @@ class Foretelling(Protocol):
         """What drives it, (2 n - 1, n_driving): at every sample and half way between."""
         ...
 
-    def rates(self, given: Numbers, numbers: jax.Array, x: jax.Array, w: jax.Array) -> jax.Array:
-        """dx/dt without constants."""
-        ...
-
-    def seen(self, given: Numbers, numbers: jax.Array, x: jax.Array, dx: jax.Array, w: jax.Array) -> jax.Array:
-        """Outputs without biases at states `x` of rates `dx`."""
+    def functions(self, given: Numbers, numbers: jax.Array) -> tuple[Rates, Seen]:
+        """Rates and outputs, both without constants."""
         ...
 
 
@@ -56,18 +59,22 @@ class ForetellingVehicle:
         w = given["driving"]
         return jnp.zeros((2 * len(w) - 1, w.shape[1])).at[::2].set(w).at[1::2].set(0.5 * (w[:-1] + w[1:]))
 
-    def _parameters(self, given: Numbers, numbers: jax.Array) -> jax.Array:
+    def functions(self, given: Numbers, numbers: jax.Array) -> tuple[Rates, Seen]:
         free = numbers[: len(self.layout.free)]
-        return jnp.concatenate([jnp.stack(list(self.layout.values(given["card"], free))), given["constants"]])
-
-    def rates(self, given: Numbers, numbers: jax.Array, x: jax.Array, w: jax.Array) -> jax.Array:
-        found: jax.Array = row_rates(self.equations, padded=False)(x, w, self._parameters(given, numbers))
-        return found
-
-    def seen(self, given: Numbers, numbers: jax.Array, x: jax.Array, dx: jax.Array, w: jax.Array) -> jax.Array:
+        p = jnp.concatenate([jnp.stack(list(self.layout.values(given["card"], free))), given["constants"]])
+        equations, force = row_rates(self.equations, padded=False), row_force(self.equations)
         known = measurable(self.equations.vehicle)
-        every = jnp.concatenate([x, dx, row_force(self.equations)(x, w, self._parameters(given, numbers))])
-        return every[jnp.array([known.index(name) for name in self.outputs])]
+        rows = jnp.array([known.index(name) for name in self.outputs])
+        felt = any(name in FORCES for name in self.outputs)
+
+        def rates(x: jax.Array, w: jax.Array) -> jax.Array:
+            found: jax.Array = equations(x, w, p)
+            return found
+
+        def seen(x: jax.Array, dx: jax.Array, w: jax.Array) -> jax.Array:
+            return jnp.concatenate([x, dx, force(x, w, p)] if felt else [x, dx])[rows]
+
+        return rates, seen
 
 
 @dataclass(frozen=True)
@@ -91,23 +98,23 @@ class ForetellingStructure:
         ]
         return jnp.stack(columns, axis=1)
 
-    def _matrices(self, numbers: jax.Array) -> dict[str, jax.Array]:
+    def functions(self, given: Numbers, numbers: jax.Array) -> tuple[Rates, Seen]:
         model, values = self.model, self._values(numbers)
         n, m, k = len(model.states), len(model.inputs), len(model.outputs)
-        shapes = {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
-        found = {name: jnp.eye(n) if name == "M" else jnp.zeros(shape) for name, shape in shapes.items()}
-        for e in model.elements:
-            found[e.matrix] = found[e.matrix].at[e.row, e.column].set(e.expression(values))
-        return found
 
-    def rates(self, given: Numbers, numbers: jax.Array, x: jax.Array, w: jax.Array) -> jax.Array:
-        m = self._matrices(numbers)
-        found: jax.Array = jnp.linalg.solve(m["M"], m["F"] @ x + m["G"] @ w)
-        return found
+        def matrix(name: str, rows: int, columns: int) -> jax.Array:
+            found: list[list[Any]] = [[float(name == "M" and i == j) for j in range(columns)] for i in range(rows)]
+            for e in model.elements:
+                if e.matrix == name:
+                    found[e.row][e.column] = e.expression(values)
+            return jnp.array(found, dtype=float)
 
-    def seen(self, given: Numbers, numbers: jax.Array, x: jax.Array, dx: jax.Array, w: jax.Array) -> jax.Array:
-        m, rows = self._matrices(numbers), jnp.array([self.model.outputs.index(o) for o in self.outputs])
-        return (m["H0"] @ x + m["H1"] @ dx + m["D"] @ w)[rows]
+        F, G = matrix("F", n, n), matrix("G", n, m)
+        if any(e.matrix == "M" for e in model.elements):
+            F, G = jnp.split(jnp.linalg.solve(matrix("M", n, n), jnp.concatenate([F, G], axis=1)), [n], axis=1)
+        shown = jnp.array([model.outputs.index(o) for o in self.outputs])
+        H0, H1, D = (matrix(name, k, columns)[shown] for name, columns in (("H0", n), ("H1", n), ("D", m)))
+        return (lambda x, w: F @ x + G @ w), (lambda x, dx, w: H0 @ x + H1 @ dx + D @ w)
 
 
 NOWHERE = -1
@@ -128,9 +135,10 @@ def _residuals(plan: CollocationPlan, given: Numbers, numbers: jax.Array) -> tup
     """The defect of two states and the error of one as functions, and what drives them."""
     row = jnp.append(numbers, 0.0)
     shift, bias = row[jnp.array(plan.shift)], row[jnp.array(plan.bias)]
+    equations, seen = plan.model.functions(given, numbers)
 
     def rates(x: jax.Array, w: jax.Array) -> jax.Array:
-        return plan.model.rates(given, numbers, x, w) + shift
+        return equations(x, w) + shift
 
     def defect(x: jax.Array, after: jax.Array, w: jax.Array) -> jax.Array:
         f, g = rates(x, w[0]), rates(after, w[2])
@@ -138,7 +146,7 @@ def _residuals(plan: CollocationPlan, given: Numbers, numbers: jax.Array) -> tup
         return after - x - plan.dt / 6.0 * (f + 4.0 * middle + g)
 
     def error(x: jax.Array, w: jax.Array, y: jax.Array) -> jax.Array:
-        return y - plan.model.seen(given, numbers, x, rates(x, w), w) - bias
+        return y - seen(x, rates(x, w), w) - bias
 
     return defect, error, plan.model.driving(given, numbers)
 
@@ -167,6 +175,14 @@ def moved_by_numbers(plan: CollocationPlan, given: Numbers, numbers: jax.Array, 
     return jax.vmap(lambda way: jax.jvp(lambda p: _both(plan, given, p, x), (numbers,), (way,))[1])(ways)
 
 
+@partial(jax.jit, static_argnums=(0, 4), compiler_options=QUICK_TO_COMPILE)
+def rate_slopes(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: jax.Array, sample: int) -> jax.Array:
+    """Slopes of the rates by the states (s, s) at a sample's inputs."""
+    w = plan.model.driving(given, numbers)[2 * sample]
+    found: jax.Array = jax.jacfwd(plan.model.functions(given, numbers)[0])(x, w)
+    return found
+
+
 class Innovations(NamedTuple):
     """Innovations one output after the other and their variances; one-step errors and their variances; (n, o) each."""
 
@@ -192,7 +208,7 @@ def _traced_filter(
     moved = jnp.concatenate([moved, jnp.zeros_like(moved[:1])])  # nothing comes after the last
     first = jnp.diag((_DIFFUSE * given["size"]) ** 2)
 
-    def step(carry: tuple[jax.Array, jax.Array], now: Any) -> tuple[Any, Any]:
+    def step(carry: Pair, now: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[Pair, Innovations]:
         (d, P), (v, c, move) = carry, now
         seen = Innovations([], [], [], [])
         for i in range(o):  # before any of this sample's outputs is taken in
@@ -210,7 +226,8 @@ def _traced_filter(
         phi, spread, offset = move[:, :s], move[:, s : 2 * s], move[:, -1]
         return (phi @ d + offset, phi @ P @ phi.T + spread @ spread.T), Innovations(*map(jnp.stack, seen))
 
-    found: Innovations = jax.lax.scan(step, (jnp.zeros(s), first), (local.v, local.here, moved))[1]
+    samples: Any = (local.v, local.here, moved)
+    found: Innovations = jax.lax.scan(step, (jnp.zeros(s), first), samples)[1]
     return found
 
 
@@ -218,12 +235,10 @@ innovations_along = jax.jit(_traced_filter, static_argnums=0, compiler_options=Q
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def innovations_moved(
-    plan: CollocationPlan, given: Numbers, at: Any, x: jax.Array, ways: Any
-) -> tuple[jax.Array, jax.Array]:
+def innovations_moved(plan: CollocationPlan, given: Numbers, at: Pair, x: jax.Array, ways: Pair) -> Pair:
     """Innovations and variances along ways of numbers and noise, (n_ways, n, o) each, the path held."""
 
-    def along(way: Any) -> tuple[jax.Array, jax.Array]:
+    def along(way: Pair) -> Pair:
         moved: Innovations = jax.jvp(lambda p: _traced_filter(plan, given, p[0], p[1], x), (at,), (way,))[1]
         return moved.innovation, moved.variance
 

@@ -45,7 +45,9 @@ from swashplate.identification.time.collocation_equations import (
     innovations_along,
     innovations_moved,
     moved_by_numbers,
+    rate_slopes,
 )
+from swashplate.simulation.dynamics import enable_double_precision
 
 _LEAST, _MOST = 1e-4, 1e3
 """Noise in sizes of what it disturbs: below the least it is none (and the factor would lose its digits)."""
@@ -107,6 +109,7 @@ class CollocationErrors:
         shifts: bool,
         biases: Sequence[str],
     ) -> None:
+        enable_double_precision()
         self.states, self.outputs, self.records = tuple(states), tuple(outputs), tuple(records)
         every = np.concatenate([record.outputs for record in records])
         around = dict(zip(outputs, map(float, np.std(every, axis=0) + 1e-12), strict=True))
@@ -179,7 +182,8 @@ class CollocationErrors:
         count, row = self._count, self._row
         low, high = row.column("lower")[:count], row.column("upper")[:count]
         numbers, noise = np.clip(row.column("start")[:count], low, high), np.exp(row.column("start")[count:])
-        prior = row.prior_information[:count, :count] / np.outer(row.scale[:count], row.scale[:count])
+        scale = row.scale[:count]
+        prior = row.prior_information[:count, :count] / scale / scale[:, None]
         mean, damping = row.column("mean")[:count], 1e-3
 
         def judged(numbers: Array, paths: Sequence[Array]) -> tuple[float, list[Chain]]:
@@ -224,8 +228,7 @@ class CollocationErrors:
             )
         self._refuse_traceless(found, prior)
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(found.information + prior, hermitian=True)), 0.0))
-        usual = row.scale[:count]
-        return numbers, np.maximum(np.abs(numbers), np.clip(spread, 1e-3 * usual, 1e3 * usual)), tuple(paths)
+        return numbers, np.maximum(np.abs(numbers), np.clip(spread, 1e-3 * scale, 1e3 * scale)), tuple(paths)
 
     def _bordered(self, numbers: Array, noise: Array, chains: Sequence[Chain], paths: Sequence[Array]) -> list[Border]:
         made = []
@@ -318,13 +321,14 @@ class CollocationErrors:
         """Slopes of every record's innovations and variances by the row's entries, (p, n, o) each."""
         numbers, noise = self._split(row)
         at, ways = (jnp.asarray(numbers), jnp.log(noise)), np.diag(self._row.scale)
+        padded = np.pad(ways, ((0, -len(ways) % _AT_ONCE), (0, 0)))  # one size, compiled once
         made = []
         for plan, given, path in zip(self._plans, self._given, self._paths_at(row) or (), strict=True):
             parts = []
-            for some in np.array_split(ways, -(-len(ways) // _AT_ONCE)):
+            for some in np.split(padded, len(padded) // _AT_ONCE):
                 way = (jnp.asarray(some[:, : self._count]), jnp.asarray(some[:, self._count :]))
                 parts.append([np.asarray(p) for p in innovations_moved(plan, given, at, jnp.asarray(path.x), way)])
-            nu, variance = (np.concatenate(each) for each in zip(*parts, strict=True))
+            nu, variance = (np.concatenate(each)[: len(ways)] for each in zip(*parts, strict=True))
             made.append((nu, variance))
         return made
 
@@ -349,6 +353,20 @@ class CollocationErrors:
             share = (variance / seen.variance).reshape(len(self._row), -1)
             rest += 0.5 * share @ share.T
         return white, slopes, rest
+
+    def fastest(self, row: Array) -> tuple[complex, float]:
+        """The mode [1/s] that steps of collocation get most wrong half way along the first path, and by how much.
+
+        A step multiplies a mode z = lambda dt by (1 + z/2 + z^2/12) / (1 - z/2 + z^2/12) in place of exp(z).
+        """
+        plan, given, x = self._plans[0], self._given[0], self._paths[0]
+        numbers, half = jnp.asarray(self._split(row)[0]), len(x) // 2
+        slopes = rate_slopes(plan, given, numbers, jnp.asarray(x[half]), half)
+        z = np.linalg.eigvals(np.asarray(slopes)) * plan.dt
+        wrong = np.abs((1.0 + z / 2.0 + z**2 / 12.0) / (1.0 - z / 2.0 + z**2 / 12.0) - np.exp(z))
+        wrong /= np.maximum(1.0, np.abs(np.exp(z)))
+        worst = int(np.argmax(wrong))
+        return complex(z[worst] / plan.dt), float(wrong[worst])
 
     @property
     def covariance(self) -> Array:
