@@ -1,4 +1,4 @@
-"""What docs/real-flights.md says, read back for README and the pages that quote it: no number is typed a second time."""
+"""What docs/real-flights.md says, read back for README and the pages that quote it: no number is typed twice."""
 
 from __future__ import annotations
 
