@@ -355,7 +355,8 @@ def thresholds_text() -> str:
     rows.append(
         (
             "cannot be judged",
-            f"past motion explains {100 * feedback.EXPLAINED:g} % or more of the command in every record",
+            f"past motion explains {100 * feedback.EXPLAINED:g} % or more of the command in every record; or even the "
+            f"ceiling stays below {THRESHOLDS['usable']:g} % and the model is as good as it",
         )
     )
     return _table(("verdict", "condition"), rows)

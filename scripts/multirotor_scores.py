@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 
 import swashplate as sp
 from swashplate.arrays import Array
-from swashplate.cli.reading import read
 from swashplate.filtering.disturbed_model import Nuisance, commands, stochastic_model
+from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild

@@ -13,8 +13,6 @@ cache on (in the user's cache folder), for the whole process: models and fits ar
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from swashplate import public
@@ -25,15 +23,22 @@ if TYPE_CHECKING:
     from swashplate.api.controllers import load_controller
     from swashplate.api.decouple import decouple
     from swashplate.api.decouple_axes import decouple_axes
+    from swashplate.api.demo import demo
     from swashplate.api.design_controller import design_controller
     from swashplate.api.excitation import excitation
-    from swashplate.api.export import export_controller, export_model
+    from swashplate.api.export import export_controller, export_flight, export_model
+    from swashplate.api.fit_ss import fit_ss
+    from swashplate.api.fit_tf import fit_tf
+    from swashplate.api.fit_time import fit_time
     from swashplate.api.fly_maneuver import fly_maneuver
     from swashplate.api.gains import suggest_gains
-    from swashplate.api.link import link_ardupilot, link_px4
+    from swashplate.api.identification import identify_and_validate
+    from swashplate.api.link import link_ardupilot, link_px4, write_ardupilot_parameters
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
+    from swashplate.api.open_logs import open_logs
+    from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
@@ -42,12 +47,17 @@ if TYPE_CHECKING:
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
     from swashplate.flights.conditioning.synchronise import merge, synchronise
+    from swashplate.flights.conditioning.uniform_records import uniform_records
+    from swashplate.flights.datasets import fetch as fetch_dataset
     from swashplate.flights.datasets import listing as datasets
     from swashplate.flights.flight import Flight
     from swashplate.flights.inspect import inspect
+    from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
+    from swashplate.flights.readers.read import read
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
+    from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
     from swashplate.identification.frequency.state_space_fit import fit_state_space
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
     from swashplate.identification.identify import identify
@@ -57,10 +67,13 @@ if TYPE_CHECKING:
     from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
     from swashplate.identification.time.linear_time_fit import fit_in_time
     from swashplate.identification.time.vehicle_time_fit import fit_vehicle
+    from swashplate.links.live.film import film_replay
     from swashplate.links.live.replay import replay
     from swashplate.models.card import Card, Parameter
+    from swashplate.models.catalogue import cards_by_name as vehicles
     from swashplate.models.catalogue import structure, vehicle
     from swashplate.models.coax_choices import CHOICES
+    from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
@@ -71,6 +84,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.linearize import linearize
     from swashplate.simulation.lpv import schedule as speed_schedule
     from swashplate.simulation.lpv import simulate_lpv
+    from swashplate.simulation.published import compare_derivatives
+    from swashplate.simulation.reduction import in_form, omit_derivatives
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
@@ -96,24 +111,35 @@ __all__ = [
     "__version__",
     "autopilot",
     "check_controller",
+    "compare_derivatives",
     "datasets",
     "decouple",
     "decouple_axes",
+    "demo",
     "derivatives",
     "design_controller",
     "equation_error",
     "evaluate_bench",
     "excitation",
     "export_controller",
+    "export_flight",
     "export_model",
+    "fetch_dataset",
+    "film_replay",
     "fit_in_frequency",
     "fit_in_time",
+    "fit_ss",
     "fit_state_space",
+    "fit_tf",
+    "fit_time",
     "fit_transfer_function",
     "fit_vehicle",
     "fly_maneuver",
+    "handling_qualities",
     "hover_hold",
     "identify",
+    "identify_and_validate",
+    "in_form",
     "inspect",
     "linearize",
     "link_ardupilot",
@@ -124,10 +150,14 @@ __all__ = [
     "maneuver",
     "merge",
     "monte_carlo",
+    "new_card",
     "observability",
     "observe",
     "observer_trial",
+    "omit_derivatives",
+    "open_logs",
     "plan_bench",
+    "plan_maneuver",
     "read",
     "read_control",
     "replay",
@@ -148,55 +178,14 @@ __all__ = [
     "synchronise",
     "trim",
     "trim_curve",
+    "uniform_records",
     "validate",
+    "validate_linear",
     "vehicle",
+    "vehicles",
     "verify",
+    "write_ardupilot_parameters",
 ]
-
-
-def read(
-    path_or_name: str | os.PathLike[str],
-    *,
-    units: Mapping[str, str] | None = None,
-    mapping: str | os.PathLike[str] | Mapping[str, Any] | None = None,
-    body: str | None = None,
-    rotation: str | None = None,
-    body_axes: str | None = None,
-    world_axes: str | None = None,
-    bad_stamps: str = "error",
-    log: int | None = None,
-) -> Flight:
-    """Read a flight log as a `Flight` in SI units, radians, NED and FRD, at its native rates.
-
-    Args:
-        path_or_name: a file, or a file of a public data set as "coax56/flight_2011-08-01_vertical".
-        units: units by channel (CSV) or field (`.mat`, motion capture) where the file says none, or the wrong ones.
-        mapping: a TOML file, or its content, that says which columns of a CSV file are which channels.
-        body: the tracked body, where a motion capture file has several.
-        rotation: how three logged angles are meant: "helical" or "euler_xyz".
-        body_axes: where the tracked body's logged axes point, for example "forward-left-up".
-        world_axes: where the room's logged axes point, for example "north-west-up".
-        bad_stamps: "error", or "drop" to leave out samples whose time repeats or goes backwards.
-        log: which of the logs in a Blackbox file, from 1; the longest if not given.
-
-    Raises:
-        FlightError, UnitError: naming the file, the channel, what was found, what was expected and what to do.
-        DatasetError: where a data set's file is named that is not on this machine.
-    """
-    from swashplate.flights import datasets  # array libraries take time to load
-    from swashplate.flights.readers.read import read as read_log
-
-    return read_log(
-        datasets.locate(os.fspath(path_or_name)),
-        units=units,
-        mapping=mapping,
-        body=body,
-        rotation=rotation,
-        body_axes=body_axes,
-        world_axes=world_axes,
-        bad_stamps=bad_stamps,
-        log=log,
-    )
 
 
 def __getattr__(name: str) -> Any:

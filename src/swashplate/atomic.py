@@ -17,8 +17,10 @@ import stat
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from swashplate.errors import WriteError
+from swashplate.json_text import as_json
 
 _MARK = ".swash-"
 _NEW, _COMMIT = "new", "commit"  # inside a temporary folder: the files, and the word that they are all there
@@ -220,6 +222,11 @@ def write_bytes(path: str | os.PathLike[str], content: bytes | memoryview) -> Pa
     with replaced_when_complete(path) as temporary, _named(path), temporary.open("wb") as stream:
         stream.write(content)
     return target
+
+
+def write_json(path: str | os.PathLike[str], value: Any) -> Path:
+    """Write a value as a JSON document (see `as_json`)."""
+    return write_text(Path(path), as_json(value) + "\n")
 
 
 @contextmanager

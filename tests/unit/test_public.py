@@ -11,22 +11,23 @@ import pytest
 import swashplate as sp
 from swashplate import public
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.read import read
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.shown import Shown
 from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.trim_curve import TrimCurve
 
 METHODS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "Flight.condition": (Flight.condition, public.resolve("condition")),
     "Flight.to_dataframe": (Flight.to_dataframe, public.resolve("flight_to_dataframe")),
     "Flight.plot": (Flight.plot, public.resolve("plot_flight")),
     "FrequencyResponse.plot": (FrequencyResponse.plot, public.resolve("plot_responses")),
-    "Validation.plot": (sp.Validation.plot, public.resolve("plot_validation")),
-    "TrimCurve.plot": (TrimCurve.plot, public.resolve("plot_trim_curve")),
+    "Flight.explore": (Flight.explore, public.resolve("explore_flight")),
+    "FrequencyResponse.explore": (FrequencyResponse.explore, public.resolve("explore_responses")),
     "Derivatives.plot": (Derivatives.plot, public.resolve("plot_derivatives")),
+    "Derivatives.explore": (Derivatives.explore, public.resolve("explore_derivatives")),
+    "Shown.plot": (Shown.plot, public.resolve("plot")),
+    "Shown.explore": (Shown.explore, public.resolve("explore")),
     "Flight.from_arrays": (Flight.from_arrays, public.resolve("flight_from_arrays")),
     "Flight.from_dataframe": (Flight.from_dataframe, public.resolve("flight_from_dataframe")),
-    "read": (sp.read, read),
 }
 
 
@@ -51,7 +52,7 @@ def test_every_name_behind_a_method_is_there() -> None:
 
 
 def test_the_tables_and_the_public_list_agree() -> None:
-    assert {*public.NAMES, "read", "__version__"} == set(sp.__all__)
+    assert {*public.NAMES, "__version__"} == set(sp.__all__)
 
 
 def test_a_name_of_no_table_is_a_key_error() -> None:

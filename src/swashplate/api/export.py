@@ -1,4 +1,4 @@
-"""Models and controllers in the formats of other programs, from what a user calls them."""
+"""Models, controllers and flights in the formats of other programs, from what a user calls them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import os
 from pathlib import Path
 
 from swashplate.control.controller_file import read_controller
+from swashplate.errors import SwashError
 from swashplate.export import formats
 from swashplate.export.c_text import Precision, identifier
 from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code
 from swashplate.export.formats import Export, Model
 from swashplate.export.matlab import read_matlab
+from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.trim import Trim
 
@@ -74,3 +76,21 @@ def export_controller(path: str | Path, *, name: str | None = None, precision: P
     code = controller_code(read, precision="float" if precision == "single" else "double")
     told = f"One step: {code.operations} operations, {code.work_bytes} bytes of temporaries."
     return Export({f"{identifier(name or Path(path).stem)}.c": code.source.encode()}, (told,))
+
+
+def export_flight(flight: Flight, *, name: str | None = None) -> Export:
+    """A flight as an MCAP file for Foxglove, Lichtblick, PlotJuggler and Rerun.
+
+    Args:
+        flight: as logged or simulated.
+        name: what the file is called; the log's own name where None.
+
+    Raises:
+        SwashError: where the extra `mcap` is missing, or the name is no file's.
+    """
+    from swashplate.export.mcap import as_mcap
+
+    called = Path(flight.provenance.source).stem if name is None else name
+    if not called or Path(called).name != called:
+        raise SwashError(f"'{called}' is no file's name.", channel="--name")
+    return Export({f"{called}.mcap": as_mcap(flight)}, flight.provenance.damage)

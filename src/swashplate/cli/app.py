@@ -25,6 +25,7 @@ from swashplate.cli import (
     link,
     live,
     maneuver,
+    open,
     replay,
     respond,
     simulate,
@@ -75,6 +76,7 @@ app.command("fit-tf", short_help="Fit transfer functions to frequency responses.
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
+app.command("open", short_help="Look at any log in the browser: one page for all of it.")(open.open_)
 app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
 app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)

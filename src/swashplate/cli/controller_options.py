@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
-from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -109,9 +108,3 @@ def show(made: Any, *, written: tuple[Path | None, ...], json: bool, quiet: bool
     files = ", ".join(str(path) for path in written if path is not None)
     if files:
         typer.echo(f"\nWritten: {files}")
-
-
-def named_numbers(texts: list[str] | None, option: str) -> dict[str, float]:
-    """NAME=VALUE, repeated."""
-    found = options.assignments(texts, option=option)
-    return {name: options.numbers(value, option=option, count=1)[0] for name, value in found.items()}

@@ -16,11 +16,11 @@ app = typer.Typer(
 @app.command("list")
 def list_(json: options.Json = False) -> None:
     """List the files of every known data set and where each is found on this machine."""
+    import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.flights.datasets import listing
 
-    rows = listing()
+    rows = sp.datasets()
     if json:
         typer.echo(as_json([{**vars(row), "found": row.found and str(row.found)} for row in rows]))
         return
@@ -37,11 +37,11 @@ def fetch(
     quiet: options.Quiet = False,
 ) -> None:
     """Download a data set from its public address into the user's cache, checked by hash; found files are not."""
+    import swashplate as sp
     from swashplate.cli.console import progress
-    from swashplate.flights.datasets import fetch as get
 
     with progress(quiet=quiet) as line:
         line.say(f"fetching {name}")
-        paths = get(name)
+        paths = sp.fetch_dataset(name)
     if not quiet:
         typer.echo("\n".join(map(str, paths)))

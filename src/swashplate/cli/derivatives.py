@@ -12,9 +12,7 @@ from swashplate.cli import options
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from swashplate.simulation.trim import Trim
+    from swashplate.simulation.published import PublishedComparison
     from swashplate.simulation.uncertainty import CardSpread
 
 
@@ -47,13 +45,7 @@ def derivatives(
     """Stability and control derivatives: force per mass and moment per inertia, split by what contributes to them."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table as tabulate
-    from swashplate.simulation.derivatives import derivative_table
-    from swashplate.simulation.derivatives_over_speed import derivatives as study
 
-    if uncertainty and len(asked.speeds) > 1:
-        raise SwashError("takes one speed.", channel="--uncertainty", hint="Give --speed a single number.")
-    if uncertainty and primed:
-        raise SwashError("has no bounds.", channel="--primed", hint="Leave out --uncertainty or --primed.")
     if published is not None and (uncertainty or plot is not None or imperial or len(asked.speeds) > 1):
         raise SwashError(
             "takes one speed, and no --uncertainty, --plot or --imperial.",
@@ -62,18 +54,25 @@ def derivatives(
         )
     if left_out and (uncertainty or primed or imperial or plot or published):
         raise SwashError("goes with --json and the conditions only.", channel="--left-out")
+    import swashplate as sp
+
     curve = asked.curve()
     remarks = asked.tell(curve)
     if published is not None:
-        from swashplate.cli.published import compare
-
-        compare(asked, curve.trims[0], published, primed=primed, json=json)
+        _compared(
+            asked, sp.compare_derivatives(asked.vehicle, curve.trims[0], published, primed=primed), published, json
+        )
         return
     if left_out:
-        derivative_table(asked.vehicle, curve.trims[0])  # refuses what has none
-        _left_out(asked, curve.trims, json=json, remarks=remarks)
+        study = sp.omit_derivatives(asked.vehicle, curve.trims)
+        if json:
+            typer.echo(as_json({"vehicle": asked.name, "studies": study.as_dict(), "remarks": remarks}))
+            return
+        for place, speed in enumerate(study.speeds):
+            typer.echo(f"At {speed:g} m/s: largest relative change of a mode, and of q/B1, p/A1, r/theta0T, w/theta0")
+            console().print(tabulate(*study.rows(place)))
         return
-    found = study(
+    found = sp.derivatives(
         asked.vehicle,
         curve.trims,
         primed=primed,
@@ -83,9 +82,7 @@ def derivatives(
         seed=seed,
     )
     if plot is not None:
-        from swashplate.reporting.speed_page import speed_page
-
-        speed_page(asked.vehicle, found.trims, path=plot, tables=found.tables, remarks=remarks, imperial=imperial)
+        sp.report(found, path=plot)
     if json:
         typer.echo(as_json({"vehicle": asked.name, **found.as_dict(), "remarks": remarks}))
         return
@@ -99,22 +96,18 @@ def derivatives(
         typer.echo(f"Written: {plot}")
 
 
-def _left_out(asked: given.Conditions, found: Sequence[Trim], *, json: bool, remarks: Sequence[str]) -> None:
-    """The study behind the paper's remark that X_r may be excluded."""
+def _compared(asked: given.Conditions, found: PublishedComparison, path: Path, json: bool) -> None:
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table as tabulate
-    from swashplate.simulation.linearize import linearize
-    from swashplate.simulation.reduction import omissions, paper_model
 
-    studies = [(at.speed, omissions(paper_model(linearize(asked.vehicle, at)))) for at in found]
     if json:
-        document = [{"speed": speed, "left_out": [vars(each) for each in study]} for speed, study in studies]
-        typer.echo(as_json({"vehicle": asked.name, "studies": document, "remarks": remarks}))
+        told = {"vehicle": asked.name, "speed": asked.speeds[0], "published": str(path)}
+        typer.echo(as_json(told | found.as_dict()))
         return
-    for speed, study in studies:
-        typer.echo(f"At {speed:g} m/s: largest relative change of a mode, and of q/B1, p/A1, r/theta0T, w/theta0")
-        rows = [(each.derivative, f"{each.value:.3g}", f"{each.modes:.1e}", f"{each.response:.1e}") for each in study]
-        console().print(tabulate(("left out", "value", "modes", "responses"), rows))
+    typer.echo(f"At {asked.speeds[0]:g} m/s, published in {path} (small: below 2 % of the largest of its kind)")
+    console().print(tabulate(*found.rows(), left=2))
+    typer.echo("\nMean difference (each at most 100 %), and derivatives within 10 %:")
+    console().print(tabulate(*found.step_rows()))
 
 
 def _modes(wide: CardSpread) -> None:

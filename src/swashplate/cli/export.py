@@ -90,7 +90,7 @@ def export(
 
     swash export flight.bbl --format mcap
     """
-    from swashplate.api import export as verbs
+    import swashplate as sp
     from swashplate.cli.console import as_json
     from swashplate.documents import kind_of
 
@@ -105,10 +105,10 @@ def export(
             )
         if refused:
             raise SwashError("is for vehicles, and this is a controller.", where=model, channel=", ".join(refused))
-        made = verbs.export_controller(model, name=name, precision=precision.value)
+        made = sp.export_controller(model, name=name, precision=precision.value)
     else:
         exported, trim = _model(model, speed, mass, changed, switched)
-        made = verbs.export_model(
+        made = sp.export_model(
             exported, form.value, name=name or Path(model).stem, trim=trim, precision=precision.value, delays=delays
         )
     made.save(out)
@@ -123,17 +123,14 @@ def export(
 
 
 def _flight(flight: str, name: str | None, refused: list[str]) -> Export:
-    from swashplate.cli.reading import read, split_log, split_window
-    from swashplate.export.formats import Export
-    from swashplate.export.mcap import as_mcap
+    import swashplate as sp
+    from swashplate.cli.reading import read
+    from swashplate.flights.readers.windows import split_log, split_window
 
     if refused:
         raise SwashError("is for vehicles, and mcap takes a flight.", where=flight, channel=", ".join(refused))
-    if name is not None and (not name or Path(name).name != name):
-        raise SwashError(f"'{name}' is no file's name.", channel="--name")
-    called = name or Path(split_log(split_window(flight)[0])[0]).stem
-    made = read(flight)
-    return Export({f"{called}.mcap": as_mcap(made)}, made.provenance.damage)
+    called = Path(split_log(split_window(flight)[0])[0]).stem
+    return sp.export_flight(read(flight), name=called if name is None else name)
 
 
 def _model(

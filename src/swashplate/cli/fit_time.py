@@ -7,9 +7,6 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import flying, options
-from swashplate.cli.reading import Reading
-
-FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
 
 def fit_time(
@@ -30,12 +27,8 @@ def fit_time(
         str | None, typer.Option("--biases", help="Outputs with a constant of their own in each record.")
     ] = None,
     shifts: Annotated[bool, typer.Option("--shifts/--no-shifts", help="Constants in the states' rates.")] = True,
-    start: Annotated[
-        list[str] | None, typer.Option("--start", metavar="NAME=VALUE", help="Start value of a parameter.")
-    ] = None,
-    fix: Annotated[
-        list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")
-    ] = None,
+    start: flying.Start = None,
+    fix: flying.Fix = None,
     iterations: Annotated[int, typer.Option("--iterations", help="At most this many.", min=1)] = 80,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
@@ -52,51 +45,30 @@ def fit_time(
     Writes report.html, model.toml, fit.json and verification.json to --out; without --hold-out the records of the fit
     are shown, and marked as no hold-out.
     """
-    from swashplate.atomic import write_text
-    from swashplate.cli.console import as_json, progress
-    from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.responses.response_warnings import damaged
-    from swashplate.identification.time.linear_time_fit import fit_in_time
-    from swashplate.models.linear.state_space_file import structure as find
-    from swashplate.models.linear.state_space_file import to_toml
-    from swashplate.reporting.response_report import response_report
-    from swashplate.reporting.sections_responses import ResponseMaterial
-    from swashplate.validation.verification import verify
+    import swashplate as sp
+    from swashplate.cli.reading import asked, read_all
 
-    model = find(structure)
-    wanted = flying.names(outputs) or model.outputs
-    channels = flying.renamed(rename, option="--rename")
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
-    model = flying.with_given(model, start, fix)
-    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
-        line.say("reading logs")
-        flown = (*model.inputs, *wanted)
-        flights = flying.flown(log, flown, rate=rate, cutoff=cutoff, how=how)
-        line.say("fitting")
-        fit = fit_in_time(
-            model,
-            flights,
-            outputs=wanted,
-            shifts=shifts,
-            biases=flying.names(biases),
+    begun, names = sp.structure(structure), flying.renamed(rename, option="--rename")
+    first, held = options.numbers_by_name(start, option="--start"), options.fixed_values(fix)
+    how = asked(mapping, unit, drop_bad_stamps)
+    flying.carried_out(
+        lambda say: sp.fit_time(
+            begun,
+            read_all(log, how=how),
             method=method,
+            outputs=flying.names(outputs) or None,
+            biases=flying.names(biases),
+            shifts=shifts,
+            start=first,
+            fixed=held,
             iterations=iterations,
-            progress=lambda i, cost: line.say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
-        )
-        line.say("flying the model")
-        unseen = flying.flown(hold_out, flown, rate=rate, cutoff=cutoff, how=how) if hold_out else flights
-        verification = flying.seen_before(verify(fit.model, unseen, outputs=wanted), fit.settings["records"])
-        if folder is not None:
-            line.say("writing the report")
-            response_report(ResponseMaterial(time_fit=fit, verification=verification), path=folder / "report.html")
-            fit.save(folder / "fit.json")
-            write_text(folder / "model.toml", to_toml(fit.model))
-            write_text(folder / "verification.json", as_json(verification.as_dict()) + "\n")
-    if json:
-        typer.echo(as_json({"fit": fit.to_document(comparisons=False), "verification": verification.as_dict()}))
-    elif not quiet:
-        typer.echo(repr(fit))
-        typer.echo(f"\n{verification!r}")
-        if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
-    flying.end_with(damaged([*flights, *(unseen if hold_out else [])]))
+            hold_out=read_all(hold_out, how=how),
+            rate=rate,
+            cutoff=cutoff,
+            names=names,
+            say=say,
+        ),
+        out=out,
+        json=json,
+        quiet=quiet,
+    )

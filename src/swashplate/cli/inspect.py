@@ -5,7 +5,6 @@ from __future__ import annotations
 import typer
 
 from swashplate.cli import options
-from swashplate.cli.reading import Reading
 from swashplate.errors import FlightError
 
 
@@ -26,7 +25,7 @@ def inspect(
     """
     from swashplate.bench.record_files import is_bench, read_bench
     from swashplate.cli.console import as_json, console
-    from swashplate.cli.reading import read
+    from swashplate.cli.reading import asked, read
     from swashplate.flights.datasets import locate
     from swashplate.flights.inspect import inspect as look
 
@@ -40,7 +39,7 @@ def inspect(
             console().print(record_table(record))
             typer.echo(f"\nEvaluate it with `swash bench {flight}`.")
         return
-    found = look(read(flight, how=Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)))
+    found = look(read(flight, how=asked(mapping, unit, drop_bad_stamps)))
     if json:
         typer.echo(as_json(found.as_dict()))
     elif not quiet:

@@ -109,11 +109,15 @@ def assignments(texts: Sequence[str] | None, *, option: str) -> dict[str, str]:
     return dict(_once([split_assignment(text, option=option) for text in texts or ()], option=option))
 
 
+def numbers_by_name(texts: Sequence[str] | None, *, option: str) -> dict[str, float]:
+    """Repeated `name=number` by name."""
+    found = assignments(texts, option=option)
+    return {name: numbers(text, option=option, count=1)[0] for name, text in found.items()}
+
+
 def fixed_values(texts: Sequence[str] | None) -> dict[str, float]:
     """`--fix name=value`, repeated."""
-    return {
-        name: numbers(text, option="--fix", count=1)[0] for name, text in assignments(texts, option="--fix").items()
-    }
+    return numbers_by_name(texts, option="--fix")
 
 
 def prior_card_name(texts: Sequence[str] | None) -> tuple[str | None, list[str]]:

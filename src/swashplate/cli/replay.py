@@ -9,7 +9,6 @@ import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import live, options
-from swashplate.cli.reading import Reading
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
@@ -52,9 +51,10 @@ def replay(
     quiet: options.Quiet = False,
 ) -> None:
     """Replay a flight: scrub through it in the browser, or film it."""
-    from swashplate.api.live import need_live_extra, show_replay
+    import swashplate as sp
+    from swashplate.api.live import need_live_extra
     from swashplate.cli.console import progress
-    from swashplate.cli.reading import read
+    from swashplate.cli.reading import asked, read
 
     if video is not None and frames is not None:
         raise SwashError("and --frames are one too many.", channel="--video", hint="Give one of them.")
@@ -69,24 +69,20 @@ def replay(
     with progress(quiet=quiet) as line:
 
         def prepared() -> Replay:
-            from swashplate.links.live.replay import replay as prepare
-            from swashplate.simulation.compilation import enable_compilation_cache
-
             line.say("reading the flight")
-            how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+            how = asked(mapping, unit, drop_bad_stamps)
             log = read(flight, how=how)
             # A simulation's true states have no outliers, and what looks like one is a maneuver.
             clean = log.provenance.simulated and "phi" in log
             logged = log.condition(rate=rate, cutoff=cutoff, outliers=not clean, trim_ground=not clean)
-            enable_compilation_cache()
             line.say("predicting (compiling takes longest the first time)" if chosen else "preparing")
-            shown = prepare(logged, model=chosen, ahead=ahead, hold_missing=hold_missing)
+            shown = sp.replay(logged, model=chosen, ahead=ahead, hold_missing=hold_missing)
             for note in shown.notes:
                 typer.echo(note, err=True)
             return shown
 
         if film_place is None:
-            show_replay(
+            sp.show_replay(
                 prepared,
                 host=host,
                 port=port,
@@ -96,14 +92,12 @@ def replay(
                 ready=lambda address: live.told(address, quiet=quiet),
             )
             return
-        from swashplate.links.live import film
-
-        write = film.write_pictures if video is None else film.write_film
-        count = write(
+        film = sp.film_replay(
             prepared(),
             film_place,
+            pictures=video is None,
             rate=frame_rate,
             tell=lambda done, total: line.say("drawing", done=done, total=total),
         )
     if not quiet:
-        typer.echo(f"Written: {film_place} ({count} pictures, {count / frame_rate:.1f} s)")
+        typer.echo(f"Written: {film}")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated
 
 import typer
 
 from swashplate.cli import flying, options
-from swashplate.cli.reading import Reading, check_disjoint
+from swashplate.errors import SwashError
 
 FILES = (flying.RESPONSES, "responses.json", "report.html")
 
@@ -48,39 +47,34 @@ def respond(
     Writes responses.nc, responses.json and report.html to --out. What could not be computed is named with exit code 2;
     the rest is written and marked.
     """
-    from swashplate.atomic import write_text
+    import swashplate as sp
+    from swashplate.atomic import write_json
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.errors import SwashError
-    from swashplate.identification.frequency.handling_readings import handling_lines
-    from swashplate.identification.responses.respond import respond as answer
-    from swashplate.reporting.response_report import response_report
-    from swashplate.reporting.sections_responses import ResponseMaterial
+    from swashplate.cli.reading import asked, read_all
+    from swashplate.flights.overlap import check_disjoint
 
     ins, outs = flying.renamed(inputs, option="--inputs"), flying.renamed(outputs, option="--outputs")
-    refs = flying.names(references)
-    limits = flying.band(band)
+    refs, limits = flying.names(references), flying.band(band)
     lengths = None if windows is None else options.numbers(windows, option="--windows")
     if lengths is not None and not all(0.0 < length < float("inf") for length in lengths):
         raise SwashError(f"'{windows}' are not all positive lengths in s.", channel="--windows")
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, ins | outs)
     with progress(quiet=quiet or json) as line:
         line.say("reading logs")
-        flights = flying.flown(log, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, how=how)
+        raw = read_all(log, how=asked(mapping, unit, drop_bad_stamps))
+        flights = sp.uniform_records(raw, (*ins, *outs, *refs), rate=rate, cutoff=cutoff, names=ins | outs)
         check_disjoint(flights, log)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
-            found = answer(
-                flights, inputs=tuple(ins), outputs=tuple(outs), references=refs, band=limits, windows=lengths
+            found = sp.respond(
+                flights, inputs=list(ins), outputs=list(outs), references=refs, band=limits, windows=lengths
             )
-            renamed = {name: source for name, source in how.channels.items() if name != source}
-            found = replace(found, settings={**found.settings, "channels": renamed})
-            document = {**found.as_dict(), "handling": [one.as_dict() for one in handling_lines(found)]}
+            document = {**found.as_dict(), "handling": [one.as_dict() for one in sp.handling_qualities(found)]}
             if folder is not None:
                 line.say("writing the report")
                 found.save(folder / flying.RESPONSES)
-                write_text(folder / "responses.json", as_json(document) + "\n")
-                response_report(ResponseMaterial(found), path=folder / "report.html")
+                write_json(folder / "responses.json", document)
+                sp.report(found, path=folder / "report.html")
     if json:
         typer.echo(as_json(document))
     elif not quiet:

@@ -27,11 +27,11 @@ def trim(
     from swashplate.cli.tables import table
 
     found = asked.curve()
-    remarks = asked.tell(found)
+    asked.tell(found)
     if plot is not None:
-        from swashplate.reporting.speed_page import speed_page
+        import swashplate as sp
 
-        speed_page(asked.vehicle, found.trims, path=plot, remarks=remarks)
+        sp.report(found, path=plot)
     if json:
         typer.echo(as_json({"vehicle": asked.name, **found.as_dict()}))
         return
@@ -77,28 +77,20 @@ def linearize(
     json: options.Json = False,
 ) -> None:
     """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
+    import swashplate as sp
     from swashplate.cli.console import as_json
-    from swashplate.simulation.linearize import linearize as about
-    from swashplate.simulation.reduction import FORMS, in_form
 
-    if form not in FORMS:
-        raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="--form")
-    if form != "full" and not asked.vehicle.traits.rotorcraft:
-        raise SwashError("is for single-rotor helicopters.", where=asked.name, channel="--form")
     if form != "full" and plot is not None:
         raise SwashError("is of the full model.", where=plot, channel="--plot", hint="Leave out --form or --plot.")
     curve = asked.curve()
-    found = curve.trims
-    models = [in_form(about(asked.vehicle, at), form) for at in found]
+    models = [sp.in_form(sp.linearize(asked.vehicle, at), form) for at in curve.trims]
     remarks = asked.tell(curve)
     if plot is not None:
-        from swashplate.reporting.speed_page import speed_page
-
-        speed_page(asked.vehicle, found, path=plot, remarks=remarks)
+        sp.report(curve, path=plot)
     if json:
         typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(m) for m in models], "remarks": remarks}))
         return
-    for at, model in zip(found, models, strict=True):
+    for at, model in zip(curve.trims, models, strict=True):
         typer.echo(f"At {at.speed:g} m/s\n{model!r}\n")
     if plot is not None:
         typer.echo(f"Written: {plot}")

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from swashplate.cli import flying, options
-from swashplate.cli.reading import Reading
-
-if TYPE_CHECKING:
-    from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.errors import SwashError
 
 FILES = ("report.html", "validation.json", "verification.json")
 
@@ -48,21 +44,33 @@ def validate(
     A state-space model (of `swash fit-ss` or `swash fit-tf`) is flown along each flight's inputs instead; --band adds
     how it does within the band that it was fitted over.
     """
-    from swashplate.atomic import write_text
+    import swashplate as sp
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.outputs import folder_when_complete
-    from swashplate.cli.reading import check_disjoint, conditioned
-    from swashplate.cli.tables import validation_table
-    from swashplate.errors import SwashError
-    from swashplate.models.catalogue import vehicle as find
-    from swashplate.models.linear.state_space_file import is_state_space
+    from swashplate.cli.reading import asked, conditioned, read_all
+    from swashplate.cli.tables import floors_table, validation_table
+    from swashplate.flights.overlap import check_disjoint
+    from swashplate.identification.core.records import records
 
-    channels = flying.renamed(rename, option="--rename")
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps, channels)
-    if is_state_space(model):
-        limits = flying.band(band)
-        _verify(
-            model, published, flight, band=limits, out=out, rate=rate, cutoff=cutoff, how=how, json=json, quiet=quiet
+    how, limits = asked(mapping, unit, drop_bad_stamps), flying.band(band)
+    judged, other = sp.vehicle(model), None if published is None else sp.vehicle(published)
+    names = flying.renamed(rename, option="--rename")
+    if judged.structure is not None:
+        linear = judged
+        flying.carried_out(
+            lambda say: sp.validate_linear(
+                linear,
+                read_all(flight, how=how),
+                published=other,
+                band=limits,
+                rate=rate,
+                cutoff=cutoff,
+                names=names,
+                say=say,
+            ),
+            out=out,
+            json=json,
+            quiet=quiet,
         )
         return
     if band is not None:
@@ -70,22 +78,17 @@ def validate(
     ahead = tuple(options.numbers(horizons, option="--horizons"))
     if min(ahead) <= 0.0:
         raise SwashError(f"'{horizons}' are not all positive.", channel="--horizons")
-    aircraft, card = find(model), None if published is None else find(published)
     with progress(quiet=quiet or json) as line:
         line.say("reading flights")
         flights = conditioned(flight, rate=rate, cutoff=cutoff, how=how)
         check_disjoint(flights, flight)
-
-        import swashplate as sp
-        from swashplate.identification.core.records import records
-
-        records(flights, aircraft)
+        records(flights, judged)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("predicting (compiling takes longest the first time)")
             validation = sp.validate(
-                aircraft,
+                judged,
                 flights,
-                published=card,
+                published=other,
                 horizons=ahead,
                 every=every,
                 calibration=calibration,
@@ -95,74 +98,15 @@ def validate(
             if folder is not None:
                 line.say("writing the report")
                 sp.report(validation, path=folder / "report.html")
-                write_text(folder / "validation.json", as_json(validation.as_dict()) + "\n")
+                validation.save(folder / "validation.json")
     if json:
         typer.echo(as_json(validation.as_dict()))
     elif not quiet:
         screen = console()
         screen.print(validation_table(validation, width=screen.width))
+        if validation.floors:
+            typer.echo("\nWhat the model's scores stand beside")
+            screen.print(floors_table(validation))
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
-
-
-def _other(name: str) -> StateSpaceModel:
-    """What an identified model is compared with: another model, or a vehicle linearised in hover."""
-    import swashplate as sp
-    from swashplate.identification.time.linearised_model import model_of
-
-    aircraft = sp.vehicle(name)
-    if aircraft.structure is not None:
-        return aircraft.structure
-    return model_of(sp.linearize(aircraft), name=f"{aircraft.name}, linearised in hover")
-
-
-def _verify(
-    model: str,
-    other: str | None,
-    flights: list[str],
-    *,
-    band: tuple[float, float] | None,
-    out: Path | None,
-    rate: float,
-    cutoff: float,
-    how: Reading,
-    json: bool,
-    quiet: bool,
-) -> None:
-    """A linear model along recorded inputs, biases and shifts solved for."""
-    from swashplate.atomic import write_text
-    from swashplate.cli.console import as_json, progress
-    from swashplate.cli.outputs import folder_when_complete
-    from swashplate.identification.responses.response_warnings import damaged
-    from swashplate.models.linear.state_space_file import structure
-    from swashplate.reporting.response_report import response_report
-    from swashplate.reporting.sections_responses import ResponseMaterial
-    from swashplate.validation.verification import verify_inside
-
-    identified, compared = structure(model), None if other is None else _other(other)
-    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
-        line.say("flying the model along the inputs")
-        inputs, outputs = identified.inputs, identified.outputs
-        flown = flying.flown(flights, inputs, rate=rate, cutoff=cutoff, how=how, also=outputs)
-        found = verify_inside(identified, flown, band=band)
-        rival = None
-        if compared is not None:
-            channels = (compared.inputs, compared.outputs)
-            rival = verify_inside(
-                compared,
-                flying.flown(flights, channels[0], rate=rate, cutoff=cutoff, how=how, also=channels[1]),
-                band=band,
-            )
-        if folder is not None:
-            response_report(ResponseMaterial(verification=found, rival=rival), path=folder / "report.html")
-            write_text(folder / "verification.json", as_json(found.as_dict()) + "\n")
-    if json:
-        typer.echo(as_json(found.as_dict()))
-    elif not quiet:
-        typer.echo(repr(found))
-        if rival is not None:
-            typer.echo(f"\n{rival!r}")
-        if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
-    flying.end_with(damaged(found.flights))

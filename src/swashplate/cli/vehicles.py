@@ -32,11 +32,11 @@ def main(ctx: typer.Context, json: options.Json = False) -> None:
 @app.command("list")
 def list_(json: options.Json = False) -> None:
     """List the vehicles by name."""
+    import swashplate as sp
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
-    from swashplate.models.catalogue import cards_by_name
 
-    cards, faults = cards_by_name()
+    cards, faults = sp.vehicles()
     for fault in faults:
         typer.echo(f"Careful: {fault}", err=True)
     if json:

@@ -91,6 +91,7 @@ ESTIMATORS: Registry[Estimator] = Registry(
         "output-error/linear": "swashplate.identification.time.linear_time_fit:OUTPUT_ERROR",
         "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
         "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
+        "collocation": "swashplate.identification.time.collocation:COLLOCATION",
         "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
     },
 )

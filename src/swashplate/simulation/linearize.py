@@ -11,6 +11,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -47,7 +48,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearModel(Shown):
     """dx/dt = A x + B u, y = C x + D u, for deviations from a trim.
 
     Attributes:

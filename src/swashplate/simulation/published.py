@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swashplate.errors import TrimError
+from swashplate.errors import SwashError, TrimError
 from swashplate.models.catalogue import from_card
 from swashplate.models.conventional.buildup import build_up
-from swashplate.models.conventional.derivative_table import DerivativeTable, split_name
+from swashplate.models.conventional.derivative_table import DerivativeTable, split_name, unit
+from swashplate.models.published import read_published
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.trim import Trim, trim
+from swashplate.text_table import text_table
 
 _SMALL = 0.02
 """Share of the largest of its kind below which a published derivative's relative difference says nothing."""
@@ -59,7 +62,7 @@ class ComparisonStep:
     near: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PublishedComparison:
     """Published derivatives against a card's.
 
@@ -79,6 +82,74 @@ class PublishedComparison:
             name: (-1.0 if value < 0.0 else 1.0) * (table[name] - value) / self.scale[name]
             for name, value in self.published.items()
         }
+
+    def rows(self) -> tuple[list[str], list[list[str]]]:
+        """Heading and cells of a table for the screen: published, the card's, with the assumptions, and by whom."""
+        first, last = self.steps[0].table, self.steps[-1].table
+        before, after = self.differences(first), self.differences(last)
+        more = len(self.steps) > 1
+        head = ["derivative", "unit", "published", "card", "off", *(["nearest", "off"] if more else []), *last.parts]
+        rows = []
+        for name, value in self.published.items():
+            row, column = split_name(name)
+            small = abs(value) < self.scale[name]
+            cells = [name, unit(name), f"{value:.4g}", f"{first[name]:.4g}", _off(before[name], small)]
+            if more:
+                cells += [f"{last[name]:.4g}", _off(after[name], small)]
+            parts = [f"{part[row, column]:.3g}" if part[row, column] else "-" for part in last.parts.values()]
+            rows.append([*cells, *parts])
+        return [heading.replace("_", " ") for heading in head], rows
+
+    def step_rows(self) -> tuple[list[str], list[list[str]]]:
+        """Heading and cells of the mean difference with one assumption after another."""
+        steps = [
+            [s.words or "the card", f"{100 * s.mean:.1f} %", f"{s.near} of {len(self.published)}"] for s in self.steps
+        ]
+        return ["with, one after another", "mean", "within 10 %"], steps
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers and words as JSON types."""
+        off = [self.differences(step.table) for step in self.steps]
+        values = {
+            name: {
+                "published": value,
+                "unit": unit(name),
+                "small": abs(value) < self.scale[name],
+                "values": [step.table[name] for step in self.steps],
+                "off": [each[name] for each in off],
+            }
+            for name, value in self.published.items()
+        }
+        steps = [{"with": s.words, "mean": s.mean, "within 10 %": s.near} for s in self.steps]
+        return {"steps": steps, "derivatives": values}
+
+    def __repr__(self) -> str:
+        differences, steps = (text_table(head, rows, left=(0, 1)) for head, rows in (self.rows(), self.step_rows()))
+        small = "small: below 2 % of the largest of its kind"
+        return f"{small}\n{differences}\n\nMean difference (each at most 100 %)\n{steps}"
+
+
+def _off(difference: float, small: bool) -> str:
+    return "small" if small else f"{100 * difference:+.0f} %"
+
+
+def compare_derivatives(vehicle: Vehicle, at: Trim, path: str | Path, *, primed: bool = False) -> PublishedComparison:
+    """A card's derivatives beside a report's, and what the report may assume (see `hold_against`).
+
+    Args:
+        vehicle: a single-rotor helicopter.
+        at: its trim, in straight flight.
+        path: the report's numbers: `name,value[,unit]`, or A and B as a matrix (see `read_published`).
+        primed: its roll and yaw rows are mixed by the product of inertia.
+
+    Raises:
+        SwashError: for a file that cannot be read, a flight that turns, or a vehicle without a build-up.
+    """
+    if at.turn:
+        raise SwashError("takes straight flight.", channel="--published", hint="Leave out --turn.")
+    sense = getattr(vehicle.options, "sense", 1.0)
+    flight = {name: at.states().get(name, 0.0) for name in ("u", "v", "w")}
+    return hold_against(vehicle, at, read_published(path, sense=sense, flight=flight), primed=primed)
 
 
 def hold_against(

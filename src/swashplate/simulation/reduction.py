@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import ROWS
-from swashplate.simulation.linearize import LinearModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.derivatives import derivative_table
+from swashplate.simulation.linearize import LinearModel, linearize
+from swashplate.simulation.trim import Trim
+from swashplate.text_table import text_table
 
 PAPER_STATES = ("u", "w", "q", "theta", "v", "p", "phi", "r")
 PAPER_INPUTS = ("theta0", "B1", "A1", "theta0T")
@@ -126,17 +131,19 @@ def in_form(model: LinearModel, form: str) -> LinearModel:
     it, without the coupling; "flapping": ten states; "bar-and-gyro": thirteen.
 
     Raises:
-        SwashError: where the form is not known, or the model lacks one of its states.
+        SwashError: where the form is not known, or the model is not of a single-rotor helicopter.
     """
+    if form not in FORMS:
+        raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="form")
     if form == "full":
         return model
+    if not set(PAPER_INPUTS) <= set(model.inputs):
+        raise SwashError("is for single-rotor helicopters.", channel="form")
     if form in ("flapping", "bar-and-gyro"):
         return residualise(model, HYBRID if form == "flapping" else METTLER)
     if form in ("paper", "printed"):
         return paper_model(model, as_printed=form == "printed")
-    if form in ("longitudinal", "lateral"):
-        return part(paper_model(model), *(LONGITUDINAL if form == "longitudinal" else LATERAL))
-    raise SwashError(f"is '{form}', expected one of {', '.join(FORMS)}.", channel="form")
+    return part(paper_model(model), *(LONGITUDINAL if form == "longitudinal" else LATERAL))
 
 
 @dataclass(frozen=True)
@@ -194,6 +201,48 @@ def omissions(model: LinearModel) -> tuple[Omission, ...]:
             B[index[name], j] = 0.0
             found.append(_omission(f"{letter}{control}", value, model.A, B, model, nominal, response))
     return tuple(sorted(found, key=lambda entry: max(entry.modes, entry.response)))
+
+
+@dataclass(frozen=True, repr=False)
+class OmissionStudy:
+    """What leaving out each derivative changes, at some speeds [m/s]; those that matter least come first."""
+
+    speeds: tuple[float, ...]
+    omissions: tuple[tuple[Omission, ...], ...]
+
+    def rows(self, place: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Heading and cells of the table at one of the speeds."""
+        cells: list[tuple[str, ...]] = [
+            (each.derivative, f"{each.value:.3g}", f"{each.modes:.1e}", f"{each.response:.1e}")
+            for each in self.omissions[place]
+        ]
+        return ("left out", "value", "modes", "responses"), cells
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """Numbers as JSON types."""
+        return [
+            {"speed": speed, "left_out": [vars(each) for each in study]}
+            for speed, study in zip(self.speeds, self.omissions, strict=True)
+        ]
+
+    def __repr__(self) -> str:
+        return "\n\n".join(f"At {v:g} m/s\n{text_table(*self.rows(k))}" for k, v in enumerate(self.speeds))
+
+
+def omit_derivatives(vehicle: Vehicle, trims: Trim | Sequence[Trim]) -> OmissionStudy:
+    """What leaving out each derivative of the paper's model changes of modes and responses.
+
+    Args:
+        vehicle: a single-rotor helicopter.
+        trims: one or several.
+
+    Raises:
+        SwashError: for a vehicle without derivatives by contributor.
+    """
+    at = (trims,) if isinstance(trims, Trim) else tuple(trims)
+    derivative_table(vehicle, at[0])  # refuses what has none
+    studies = tuple(omissions(paper_model(linearize(vehicle, each))) for each in at)
+    return OmissionStudy(tuple(each.speed for each in at), studies)
 
 
 def _omission(

@@ -147,6 +147,21 @@ def test_the_result_is_plain_json_and_prints() -> None:
         assert part in repr(found)
 
 
+def test_every_score_of_the_model_stands_beside_its_floor() -> None:
+    found = _validation()
+    assert {(f.channel, f.horizon) for f in found.floors} == {(c, h) for c in PREDICTED for h in HORIZONS}
+    for floor in found.floors:
+        score = found.score(floor.channel, floor.horizon)
+        assert (floor.fit, floor.rms) == (pytest.approx(score.fit), pytest.approx(score.rms))
+        assert floor.moved == pytest.approx(found.score(floor.channel, floor.horizon, "hold").rms)
+        assert floor.rival != "published card"  # a card is no rival of itself
+    phi = found.floor("phi", 0.5)
+    assert 0.0 < phi.expected < phi.fit  # the usual gusts are promised, and this flight had none
+    assert np.isnan(phi.low)  # five seconds of starts are too few blocks
+    assert "filter expects" in repr(found)
+    assert found.as_dict()["floors"][0]["words"] == found.floors[0].words
+
+
 def test_a_flight_that_is_over_before_it_is_calibrated_is_refused() -> None:
     flight = ten_seconds().condition(rate=100.0, cutoff=0.0).between(0.0, 6.0)
     with pytest.raises(FlightError, match=r"longest unbroken piece has 6\.0 s, expected more than 6\.5 s"):

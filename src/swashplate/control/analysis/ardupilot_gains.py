@@ -35,7 +35,7 @@ _INTEGRATES = 2.0
 """Gain at 0.1 Hz over that at 0.4 Hz from which a rate has no steady value to feed forward."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Suggestion:
     """Gains of one axis.
 
@@ -65,6 +65,24 @@ class Suggestion:
 
         told = {"margins": read(self.margins), "flown_margins": read(self.flown_margins)}
         return {**vars(self), **told}
+
+    def __repr__(self) -> str:
+        words = f"{self.axis}: {_margin_words(self.margins, self.peak) if self.parameters else self.words}\n"
+        if self.flown:
+            words += f"  {'parameter':<18}{'suggested':>10}{'flown':>10}\n"
+        for name in self.parameters or self.flown:
+            cells = f"{self.parameters[name]:>10.4f}" if name in self.parameters else f"{'':>10}"
+            words += f"  {name:<18}{cells}" + (f"{self.flown[name]:>10.4f}" if name in self.flown else "") + "\n"
+        if self.flown:
+            words += f"  as flown: {_margin_words(self.flown_margins, self.flown_peak)}\n"
+        return f"{words}  {self.words}" if self.parameters else words.rstrip("\n")
+
+
+def _margin_words(m: Margins, peak: float) -> str:
+    where = f" at {m.omega_180.value:.3g} rad/s" if m.omega_180.value > 0.0 else ""
+    return (
+        f"phase margin {m.phase_margin!r} deg, gain margin {m.gain_margin!r} dB{where}, largest sensitivity {peak:.2f}"
+    )
 
 
 def suggest_gains(

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from swashplate.errors import FlightError
+from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import analogue, blackbox
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
+from swashplate.flights.readers.windows import cut, split_log, split_window
 from swashplate.registry import Registry
 
 
@@ -50,7 +52,7 @@ READERS: Registry[Reader] = Registry(
 
 
 def read(
-    path: str | os.PathLike[str],
+    path_or_name: str | os.PathLike[str],
     *,
     units: Mapping[str, str] | None = None,
     mapping: str | os.PathLike[str] | Mapping[str, Any] | None = None,
@@ -68,7 +70,9 @@ def read(
     ULog files and ROS bags need `pip install swashplate[logs]`.
 
     Args:
-        path: the file, or the folder of a rosbag2.
+        path_or_name: the file, or the folder of a rosbag2; or a file of a public data set as
+            "coax56/flight_2011-08-01_vertical". "FILE@5-30" reads the seconds 5 to 30 of it, "FILE#2" the second log
+            of a Blackbox file; a file that is called so wins.
         units: units by channel (CSV) or field (`.mat`, "position" of a motion capture file) where the file says none,
             or the wrong ones.
         mapping: a TOML file, or its content as a dictionary, that says which columns of a CSV file are which channels
@@ -87,7 +91,39 @@ def read(
 
     Raises:
         FlightError, UnitError: naming the file, the channel, what was found, what was expected and what to do.
+        DatasetError: where a data set's file is named that is not on this machine.
     """
+    named, window = split_window(path_or_name)
+    file, number = split_log(named)
+    if log is not None and number is not None:
+        raise FlightError(f"names log {number}, and log={log} is given too.", where=named, hint="Give one of them.")
+    flight = _whole(
+        datasets.locate(file),
+        units=units,
+        mapping=mapping,
+        body=body,
+        rotation=rotation,
+        body_axes=body_axes,
+        world_axes=world_axes,
+        bad_stamps=bad_stamps,
+        log=number if log is None else log,
+    )
+    return flight if window is None else cut(flight, *window, where=file)
+
+
+def _whole(
+    path: str | os.PathLike[str],
+    *,
+    units: Mapping[str, str] | None,
+    mapping: str | os.PathLike[str] | Mapping[str, Any] | None,
+    body: str | None,
+    rotation: str | None,
+    body_axes: str | None,
+    world_axes: str | None,
+    bad_stamps: str,
+    log: int | None,
+) -> Flight:
+    """One log of a file from its first sample to its last."""
     source = open_source(path)
     options = Options(
         units=units or {},

@@ -50,6 +50,22 @@ def measurable(vehicle: Vehicle) -> tuple[str, ...]:
     return (*vehicle.state_names, *(f"{name}dot" for name in vehicle.state_names), *FORCES)
 
 
+def check_foretold(vehicle: Vehicle, outputs: Sequence[str]) -> None:
+    """That a vehicle's equations foretell some channels.
+
+    Raises:
+        IdentificationError: naming those that they do not, and those that they do.
+    """
+    known = measurable(vehicle)
+    strange = [name for name in outputs if name not in known]
+    if strange:
+        raise IdentificationError(
+            f"'{vehicle.name}' does not foretell it.",
+            channel=", ".join(strange),
+            hint=f"Its outputs may be {', '.join(known)}.",
+        )
+
+
 class VehicleErrors(TimeErrors):
     """The likelihood of a vehicle's output errors, or of its innovations.
 
@@ -76,14 +92,7 @@ class VehicleErrors(TimeErrors):
         biases: Sequence[str],
     ) -> None:
         vehicle, outputs = table.vehicle, records[0].output_names
-        known = measurable(vehicle)
-        strange = [name for name in outputs if name not in known]
-        if strange:
-            raise IdentificationError(
-                f"'{vehicle.name}' does not foretell it.",
-                channel=", ".join(strange),
-                hint=f"Its outputs may be {', '.join(known)}.",
-            )
+        check_foretold(vehicle, outputs)
         self.table, self.method = table, method
         super().__init__(
             parameter_entries(table),
@@ -165,11 +174,15 @@ class _Plan:
     gain: tuple[int, ...]
 
 
+def driving_rows(record: Record, environment: Environment) -> Array:
+    """Inputs, wind and voltage of a record at every sample, (n, n_driving)."""
+    wind = [np.full(record.time.size, float(getattr(environment, name))) for name in SURROUNDINGS[:-1]]
+    return np.column_stack([record.inputs, *wind, record.voltage])
+
+
 def _data(record: Record, environment: Environment) -> dict[str, Any]:
     """What a record gives: the driving row at every sample, and what was measured."""
-    wind = [np.full(record.time.size, float(getattr(environment, name))) for name in SURROUNDINGS[:-1]]
-    driving = np.column_stack([record.inputs, *wind, record.voltage])
-    return {"driving": jnp.asarray(driving), "outputs": jnp.asarray(record.outputs)}
+    return {"driving": jnp.asarray(driving_rows(record, environment)), "outputs": jnp.asarray(record.outputs)}
 
 
 def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import subprocess
 import textwrap
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,44 @@ _LOOKS: dict[str, tuple[str, float]] = {
     "ghost": ("#56B4E9", 1.3),
     "trail": ("#D55E00", 1.0),
 }
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film, or a folder of numbered pictures: where it is, how many pictures, and how long it plays [s]."""
+
+    path: Path
+    pictures: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.path} ({self.pictures} pictures, {self.seconds:.1f} s)"
+
+
+def film_replay(
+    shown: Replay,
+    path: str | os.PathLike[str],
+    *,
+    pictures: bool = False,
+    rate: float = 25.0,
+    tell: Tell | None = None,
+) -> Film:
+    """Film a replay as a file (.mp4, .mkv or .mov), or draw it as numbered pictures for a paper.
+
+    Args:
+        shown: what `sp.replay` made.
+        path: of the film, or the folder for pictures, which is made if missing.
+        pictures: numbered pictures instead of a film.
+        rate: pictures per second of flight [Hz].
+        tell: called with the pictures done and their number.
+
+    Raises:
+        SwashError: for another suffix, a place that cannot be written to, a rate that makes no sense, or where
+            imageio-ffmpeg is missing.
+    """
+    place = Path(path)
+    count = (write_pictures if pictures else write_film)(shown, place, rate=rate, tell=tell)
+    return Film(place, count, count / rate)
 
 
 def write_film(shown: Replay, path: Path, *, rate: float = 25.0, tell: Tell | None = None) -> int:

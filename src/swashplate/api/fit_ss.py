@@ -1,0 +1,136 @@
+"""The verb `fit_ss`: a state-space model from frequency responses, verified in time on what the fit has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from swashplate.api.gains import suggest_gains
+from swashplate.api.linear_study import LinearStudy, marked
+from swashplate.api.saying import Say, silent
+from swashplate.flights.conditioning.uniform_records import uniform_records
+from swashplate.flights.flight import Flight
+from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.catalogue import vehicle
+from swashplate.models.linear.linear_vehicle import structure_of
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import is_state_space, structure
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.simulation.linearize import linearize
+from swashplate.validation.structure_reduction import reduce as reduced
+from swashplate.validation.verification import verify_inside
+
+Linear: TypeAlias = Vehicle | StateSpaceModel | str | Path
+"""A linear model, or its name or file."""
+
+
+def linear(model: Linear) -> StateSpaceModel:
+    """What a linear model is made of, by its name or file too."""
+    return structure(model) if isinstance(model, str | Path) else structure_of(model)
+
+
+def fit_ss(
+    model: Linear,
+    responses: FrequencyResponse,
+    *,
+    start: Mapping[str, float] | None = None,
+    start_from: str | Path | Vehicle | Sequence[str | Path] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    band: tuple[float, float] | None = None,
+    least_coherence: float = 0.6,
+    reduce: bool = False,
+    starts: int = 4,
+    seed: int = 0,
+    gains: bool = False,
+    hold_out: Flight | Iterable[Flight] = (),
+    rate: float = 100.0,
+    cutoff: float = 0.0,
+    names: Mapping[str, str] | None = None,
+    say: Say = silent,
+) -> LinearStudy:
+    """Fit a state-space model, with accuracy figures, and verify it in time on flights that the fit has not seen.
+
+    Args:
+        model: a ready structure's name, a file, or a linear model.
+        responses: from `respond`.
+        start: start values by name.
+        start_from: a vehicle, whose linearisation in hover gives start values, or folders or files of `fit_tf`.
+        fixed: values of parameters that are held.
+        band: limits [Hz].
+        least_coherence: from which a response is used.
+        reduce: take out what the responses do not tell (Tischler and Remple 2012, ch. 13).
+        starts: starting points that are followed. seed: of them.
+        gains: also suggest ArduPilot rate-loop gains.
+        hold_out: flights as logged, to verify on.
+        rate, cutoff, names: how they are brought to one rate, see `uniform_records`; names that the responses know
+            already need not be given.
+        say: told what is being done.
+
+    Raises:
+        CardError: a name that the model does not have, or a value outside its bounds.
+        IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
+        FlightError: a hold-out flight without the model's channels.
+    """
+    begun = linear(model)
+    if start_from is not None:
+        say("finding start values")
+        begun = _started(begun, start_from, responses, seed=seed)
+    begun = with_given(at_flown_trim(begun, responses), start, fixed)
+    say("fitting")
+    fit = fit_state_space(
+        begun,
+        responses,
+        band=band,
+        least_coherence=least_coherence,
+        starts=starts,
+        seed=seed,
+        progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
+    )
+    wanted = (*begun.inputs, *(t for t in begun.outputs if t in responses.outputs))
+    called = {**responses.settings.get("channels", {}), **(names or {})}
+    flights = uniform_records(hold_out, wanted, rate=rate, cutoff=cutoff, names=called)
+    if reduce:
+        fit = reduced(
+            fit, hold_out=flights, progress=lambda i, cost: say("reducing", note=f"step {i}, J_ave {cost:.4g}")
+        )
+    verification = None
+    if flights:
+        say("flying the model along what the fit has not seen")
+        verification = marked(verify_inside(fit.model, flights, band=band), responses.sources)
+    advice = suggest_gains(fit, responses) if gains else ()
+    material = ResponseMaterial(responses, fit=fit, verification=verification, gains=advice)
+    return LinearStudy(material, model=fit.model)
+
+
+def with_given(
+    model: StateSpaceModel, start: Mapping[str, float] | None, fixed: Mapping[str, float] | None
+) -> StateSpaceModel:
+    """The model with start values and, held, fixed ones.
+
+    Raises:
+        CardError: a name that the model does not have, or a value outside its bounds.
+    """
+    given = model.with_values(start or {}).with_values(fixed or {}, free=False)
+    given.check_bounds((*(start or {}), *(fixed or {})))
+    return given
+
+
+def _started(
+    model: StateSpaceModel,
+    source: str | Path | Vehicle | Sequence[str | Path],
+    responses: FrequencyResponse,
+    *,
+    seed: int,
+) -> StateSpaceModel:
+    """The model with start values from fitted transfer functions (files or their folders) or from a vehicle."""
+    if isinstance(source, Vehicle):
+        return from_linear_model(model, linearize(source))
+    given = (source,) if isinstance(source, str | Path) else tuple(source)
+    places = [Path(name) / "model.toml" if Path(name).is_dir() else Path(name) for name in given]
+    if places and all(is_state_space(str(place)) for place in places):
+        return from_models(model, [structure(str(place)) for place in places], responses, seed=seed)
+    return from_linear_model(model, linearize(vehicle(",".join(map(str, given)))))

@@ -1,0 +1,136 @@
+"""The verb `identify_and_validate`: a vehicle from flights, judged on others."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from swashplate import atomic
+from swashplate.api.saying import Say, silent
+from swashplate.flights.flight import Flight
+from swashplate.flights.overlap import check_disjoint
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import records
+from swashplate.identification.core.result import Result
+from swashplate.identification.identify import identify
+from swashplate.identification.time.flight_details import FlightDetails
+from swashplate.models.card import Card
+from swashplate.models.choices import Free
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.compose import compose
+from swashplate.reporting.html import write_page
+from swashplate.reporting.structure import Report
+from swashplate.reporting.summary import banners, summary
+from swashplate.validation.validation import Validation
+from swashplate.validation.verb import validate
+
+FILES = ("report.html", "model.toml", "fit.json", "validation.json")
+"""What `save` may write."""
+
+
+@dataclass(frozen=True, repr=False)
+class Identification:
+    """A vehicle identified from flights, and how it predicts others.
+
+    Attributes:
+        fit: what the identification found.
+        validation: on what the fit has not seen; None without such flights, or for a fit that has failed.
+    """
+
+    fit: Result[Vehicle, FlightDetails]
+    validation: Validation | None
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON, without time histories."""
+        validation = self.validation and self.validation.as_dict()
+        return {"fit": self.fit.to_document(comparisons=False), "validation": validation}
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes."""
+        return compose(self.fit, self.validation, title=title)
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Write report.html, fit.json, model.toml and validation.json into a folder; a failed fit has no model."""
+        with atomic.folder_when_complete(folder, ours=FILES) as place:
+            self.write(place)
+        return Path(folder)
+
+    def write(self, folder: Path) -> None:
+        """The files of `save` into a folder that is there."""
+        write_page(folder / "report.html", self.page())
+        self.fit.save(folder / "fit.json")
+        if self.validation is not None:
+            self.validation.save(folder / "validation.json")
+        if not self.fit.failed:
+            self.fit.model.save(folder / "model.toml")
+
+    def lines(self) -> list[str]:
+        """The report's own warnings and five lines, in words."""
+        told = [f"! {text}" for _, text in banners(self.fit, self.validation)]
+        return told + [f"{label + ':':11} {words}" for label, words, _ in summary(self.fit, self.validation)]
+
+    def __repr__(self) -> str:
+        return "\n".join([repr(self.fit), "", *self.lines()])
+
+
+def identify_and_validate(
+    vehicle: Vehicle,
+    flights: Flight | Iterable[Flight],
+    *,
+    hold_out: Flight | Iterable[Flight] = (),
+    free: str | Sequence[str | Free] = "full",
+    method: str = "prediction-error",
+    ties: Sequence[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    prior_card: Card | None = None,
+    iterations: int = 60,
+    keep_unexcited: bool = False,
+    wind: bool = False,
+    names: Sequence[str] | None = None,
+    say: Say = silent,
+) -> Identification:
+    """Identify a vehicle from conditioned flights and, where it has not failed, predict others with it.
+
+    Args:
+        vehicle: the equations and the numbers to start from.
+        flights: conditioned, with their pose tracked.
+        hold_out: conditioned flights that the fit never sees.
+        free, method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as of `identify`.
+        names: what the user calls the flights and the hold-outs, for messages.
+        say: told what is being done.
+
+    Raises:
+        FlightError: where a hold-out is a stretch that the fit sees, or a flight lacks a channel.
+        IdentificationError: where no fit can be started.
+    """
+    seen = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    unseen = (hold_out,) if isinstance(hold_out, Flight) else tuple(hold_out)
+    check_disjoint([*seen, *unseen], names)
+    # What can be said without computing is said at once, before the seconds that loading and compiling take.
+    parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
+    records([*seen, *unseen], vehicle)
+    say("preparing the fit (compiling takes longest the first time)")
+    fit = identify(
+        vehicle,
+        seen,
+        free=free,
+        method=method,
+        ties=ties,
+        fixed=fixed,
+        priors=priors,
+        prior_card=prior_card,
+        iterations=iterations,
+        keep_unexcited=keep_unexcited,
+        wind=wind,
+        progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
+    )
+    validation = None
+    if unseen and not fit.failed:
+        validating = "validating on what the fit has not seen"
+        say(validating)
+        validation = validate(fit, unseen, progress=lambda i, n: say(validating, done=i, total=n))
+    return Identification(fit, validation)

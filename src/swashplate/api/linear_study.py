@@ -1,0 +1,131 @@
+"""What the verbs on linear models return: fits, verification in time, margins and gains, as one object."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from swashplate import atomic
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.result import Result
+from swashplate.identification.frequency.handling_readings import Line
+from swashplate.identification.responses.response_warnings import damaged
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import to_toml
+from swashplate.reporting.html import write_page
+from swashplate.reporting.response_report import compose_responses
+from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.structure import Report
+from swashplate.validation.verification import Verification
+
+FILES = ("report.html", "fit.json", "model.toml", "verification.json")
+"""What `save` may write."""
+
+
+@dataclass(frozen=True, repr=False)
+class LinearStudy:
+    """A linear model: how it was fitted, how it follows records, and what can be read off it.
+
+    Attributes:
+        material: responses, fits, trials, verification, rival and gains, as far as there are any.
+        fitted: flights that the fit was made from, where it was made from flights.
+        margins: read off the responses and the model.
+        model: that can be flown and saved; None where there is none.
+        remarks: what the user must know beside the fit's own warnings.
+    """
+
+    material: ResponseMaterial
+    fitted: tuple[Flight, ...] = ()
+    margins: tuple[Line, ...] = ()
+    model: StateSpaceModel | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def fit(self) -> Result[Any, Any] | None:
+        """The fit: of a state-space model or of transfer functions."""
+        m = self.material
+        return m.fit or m.time_fit or (m.transfer_functions[0] if m.transfer_functions else None)
+
+    @property
+    def verification(self) -> Verification | None:
+        """How the model follows records, in time."""
+        return self.material.verification
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What could not be computed, and logs that are damaged; empty where all is well."""
+        flights = (*self.fitted, *(self.verification.flights if self.verification else ()))
+        own = () if self.fit is None else self.fit.problems
+        return (*own, *dict.fromkeys(damaged(flights)))
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        verification = self.verification and self.verification.as_dict()
+        if self.fit is None:
+            return dict(verification or {})
+        document = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
+        if self.material.time_fit is not None:
+            return document
+        tried = [{"form": t.form.text, "J": t.cost} for t in self.material.trials]
+        gains = [suggestion.as_dict() for suggestion in self.material.gains]
+        return document | {"margins": [line.as_dict() for line in self.margins], "gains": gains, "tried": tried}
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes."""
+        return compose_responses(self.material, title=title)
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Write report.html, and fit.json, model.toml and verification.json where there are such, into a folder."""
+        with atomic.folder_when_complete(folder, ours=FILES) as place:
+            self.write(place)
+        return Path(folder)
+
+    def write(self, folder: Path) -> None:
+        """The files of `save` into a folder that is there."""
+        write_page(folder / "report.html", self.page())
+        if self.fit is not None:
+            self.fit.save(folder / "fit.json")
+        if self.model is not None:
+            atomic.write_text(folder / "model.toml", to_toml(self.model))
+        if self.verification is not None:
+            self.verification.save(folder / "verification.json")
+
+    def __repr__(self) -> str:
+        m, parts = self.material, []
+        if m.trials:
+            rows = [f"  {t.form.text:<10}{t.parameters:>3} parameters   J = {t.cost:8.1f}" for t in m.trials]
+            parts.append("\n".join(["Structures tried (zeros/poles):", *rows]))
+        if self.fit is not None:
+            parts.append("\n".join([repr(self.fit), *map(repr, self.margins)]))
+        parts += [repr(found) for found in (m.verification, m.rival) if found is not None]
+        parts += [repr(suggestion) for suggestion in m.gains]
+        return "\n\n".join(parts)
+
+
+_PIECE = re.compile(r"(?P<source>.+) (?P<start>-?[\d.]+)-(?P<stop>-?[\d.]+) s")
+
+
+def marked(verification: Verification, sources: Sequence[str]) -> Verification:
+    """The verification, with a warning where a stretch lies in what the fit was made from.
+
+    Args:
+        sources: names of the fit's records, "log 3.00-9.00 s" each.
+    """
+    fitted = [m for m in map(_PIECE.fullmatch, sources) if m]
+    used = [
+        trace.source
+        for trace in verification.traces
+        if (t := _PIECE.fullmatch(trace.source))
+        and any(
+            f["source"] == t["source"] and float(f["start"]) < float(t["stop"]) and float(t["start"]) < float(f["stop"])
+            for f in fitted
+        )
+    ]
+    if not used:
+        return verification
+    words = f"NOT A HOLD-OUT: the fit has seen {', '.join(used)}."
+    return replace(verification, warnings=(words, *verification.warnings))
