@@ -51,9 +51,8 @@ def automatic(question: Question, time: Array) -> Array:
 def by_hand(question: Question, time: Array) -> Array:
     """What a pilot makes of a sweep: irregular speed and size, pauses, a wave that is no sine.
 
-    The frequency follows the schedule at a speed that wanders by 35 % over some seconds (a quarter of an octave of the
-    frequency itself from one cycle to the next), rests at times, and two or three times the stick is held still for 1 to
-    4 s and taken up again at another phase.
+    The frequency follows the schedule at a speed that wanders by 35 % over some seconds, and itself by 12 % from one
+    cycle to the next; two or three times the stick is held still for 1 to 4 s and taken up again at another phase.
     """
     random = np.random.default_rng([question.seed, 7])
     dt, count = float(time[1] - time[0]), time.size

@@ -9,7 +9,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.comparison import Comparison
@@ -19,7 +19,7 @@ from swashplate.identification.core.sources import sources_of
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 from swashplate.validation.floors import Floor
 from swashplate.validation.validation import (
     PREDICTORS,

@@ -38,14 +38,19 @@ if TYPE_CHECKING:
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
+    from swashplate.api.plot_logs import plot_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
+    from swashplate.control.analysis.stability import loop_margins, loop_modes
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
+    from swashplate.control.laws.hover_trim import hover_trim
+    from swashplate.control.laws.linear_decoupling import coupling, dynamic_decoupling, static_decoupling
     from swashplate.control.laws.state_hold import state_hold
     from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
+    from swashplate.flights.conditioning.reconstruction import reconstruct
     from swashplate.flights.conditioning.synchronise import merge, synchronise
     from swashplate.flights.conditioning.uniform_records import uniform_records
     from swashplate.flights.datasets import fetch as fetch_dataset
@@ -55,6 +60,7 @@ if TYPE_CHECKING:
     from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
     from swashplate.flights.readers.read import read
+    from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
@@ -75,6 +81,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
     from swashplate.simulation.adaptive import simulate_adaptive
@@ -89,6 +96,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
+    from swashplate.validation.compare import compare
+    from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
     from swashplate.validation.verification import verify
@@ -99,6 +108,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Environment",
     "Flight",
     "FrequencyResponse",
     "Parameter",
@@ -111,13 +121,16 @@ __all__ = [
     "__version__",
     "autopilot",
     "check_controller",
+    "compare",
     "compare_derivatives",
+    "coupling",
     "datasets",
     "decouple",
     "decouple_axes",
     "demo",
     "derivatives",
     "design_controller",
+    "dynamic_decoupling",
     "equation_error",
     "evaluate_bench",
     "excitation",
@@ -136,7 +149,9 @@ __all__ = [
     "fit_vehicle",
     "fly_maneuver",
     "handling_qualities",
+    "harmonics",
     "hover_hold",
+    "hover_trim",
     "identify",
     "identify_and_validate",
     "in_form",
@@ -147,6 +162,8 @@ __all__ = [
     "live",
     "load",
     "load_controller",
+    "loop_margins",
+    "loop_modes",
     "maneuver",
     "merge",
     "monte_carlo",
@@ -158,10 +175,13 @@ __all__ = [
     "open_logs",
     "plan_bench",
     "plan_maneuver",
+    "plot_logs",
     "read",
     "read_control",
+    "reconstruct",
     "replay",
     "report",
+    "residuals",
     "respond",
     "show_replay",
     "simulate",
@@ -170,8 +190,11 @@ __all__ = [
     "simulate_closed_loop",
     "simulate_lpv",
     "simulate_maneuver",
+    "spectrogram",
+    "spectrum",
     "speed_schedule",
     "state_hold",
+    "static_decoupling",
     "stepwise",
     "structure",
     "suggest_gains",

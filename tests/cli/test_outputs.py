@@ -16,7 +16,7 @@ from commands import one_message, swash
 import swashplate as sp
 from swashplate.cli.console import as_json
 from swashplate.cli.outputs import folder_when_complete
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import sources_of

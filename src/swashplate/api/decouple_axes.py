@@ -178,9 +178,9 @@ def _usual(system: Any) -> tuple[tuple[str, str], ...]:
 
 def _system(model: Vehicle, speed: float) -> Any:
     if model.structure is not None:
-        return model.structure.to_control()
+        return model.structure.to_control(pade=0)
     nominal = model.card.values().get("voltage_nominal")
-    return linearize(model, trim(model, speed=speed, voltage=nominal)).to_control()
+    return linearize(model, trim(model, speed=speed, voltage=nominal)).to_control(pade=0)
 
 
 def _matrices(system: Any, states: Sequence[str]) -> dict[str, Any]:

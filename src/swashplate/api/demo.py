@@ -9,7 +9,7 @@ from swashplate.api.saying import Say, silent
 from swashplate.control.laws.hold import hover_hold
 from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
-from swashplate.flights.maneuvers.series import AXES, parse
+from swashplate.flights.maneuvers.series import parse
 from swashplate.flights.readers.read import read
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
@@ -66,7 +66,7 @@ def simulated_log(vehicle: Vehicle, maneuver: str, *, seed: int, rate: float = 1
     time = np.arange(round(duration * rate) + 1) / rate
     added = {name: np.zeros_like(time) for name in aircraft.input_names}
     for axis, signal in excitation.signals(time - _LEAD).items():
-        for name, share in AXES[axis][0].items():
+        for name, share in aircraft.stick_axes[axis].items():
             added[name] += share * _AMPLITUDES[axis] * signal
     start = trim(aircraft, voltage=aircraft.card.values()["voltage_nominal"] + 0.3)
     flight = simulate_closed_loop(

@@ -12,7 +12,7 @@ from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines
 from swashplate.identification.frequency.transfer_function_fit import (
-    Trial,
+    TriedStructure,
     as_state_space,
     fit_transfer_function,
     suggest,
@@ -62,7 +62,7 @@ def fit_tf(
         FlightError: a hold-out flight without the model's channels.
     """
     say("fitting")
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[TriedStructure, ...] = ()
     if form is None and not fixed:
         best, trials = suggest(responses, input=input, outputs=outputs, band=band, least_coherence=least_coherence)
         fit = best.fit

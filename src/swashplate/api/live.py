@@ -13,6 +13,7 @@ from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.live.replay import Replay, as_json
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.compilation import dispatch_in_line, enable_compilation_cache
 
 
@@ -23,7 +24,7 @@ def _silent(_: str) -> None:
 def live(
     vehicle: Vehicle,
     *,
-    controller: Autopilot | str | Path | None = None,
+    controller: Controller | str | Path | None = None,
     folder: str | Path = "live",
     host: str = "127.0.0.1",
     port: int = 8017,
@@ -36,7 +37,7 @@ def live(
 
     Args:
         vehicle: what flies.
-        controller: an autopilot, or its file (`swash decouple`).
+        controller: one that sticks can move, or its file (`swash decouple`).
         folder: for recordings and reports; made with the first one.
         host, port: where the page is; port 0 takes any free one.
         allow_remote: let other machines open the page and fly.
@@ -58,7 +59,7 @@ def live(
         raise SwashError("is a file, expected a folder.", where=place, channel="--out")
     enable_compilation_cache()
     dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
-    chosen = controller if controller is None or isinstance(controller, Autopilot) else _autopilot(controller)
+    chosen = None if controller is None else _for_sticks(controller)
     check_page()
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
@@ -109,10 +110,10 @@ def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say
         say(f"No browser was found; open {address} yourself.")
 
 
-def _autopilot(file: str | Path) -> Autopilot:
-    read = read_controller(file)
+def _for_sticks(controller: Controller | str | Path) -> Autopilot:
+    file, held = (controller, read_controller(controller)) if isinstance(controller, str | Path) else (None, controller)
     try:
-        made: Autopilot = kind_of(read).for_sticks(read)
+        made: Autopilot = kind_of(held).for_sticks(held)
     except ControllerError as error:
         raise SwashError(error.problem, where=file, channel="--controller", hint=error.hint) from None
     return made

@@ -172,7 +172,9 @@ def monte_carlo(
         size=count,
         parameters=drawn or None,
         reference=excitation.signals(time - _LEAD) if kind.takes_stick else None,
-        excitation=None if kind.takes_stick else excitation.offsets(time - _LEAD, inputs=vehicle.input_names),
+        excitation=None
+        if kind.takes_stick
+        else excitation.offsets(time - _LEAD, inputs=vehicle.input_names, axes=vehicle.stick_axes),
         wind=blowing,
         voltage=float(hover.environment.voltage) - fall * time,
         noise=None if kind.own_sensors else SENSOR_NOISE,

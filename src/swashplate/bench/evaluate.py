@@ -38,8 +38,9 @@ from swashplate.bench.refusals import (
 from swashplate.bench.result import BenchCheck, BenchResult
 from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
-from swashplate.identification.core.result import Estimate, Result, correlation_of
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.accuracy import blind_directions
+from swashplate.identification.core.result import Direction, Estimate, Result, correlation_of
+from swashplate.identification.core.sources import DataSource
 from swashplate.models.card import Card
 from swashplate.models.vehicle import Vehicle
 
@@ -105,7 +106,11 @@ class BenchDetails:
 
 
 Bench = Result[Vehicle, BenchDetails]
-"""What `evaluate` returns: the vehicle with the measured card, and the joint covariance of what was measured."""
+"""What `evaluate` returns: the vehicle with the measured card, and the joint covariance of what was measured.
+
+There are no bounds corrected for coloured errors: averaged points have no order in time, and the procedures take their
+scatter from the records themselves. None has failed: what contradicts itself ends in an error instead.
+"""
 
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:
@@ -185,12 +190,20 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
         covariance=covariance,
         covariance_corrected=np.full_like(covariance, np.nan),
         correlation=correlation_of(covariance),
+        directions=_unseen(card, joint.measured, covariance),
         details=BenchDetails(
             tuple(results), tuple(name for name in MEASURED if name not in joint.measured), tuple(disagreements)
         ),
         warnings=tuple(dict.fromkeys(doubts)),
-        data=tuple(Source(record.name) for record in records),
+        data=tuple(DataSource(record.name, sha256=record.sha256) for record in records),
     )
+
+
+def _unseen(card: Card, names: tuple[str, ...], covariance: Array) -> tuple[Direction, ...]:
+    """Combinations of what was measured that the records hardly tell; a parameter's scale is its value."""
+    scale = np.array([abs(card.parameters[name].value) or 1.0 for name in names])
+    scaled: Array = np.asarray(covariance / np.outer(scale, scale), dtype=np.float64)
+    return blind_directions(names, np.asarray(np.linalg.pinv(scaled, hermitian=True), dtype=np.float64))
 
 
 def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:

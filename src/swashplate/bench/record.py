@@ -78,12 +78,14 @@ class BenchRecord:
         procedures: which procedures it is for.
         channels: columns by name, shape (n,), in the units of `COLUMNS`.
         header: the other lines of the header.
+        sha256: of the file's bytes; "" where it has no file.
     """
 
     name: str
     procedures: tuple[str, ...]
     channels: Mapping[str, Array]
     header: Mapping[str, str] = field(default_factory=dict)
+    sha256: str = ""
 
     def __getitem__(self, name: str) -> Array:
         """A column.

@@ -7,6 +7,7 @@ text files.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from swashplate.bench import record_tables as bench_tables
@@ -44,12 +45,8 @@ def read_bench(path: str | Path) -> BenchRecord:
     """
     source = open_source(path)
     form = _form(source)
-    if form == "rig":
-        return bench_tables.read_rig(path)
-    if form == "table":
-        return bench_tables.read_table(path)
-    if form == "normals":
-        return bench_tables.read_normals(path)
+    if form in _READ_BY:
+        return replace(_READ_BY[form](path), sha256=source.sha256)
     if source.text is None:
         raise BenchError(
             "is no bench record.",
@@ -57,7 +54,15 @@ def read_bench(path: str | Path) -> BenchRecord:
             hint="Known are swashplate's CSV records, the CoaX-56's bench tables (.mat) and runs of the propeller rig. "
             "Flights are for `swash inspect` and `swash identify`.",
         )
-    return read_record(path)  # which says what a record needs
+    return replace(read_record(path), sha256=source.sha256)  # which says what a record needs
+
+
+_READ_BY = {
+    "rig": bench_tables.read_rig,
+    "table": bench_tables.read_table,
+    "normals": bench_tables.read_normals,
+}
+"""Forms that are no swashplate record."""
 
 
 def read_records(*places: str | Path) -> tuple[BenchRecord, ...]:

@@ -31,8 +31,9 @@ def _weights(text: str | None, option: str) -> list[float] | None:
 def design(
     model: shared.Model,
     method: Annotated[
-        shared.Method, typer.Option("--method", help="With an observer on sensors (lqg), or fed with the states (lqr).")
-    ] = shared.Method.LQG,
+        shared.DesignMethod,
+        typer.Option("--method", help="With an observer on sensors (lqg), or fed with the states (lqr)."),
+    ] = shared.DesignMethod.LQG,
     sensors: shared.Sensors = shared.USUAL_SENSORS,
     holding: Annotated[
         shared.Holding,
@@ -62,9 +63,9 @@ def design(
         str | None, typer.Option("--input-weights", metavar="R1,R2,...", help="Weights of all inputs instead.")
     ] = None,
     gain: Annotated[
-        shared.Gain,
+        shared.ObserverGain,
         typer.Option("--gain", help="Of the observer: found as it flies, or constant (a small processor)."),
-    ] = shared.Gain.FLYING,
+    ] = shared.ObserverGain.FLYING,
     voltage: shared.Voltage = None,
     switched: given.Switch = None,
     out: shared.Out = None,

@@ -17,7 +17,7 @@ from swashplate.errors import SwashError
 OURS = ("report.html", "check.json")
 
 
-class Task(StrEnum):
+class HandlingTask(StrEnum):
     OTHER = "other"
     TRACKING = "tracking"
 
@@ -33,8 +33,8 @@ def check(
     controller: Annotated[Path, typer.Option("--controller", metavar="FILE", help="The controller's file.")],
     out: options.OutFolder = None,
     task: Annotated[
-        Task, typer.Option("--task", help="Which boundaries of ADS-33E: target tracking, or all other tasks.")
-    ] = Task.OTHER,
+        HandlingTask, typer.Option("--task", help="Which boundaries of ADS-33E: target tracking, or all other tasks.")
+    ] = HandlingTask.OTHER,
     response: Annotated[
         Response, typer.Option("--response", help="What a steady command gives: it says which bandwidth counts.")
     ] = Response.AUTO,

@@ -19,7 +19,7 @@ class Precision(StrEnum):
     FLOAT = "float"
 
 
-class Method(StrEnum):
+class DesignMethod(StrEnum):
     LQG = "lqg"
     LQR = "lqr"
 
@@ -29,12 +29,12 @@ class Holding(StrEnum):
     SPEED = "speed"
 
 
-class Gain(StrEnum):
+class ObserverGain(StrEnum):
     FLYING = "flying"
     STEADY = "steady"
 
 
-class Mode(StrEnum):
+class AutopilotMode(StrEnum):
     MANUAL = "manual"
     SPEED = "speed"
     PLACE = "place"

@@ -33,8 +33,8 @@ def decouple(
         bool, typer.Option("--speed-terms/--no-speed-terms", help="Cancel what speed does across the motion.")
     ] = True,
     mode: Annotated[
-        shared.Mode, typer.Option("--mode", help="What the servos hold besides a pilot's commands.")
-    ] = shared.Mode.MANUAL,
+        shared.AutopilotMode, typer.Option("--mode", help="What the servos hold besides a pilot's commands.")
+    ] = shared.AutopilotMode.MANUAL,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage of the hover [V].")] = None,
     rate: shared.Rate = 100.0,
     c_code: shared.Code = None,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from swashplate.api.identification import Identification
 
 
-class Method(StrEnum):
+class FitMethod(StrEnum):
     PREDICTION_ERROR = "prediction-error"
     OUTPUT_ERROR = "output-error"
     NELDER_MEAD = "nelder-mead"
@@ -31,7 +31,7 @@ def identify(
     free: Annotated[
         str, typer.Option("--free", help="Ready choice (full, flight) or parameter names separated by commas.")
     ] = "full",
-    method: Annotated[Method, typer.Option("--method", help="How to estimate.")] = Method.PREDICTION_ERROR,
+    method: Annotated[FitMethod, typer.Option("--method", help="How to estimate.")] = FitMethod.PREDICTION_ERROR,
     fix: flying.Fix = None,
     tie: Annotated[
         list[str] | None, typer.Option("--tie", metavar="'A = B'", help="Tie a parameter to an expression.")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LogOptions:
     """What the user says about logs that the logs do not say themselves.
 
     Attributes:
@@ -28,12 +28,12 @@ class Reading:
     drop_bad_stamps: bool = False
 
 
-def asked(mapping: Path | None, unit: Sequence[str] | None, drop_bad_stamps: bool) -> Reading:
+def asked(mapping: Path | None, unit: Sequence[str] | None, drop_bad_stamps: bool) -> LogOptions:
     """The options as what is said about logs."""
-    return Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    return LogOptions(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
 
 
-def read(text: str, *, how: Reading | None = None) -> Flight:
+def read(text: str, *, how: LogOptions | None = None) -> Flight:
     """The flight that `text` names, as `sp.read`; a saved simulation goes by its file's name.
 
     Raises:
@@ -42,7 +42,7 @@ def read(text: str, *, how: Reading | None = None) -> Flight:
     from swashplate.flights.readers.read import read as read_log
     from swashplate.flights.readers.windows import split_log, split_window
 
-    chosen = how or Reading()
+    chosen = how or LogOptions()
     flight = read_log(
         text,
         mapping=chosen.mapping,
@@ -56,11 +56,11 @@ def read(text: str, *, how: Reading | None = None) -> Flight:
     return replace(flight, provenance=replace(flight.provenance, source=called))
 
 
-def read_all(texts: Iterable[str] | None, *, how: Reading | None = None) -> list[Flight]:
+def read_all(texts: Iterable[str] | None, *, how: LogOptions | None = None) -> list[Flight]:
     """Flights as logged."""
     return [read(text, how=how) for text in texts or ()]
 
 
-def conditioned(texts: Iterable[str], *, rate: float, cutoff: float, how: Reading | None = None) -> list[Flight]:
+def conditioned(texts: Iterable[str], *, rate: float, cutoff: float, how: LogOptions | None = None) -> list[Flight]:
     """Flights read and brought to one rate, each step in its history."""
     return [read(text, how=how).condition(rate=rate, cutoff=cutoff) for text in texts]

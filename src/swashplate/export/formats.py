@@ -113,22 +113,21 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
-    if isinstance(model, Vehicle) and model.structure is not None:
-        model = model.structure
-    if trim is not None and not isinstance(model, Vehicle):
-        raise ExportError("a linear model holds at the one flight that it was identified in.", channel="--speed")
-    if delays and not isinstance(model, Vehicle):
-        raise ExportError("a linear model brings its own delays.", channel="--delays", hint="Leave it out.")
-    late, left_out = None, ""
-    if isinstance(model, Vehicle):
-        known = logged_delays(model) if delays else input_delays(model)
+    flying = model if isinstance(model, Vehicle) and model.structure is None else None
+    late, left_out, about = None, "", trim
+    if flying is None:
+        model = model.structure or model if isinstance(model, Vehicle) else model
+        if trim is not None:
+            raise ExportError("a linear model holds at the one flight that it was identified in.", channel="--speed")
+        if delays:
+            raise ExportError("a linear model brings its own delays.", channel="--delays", hint="Leave it out.")
+    else:
+        known = logged_delays(flying) if delays else input_delays(flying)
         late = None if delays is False else known or None
         if delays is False and any(known.values()):
             told = ", ".join(f"{name} {1e3 * d:.3g} ms" for name, d in known.items() if d)
             left_out = f"Left out: the identified delays of the inputs ({told})."
+        about = trim or find_trim(flying, voltage=flying.card.values().get("voltage_nominal"))
     called = identifier(name)
-    about = trim
-    if isinstance(model, Vehicle) and about is None:
-        about = find_trim(model, voltage=model.card.values().get("voltage_nominal"))
     made = FORMATS[form](ExportRequest(model, called, about, late, precision))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made

@@ -6,12 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.filtering.matrix_operations import Matrices, change
-from swashplate.filtering.observer import Estimate, Numbers, Plan, arriving, innovations_of, keeping, moving
+from swashplate.filtering.observer import (
+    Numbers,
+    ObserverEstimate,
+    ObserverPlan,
+    arriving,
+    innovations_of,
+    keeping,
+    moving,
+)
 
 
 def corrected_steadily(
-    plan: Plan, numbers: Numbers, estimate: Estimate, y: Any, phase: Any, w: Any, M: Matrices
-) -> Estimate:
+    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, y: Any, phase: Any, w: Any, M: Matrices
+) -> ObserverEstimate:
     """The estimate after this sample's readings: a matrix in each phase of the cycle, zero for readings not due.
 
     Args:
@@ -23,15 +31,15 @@ def corrected_steadily(
     for i in range(plan.period):
         now = M.xp.where(M.xp.abs(phase - i) < 0.5, 1.0, 0.0)
         mean = mean + now * (numbers.steady[i] @ away)
-    return Estimate(mean, estimate.covariance)
+    return ObserverEstimate(mean, estimate.covariance)
 
 
 def predicted_steadily(
-    plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: Sequence[Any], M: Matrices
-) -> Estimate:
+    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, taken: Sequence[Any], M: Matrices
+) -> ObserverEstimate:
     """The mean alone one sample later; arguments as in `observer.predicted`."""
     xp, dt, e = M.xp, plan.dt, estimate.mean
     if any(at.kept for at in plan.sampling):
         e = M.value(lambda e, w: keeping(plan, numbers, e, w, xp), e, M.column([*M.scalars(w), *taken]))
     step = change(lambda e, w: moving(plan, numbers, e, w, xp), e, w, dt, M)
-    return Estimate(e + step, estimate.covariance)
+    return ObserverEstimate(e + step, estimate.covariance)

@@ -20,6 +20,7 @@ import numpy as np
 
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.filter_loop import filtered
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import kalman_gain
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -37,35 +38,7 @@ from swashplate.simulation.runge_kutta import rk4_step
 N_DISTURBANCES = len(DISTURBED)
 
 
-class Nuisance(NamedTuple):
-    """What belongs to one record and not to the vehicle.
-
-    `delay_*`: time by which the motion lags the logged commands [s]; `trim_*`: zeros of the commands; `lever_*`: from
-    the centre of gravity to the tracked point in body axes [m]; `level_phi`, `level_theta`: error of the tracked body's
-    level, `level_psi`: its heading against the nose [rad].
-    """
-
-    delay_servo: Any = 0.0
-    delay_motor: Any = 0.0
-    trim_motor_lower: Any = 0.0
-    trim_motor_upper: Any = 0.0
-    trim_servo_roll: Any = 0.0
-    trim_servo_pitch: Any = 0.0
-    lever_x: Any = 0.0
-    lever_y: Any = 0.0
-    lever_z: Any = 0.0
-    level_phi: Any = 0.0
-    level_theta: Any = 0.0
-    level_psi: Any = 0.0
-
-
-def mean_nuisance(nuisances: Nuisance) -> Nuisance:
-    """Delays and lever arms averaged over the records; trims belong to their flight and are left at zero."""
-    means = {name: float(np.mean(np.asarray(value))) for name, value in nuisances._asdict().items()}
-    return Nuisance(**{name: 0.0 if name.startswith("trim") else value for name, value in means.items()})
-
-
-class Gain(NamedTuple):
+class FilterGain(NamedTuple):
     """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance."""
 
     state: Any
@@ -208,11 +181,11 @@ class StochasticModel:
         )
         return A, C, Q, jnp.diag(self._sensor_variances(noise))
 
-    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> Gain:
+    def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
         n, g = x.shape[0], self.n_gusts
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
-        return Gain(K[:n], K[n : n + g], K[n + g :], S)
+        return FilterGain(K[:n], K[n : n + g], K[n + g :], S)
 
     def _fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
@@ -233,7 +206,7 @@ class StochasticModel:
     def n_outputs(self) -> int:
         return len(self.output_names)
 
-    def correct(self, state: FilterState, y: Any, gain: Gain, nuisance: Nuisance) -> tuple[FilterState, Any]:
+    def correct(self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance) -> tuple[FilterState, Any]:
         """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
         innovation = _turn(y - self.measure(state.x, nuisance), self.output_names, -psi)
@@ -250,7 +223,14 @@ class StochasticModel:
         return FilterState(advance(state.x, self.acting(state), now), self._fade(noise) * state.gust, state.drift)
 
     def run(
-        self, start: FilterState, y: Any, advance: Advance, along: Any, noise: Noise, nuisance: Nuisance, gain: Gain
+        self,
+        start: FilterState,
+        y: Any,
+        advance: Advance,
+        along: Any,
+        noise: Noise,
+        nuisance: Nuisance,
+        gain: FilterGain,
     ) -> tuple[Any, FilterState]:
         """Innovations (n, n_outputs) and the states after each measurement.
 

@@ -48,7 +48,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ObserverPlan:
     """What compiled code of an observer depends on: everything but numbers.
 
     Attributes:
@@ -108,7 +108,7 @@ class Plan:
             *late,
         )
 
-    def checked(self) -> Plan:
+    def checked(self) -> ObserverPlan:
         """The plan itself where every sensor fits the controller's rate.
 
         Raises:
@@ -144,14 +144,14 @@ class Numbers(NamedTuple):
     steady: Any = None
 
 
-class Estimate(NamedTuple):
+class ObserverEstimate(NamedTuple):
     """Estimates, a column (N, 1), and their covariance (N, N), or (0, 0) with constant gains."""
 
     mean: Any
     covariance: Any
 
 
-def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
+def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
     """(1 / time constants of the disturbances, variance per sample of everything estimated)."""
     u, dt = unrest, plan.dt
     fade = 1.0 / np.array(on_axes(u.force_time, u.force_time, u.moment_time, u.moment_time))
@@ -169,11 +169,11 @@ def process_noise(plan: Plan, unrest: Unrest) -> tuple[Array, Array]:
     return fade, np.array([*states, *spread, *wander, *[0.0] * late])
 
 
-def measurement_noise(plan: Plan) -> Array:
+def measurement_noise(plan: ObserverPlan) -> Array:
     return np.array([sigma**2 for sensor in plan.sensors for sigma in sensor.sigma])
 
 
-def start_variance(plan: Plan, unrest: Unrest) -> Array:
+def start_variance(plan: ObserverPlan, unrest: Unrest) -> Array:
     """Variances before the first reading, of states, disturbances and biases."""
     units = dict(zip(plan.equations.vehicle.state_names, plan.equations.vehicle.state_units, strict=True))
     usual = {"m": 0.05, "m/s": 0.05, "rad": 0.01, "rad/s": 0.02}
@@ -183,14 +183,14 @@ def start_variance(plan: Plan, unrest: Unrest) -> Array:
 
 
 # ---- scalar functions --------------------------------------------------------------------------------------------
-def _surrounded(plan: Plan, numbers: Any, voltage: Any) -> tuple[Any, Environment]:
+def _surrounded(plan: ObserverPlan, numbers: Any, voltage: Any) -> tuple[Any, Environment]:
     vehicle = plan.equations.vehicle
     count = len(vehicle.parameter_names)
     parameters = vehicle.parameters(*(numbers[i] for i in range(count)))
     return parameters, Environment(voltage=voltage, air_density=numbers[count], gravity=numbers[count + 1])
 
 
-def moving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def moving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """Rates of everything estimated; `w` is the inputs and the voltage."""
     vehicle, n = plan.equations.vehicle, plan.n
     parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
@@ -203,7 +203,7 @@ def moving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp:
     return [*rates, *fading, *[0.0] * (len(e) - n - 6)]
 
 
-def shown(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def shown(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """What every sensor would read now of an estimate, channel by channel."""
     vehicle, n = plan.equations.vehicle, plan.n
     body = RigidBody(*e[:_BODY])
@@ -217,7 +217,7 @@ def shown(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: 
     return [value for sensor in plan.sensors for value in readings(sensor, body, force, bias, xp).values()]
 
 
-def pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
+def pieces(plan: ObserverPlan) -> list[tuple[Sampling, slice, int]]:
     """Of each sensor its sampling, its channels, and where its kept readings begin."""
     found, channel, place = [], 0, plan.n + 6 + len(plan.biases)
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
@@ -227,7 +227,7 @@ def pieces(plan: Plan) -> list[tuple[Sampling, slice, int]]:
     return found
 
 
-def arriving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def arriving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """What should arrive now: fresh readings, and for late sensors the oldest one kept."""
     now = shown(plan, numbers, e, w, xp)
     for at, part, place in pieces(plan):
@@ -237,7 +237,7 @@ def arriving(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], x
     return now
 
 
-def keeping(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
+def keeping(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """Estimates with the readings taken now put in store; `w` ends in a flag per sensor: 1 where it takes one."""
     now, after = shown(plan, numbers, e, w, xp), list(e)
     for number, (at, part, place) in enumerate(pieces(plan)):
@@ -250,8 +250,14 @@ def keeping(plan: Plan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp
 
 # ---- the filter --------------------------------------------------------------------------------------------------
 def corrected(
-    plan: Plan, numbers: Numbers, estimate: Estimate, y: Any, due: Sequence[Any], w: Any, M: Matrices
-) -> tuple[Estimate, Any, Any]:
+    plan: ObserverPlan,
+    numbers: Numbers,
+    estimate: ObserverEstimate,
+    y: Any,
+    due: Sequence[Any],
+    w: Any,
+    M: Matrices,
+) -> tuple[ObserverEstimate, Any, Any]:
     """The estimate after the readings that are due, the innovations (channels, 1) and their covariance.
 
     Args:
@@ -287,11 +293,11 @@ def corrected(
     known = M.stacked(rows)
     N = len(plan.names)
     told, news = known[:, :N], known[:, N:]
-    after = Estimate(estimate.mean + told.T @ news, estimate.covariance - told.T @ told)
+    after = ObserverEstimate(estimate.mean + told.T @ news, estimate.covariance - told.T @ told)
     return after, innovations, spread
 
 
-def innovations_of(plan: Plan, y: Any, expected: Any, M: Matrices) -> list[Any]:
+def innovations_of(plan: ObserverPlan, y: Any, expected: Any, M: Matrices) -> list[Any]:
     """Readings less what was expected, headings the short way round."""
     away = M.scalars(y - expected)
     for i, name in enumerate(plan.channels):
@@ -300,7 +306,9 @@ def innovations_of(plan: Plan, y: Any, expected: Any, M: Matrices) -> list[Any]:
     return away
 
 
-def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: Sequence[Any], M: Matrices) -> Estimate:
+def predicted(
+    plan: ObserverPlan, numbers: Numbers, estimate: ObserverEstimate, w: Any, taken: Sequence[Any], M: Matrices
+) -> ObserverEstimate:
     """The estimate one sample later.
 
     Args:
@@ -330,4 +338,4 @@ def predicted(plan: Plan, numbers: Numbers, estimate: Estimate, w: Any, taken: S
     for _ in range(2):  # the moved states' rows, the offsets', the kept readings'; then the same from the other side
         stored = [] if J is None else [J @ P]
         P = M.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T
-    return Estimate(M.stacked(mean), 0.5 * (P + P.T) + M.diagonal(numbers.process))
+    return ObserverEstimate(M.stacked(mean), 0.5 * (P + P.T) + M.diagonal(numbers.process))

@@ -11,7 +11,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.riccati import followed, gain_at, settled_covariance
 from swashplate.filtering.sampled_observer_model import disturbed, outputs
 from swashplate.simulation.discretisation import zero_order_hold
@@ -20,7 +20,7 @@ from swashplate.simulation.linearize import LinearModel
 _DOUBLINGS = 40
 
 
-def steady_gains(plan: Plan, numbers: Numbers, model: LinearModel, period: int) -> tuple[Array, Array]:
+def steady_gains(plan: ObserverPlan, numbers: Numbers, model: LinearModel, period: int) -> tuple[Array, Array]:
     """Gains and the covariance of the predicted estimates through a cycle, (period, N, channels) and (period, N, N).
 
     The periodic Riccati equation: the maps of a cycle's samples, one after the other, are one map (`riccati`).
@@ -67,7 +67,7 @@ def steady_gains(plan: Plan, numbers: Numbers, model: LinearModel, period: int) 
     return gains, covariances
 
 
-def _cycle(plan: Plan, numbers: Numbers, model: LinearModel, period: int) -> list[tuple[Array, Array]]:
+def _cycle(plan: ObserverPlan, numbers: Numbers, model: LinearModel, period: int) -> list[tuple[Array, Array]]:
     """Of every sample of the cycle how estimates move, and the slopes of the readings that arrive (zero for others)."""
     F, shown = _transition(plan, numbers, model), outputs(plan, numbers, model.trim)
     H, steps = _arriving(plan, shown), []
@@ -79,19 +79,19 @@ def _cycle(plan: Plan, numbers: Numbers, model: LinearModel, period: int) -> lis
     return steps
 
 
-def _first(plan: Plan, N: int) -> Array:
+def _first(plan: ObserverPlan, N: int) -> Array:
     found = np.full(N, 1e-4)
     own = plan.n + 6 + len(plan.biases)
     found[:own] = observer.start_variance(plan, disturbances.Unrest())
     return np.diag(found)
 
 
-def _transition(plan: Plan, numbers: Numbers, model: LinearModel) -> Array:
+def _transition(plan: ObserverPlan, numbers: Numbers, model: LinearModel) -> Array:
     N = len(plan.names)
     return zero_order_hold(disturbed(numbers, model, N), np.zeros((N, 1)), plan.dt)[0]
 
 
-def _arriving(plan: Plan, shown: Array) -> Array:
+def _arriving(plan: ObserverPlan, shown: Array) -> Array:
     """Slopes of what arrives: fresh readings, and of late sensors the oldest one kept."""
     H = np.array(shown)
     for at, part, place in observer.pieces(plan):
@@ -103,7 +103,7 @@ def _arriving(plan: Plan, shown: Array) -> Array:
     return H
 
 
-def _keeping(plan: Plan, shown: Array, taken: list[bool]) -> Array:
+def _keeping(plan: ObserverPlan, shown: Array, taken: list[bool]) -> Array:
     """Slopes of putting the readings taken now in store."""
     G = np.eye(shown.shape[1])
     for now, (at, part, place) in zip(taken, observer.pieces(plan), strict=True):
@@ -116,7 +116,7 @@ def _keeping(plan: Plan, shown: Array, taken: list[bool]) -> Array:
     return G
 
 
-def steady_sigmas(plan: Plan, numbers: Numbers, model: LinearModel) -> Array:
+def steady_sigmas(plan: ObserverPlan, numbers: Numbers, model: LinearModel) -> Array:
     """Standard deviations of the predicted estimates' errors under constant gains, RMS over the cycle, shape (N,).
 
     The covariance of a filter whose gains are given (Joseph's form) through a cycle is P -> A P A' + W; the fixed point

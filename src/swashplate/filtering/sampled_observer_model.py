@@ -15,7 +15,7 @@ from swashplate.arrays import Array
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import DISTURBED
 from swashplate.filtering.matrix_operations import JaxMatrices
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.discretisation import held_late, with_late_inputs
 from swashplate.simulation.dynamics import enable_double_precision
@@ -47,7 +47,7 @@ class SampledObserverModel:
 
 
 def sampled_observer_model(
-    plan: Plan,
+    plan: ObserverPlan,
     numbers: Numbers,
     model: LinearModel,
     *,
@@ -105,7 +105,7 @@ def disturbed(numbers: Numbers, model: LinearModel, size: int) -> Array:
     return A
 
 
-def _late_readings(F: Array, H: Array, plan: Plan) -> tuple[Array, Array, list[str]]:
+def _late_readings(F: Array, H: Array, plan: ObserverPlan) -> tuple[Array, Array, list[str]]:
     """The model with chains of samples for readings that arrive late."""
     channel, names = 0, []
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
@@ -123,7 +123,7 @@ def _late_readings(F: Array, H: Array, plan: Plan) -> tuple[Array, Array, list[s
     return F, H, names
 
 
-def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
+def outputs(plan: ObserverPlan, numbers: Numbers, trim: Trim) -> Array:
     """Slopes of all channels by everything estimated, about a trim."""
     enable_double_precision()
     if not plan.sensors:
@@ -136,6 +136,6 @@ def outputs(plan: Plan, numbers: Numbers, trim: Trim) -> Array:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _outputs(plan: Plan, numbers: Numbers, e: Any, w: Any) -> Any:
+def _outputs(plan: ObserverPlan, numbers: Numbers, e: Any, w: Any) -> Any:
     M = JaxMatrices()
     return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]

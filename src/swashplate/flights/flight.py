@@ -102,11 +102,12 @@ class Flight:
         for stream_name, data in self.streams.items():
             if name in data.data_vars:
                 return stream_name
+        asked = did_you_mean(name, self.channels)
         raise FlightError(
-            f"the flight has no such channel; it has {', '.join(self.channels) or 'none'}.",
+            f"the flight has no such channel.{f' {asked}' if asked else ''}",
             where=self.provenance.source or None,
             channel=name,
-            hint=did_you_mean(name, self.channels),
+            hint=f"It has {', '.join(self.channels) or 'none'}.",
         )
 
     def time(self, name: str) -> Array:

@@ -35,6 +35,7 @@ class Question:
         keep_unexcited, wind: see `identify`.
         environment: wind, density and gravity.
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
+        band: lowest and highest frequency [Hz], for methods that fit lines of a transform.
         progress: told the iteration and the cost.
     """
 
@@ -50,6 +51,7 @@ class Question:
     environment: Environment | None = None
     shifts: bool | None = None
     biases: Sequence[str] = ()
+    band: tuple[float, float] | None = None
     progress: Callable[[int, float], None] | None = None
 
     @property
@@ -92,6 +94,7 @@ ESTIMATORS: Registry[Estimator] = Registry(
         "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
         "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
         "collocation": "swashplate.identification.time.collocation:COLLOCATION",
+        "frequency-lines": "swashplate.identification.time.linear_frequency_fit:FREQUENCY_LINES",
         "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
     },
 )

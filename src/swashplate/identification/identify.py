@@ -34,6 +34,7 @@ def identify(
     environment: Environment | None = None,
     shifts: bool | None = None,
     biases: Sequence[str] = (),
+    band: tuple[float, float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Any, Any]:
     """Identify a model's parameters from one or more conditioned flights, or from frequency responses.
@@ -60,6 +61,7 @@ def identify(
         environment: wind, density and gravity, for equations of your own.
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
+        band: lowest and highest frequency [Hz] for the method "frequency-lines".
         progress: called with the iteration's number and cost.
 
     Returns:
@@ -90,6 +92,7 @@ def identify(
         environment=environment,
         shifts=shifts,
         biases=tuple(biases),
+        band=band,
         progress=progress,
     )
     name, estimator = _suited(model, data, method)

@@ -117,10 +117,11 @@ class CoaxialMapping:
 
 
 ServoMapping = HelicopterMapping | CoaxialMapping
-_KINDS: Mapping[str, type[HelicopterMapping] | type[CoaxialMapping]] = {
-    "conventional": HelicopterMapping,
-    "coax": CoaxialMapping,
+_LAYOUTS: Mapping[str, type[HelicopterMapping] | type[CoaxialMapping]] = {
+    "swashplate": HelicopterMapping,
+    "two motors": CoaxialMapping,
 }
+"""By `Traits.servo_layout`."""
 
 
 def packaged() -> tuple[str, ...]:
@@ -147,9 +148,10 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
     table.text("kind"), table.number("schema")
     table.text("title")
     meant = table.text("vehicle")
-    if meant != vehicle.name or meant not in _KINDS:
+    layout = _LAYOUTS.get(vehicle.traits.servo_layout)
+    if meant != vehicle.name or layout is None:
         raise table.error("vehicle", f"is '{meant}', the vehicle has the equations of '{vehicle.name}'.")
-    return _KINDS[meant](table, vehicle)
+    return layout(table, vehicle)
 
 
 def _read(name_or_file: str | Path) -> tuple[str, str]:

@@ -8,8 +8,6 @@ import socket
 
 from swashplate.errors import LinkError
 
-LOOPBACK = "127.0.0.1"
-
 
 def is_loopback(address: str) -> bool:
     """Whether only this machine can reach an address.

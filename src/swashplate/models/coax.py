@@ -107,7 +107,7 @@ class CoaxInputs(NamedTuple):
     servo_pitch: Scalar
 
 
-class Loads(NamedTuple):
+class CoaxialLoads(NamedTuple):
     """What acts on the fuselage, in body axes, and how the moving parts move."""
 
     force: Vector
@@ -129,7 +129,7 @@ def _turning(omega: Scalar, full: Scalar, xp: Backend) -> Scalar:
 
 def loads(
     state: CoaxState, inputs: CoaxInputs, par: Any, env: Environment, xp: Backend, *, mixing: str = "rotation"
-) -> Loads:
+) -> CoaxialLoads:
     """Force [N] and moment [N m] on the fuselage without gravity, and the rates of bar, lower rotor and drive trains.
 
     Bench and flight use this same function: the bench holds the body still.
@@ -228,7 +228,7 @@ def loads(
         + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_upper, drive.omega_upper, SENSE_UPPER)
         + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_lower, drive.omega_lower, SENSE_LOWER)
     )
-    return Loads(thrust_upper + thrust_lower + drag, moment, lower_rates, bar_rates, drive_rates)
+    return CoaxialLoads(thrust_upper + thrust_lower + drag, moment, lower_rates, bar_rates, drive_rates)
 
 
 def derivatives(

@@ -117,6 +117,7 @@ TRAITS = Traits(
     observed=True,
     published="coax",
     servos="coax",
+    servo_layout="two motors",
     choices=lambda card: CHOICES,
     recording=RecordingFit(),
     switches=("bar",),

@@ -35,7 +35,7 @@ class MultirotorState(NamedTuple):
     battery: Battery | None
 
 
-class Loads(NamedTuple):
+class MultirotorLoads(NamedTuple):
     """What acts on the body, in body axes, and how the moving parts move."""
 
     force: Vector
@@ -75,7 +75,7 @@ def sag_rate(par: Any, sag: Scalar, speeds: Any, env: Environment, xp: Backend) 
 
 def loads(
     state: MultirotorState, inputs: Any, par: Any, env: Environment, xp: Backend, *, senses: tuple[float, ...]
-) -> Loads:
+) -> MultirotorLoads:
     """Force [N] and moment [N m] on the body without gravity, and the rates of rotors and battery.
 
     Args:
@@ -111,7 +111,7 @@ def loads(
         )
         rates.append(rate)
     lost = None if battery is None else Battery(sag_rate(par, battery.voltage_sag, drive, env, xp))
-    return Loads(force, moment, type(drive)(*rates), lost)
+    return MultirotorLoads(force, moment, type(drive)(*rates), lost)
 
 
 def derivatives(

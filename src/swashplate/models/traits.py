@@ -75,6 +75,8 @@ class Traits:
         observed: the observer of validation (tracked pose, gusts, delays of servos and motors) is made for it.
         published: name of the packaged card of just these equations, "" where cards differ by aircraft.
         servos: name of its packaged servo mapping, "" where that is its card's.
+        servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two motors" (and two
+            cyclic servos), or "" where no autopilot can be linked.
         choices: a card's ready choices of what a fit may free.
         recording: how the live page fits it to a recording; None where only frequency responses are made.
         switches: options of the card that may be changed in flight on the live page.
@@ -105,6 +107,7 @@ class Traits:
     observed: bool = False
     published: str = ""
     servos: str = ""
+    servo_layout: str = ""
     choices: Callable[[Card], Mapping[str, Choice]] = uncertain_numbers
     recording: RecordingFit | None = None
     switches: tuple[str, ...] = ()

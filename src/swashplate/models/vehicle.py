@@ -13,9 +13,11 @@ from swashplate.models.choices import Choice
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.traits import Traits
-from swashplate.physics.backend import Backend
+from swashplate.models.usual_axes import usual_axes
+from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment
 
+_CALM, _FLOATS = Environment(), FloatBackend()
 Derivatives = Callable[[Any, Any, Any, Environment, Backend], Any]
 
 
@@ -65,6 +67,13 @@ class Vehicle:
         return self.card.title if self.traits.linear else self.name
 
     @property
+    def stick_axes(self) -> Mapping[str, Mapping[str, float]]:
+        """Inputs by the axis that moves them, roll, pitch, yaw and heave: the largest share is one."""
+        axes = self.traits.axes or usual_axes(self.input_names)
+        largest = {axis.name: max(abs(share) for share in axis.inputs.values()) for axis in axes}
+        return {axis.name: {name: share / largest[axis.name] for name, share in axis.inputs.items()} for axis in axes}
+
+    @property
     def choices(self) -> Mapping[str, Choice]:
         """Ready choices of what an identification may move, by name."""
         return self.traits.choices(self.card)
@@ -78,8 +87,13 @@ class Vehicle:
         numbers = self.card.values()
         return self.parameters(*(numbers[name] for name in self.parameter_names))
 
-    def rates(self, x: Any, u: Any, parameters: Any, environment: Environment, xp: Backend) -> list[Any]:
-        """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states."""
+    def rates(
+        self, x: Any, u: Any, parameters: Any, environment: Environment = _CALM, xp: Backend = _FLOATS
+    ) -> list[Any]:
+        """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states.
+
+        In calm air and on plain floats where nothing else is said.
+        """
         nested = rebuild(self.state, [x[i] for i in range(len(self.state_names))])
         commands = self.inputs(*(u[i] for i in range(len(self.input_names))))
         return list(leaves(self.derivatives(nested, commands, parameters, environment, xp)))

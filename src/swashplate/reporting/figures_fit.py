@@ -26,7 +26,7 @@ from swashplate.reporting.theme import (
     stacked,
     unit_words,
 )
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 
 LAGS = 50
 """Samples of autocorrelation that are drawn."""
@@ -231,7 +231,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
         "xgap": 1,
         "ygap": 1,
         "colorbar": {
-            "title": {"text": "correlation [-]", "side": "right"},
+            "title": {"text": "correlation [-]"},
             "thickness": 10,
             "tickvals": [-1, -0.5, 0, 0.5, 1],
         },

@@ -18,15 +18,12 @@ from swashplate.reporting.compose import compose
 from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.reporting.speed_page import compose_speeds
 from swashplate.reporting.structure import Report
-from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import Mode
-from swashplate.simulation.trim_curve import TrimCurve
+from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse | TrimCurve | Derivatives
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
 
 
 @runtime_checkable
@@ -75,14 +72,12 @@ def structure_of(
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []
     for one in asked:
-        if not isinstance(one, HasPage | TrimCurve | Derivatives):
+        if not isinstance(one, HasPage):
             given.append(one)
         elif len(asked) > 1 or modes is not None:
             raise SwashError("has a page of its own.", channel=type(one).__name__, hint="Write a report of each.")
-        elif isinstance(one, HasPage):
-            return one.page(title=title)
         else:
-            return compose_speeds(one, title=title)
+            return one.page(title=title)
     of_vehicles = [one for one in given if isinstance(one, Validation) or _is_of(one, Vehicle)]
     if not of_vehicles:
         return _of_linear_models(given, title)

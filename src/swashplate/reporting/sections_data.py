@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import Source, sources_of
+from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.versions import card_hash, date, result_hash, versions
@@ -63,11 +63,11 @@ def method_words(method: str) -> str:
     }.get(method, method)
 
 
-def _sources(flights: Iterable[Source]) -> list[str]:
+def _sources(flights: Iterable[DataSource]) -> list[str]:
     return [flight.name or "an unnamed flight" for flight in flights]
 
 
-def used_twice(fit: Result[Any, Any] | None, validation: Validation | None) -> list[Source]:
+def used_twice(fit: Result[Any, Any] | None, validation: Validation | None) -> list[DataSource]:
     """Flights of the validation that come from a log which the fit used: predicting them proves less."""
     if fit is None or validation is None:
         return []

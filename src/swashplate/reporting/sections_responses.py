@@ -18,7 +18,7 @@ from swashplate.identification.frequency.reading_accuracy import Fitted, answers
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, Trial
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, TriedStructure
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -29,7 +29,7 @@ from swashplate.reporting.structure import Block, Cell, Points, Section, Table, 
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 from swashplate.validation.verification import Verification
 
 
@@ -46,7 +46,7 @@ class ResponseMaterial:
 
     responses: FrequencyResponse | None = None
     transfer_functions: tuple[TransferFunctionFit, ...] = ()
-    trials: tuple[Trial, ...] = ()
+    trials: tuple[TriedStructure, ...] = ()
     fit: StateSpaceFit | None = None
     verification: Verification | None = None
     rival: Verification | None = None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.schema import channel
 from swashplate.identification.time.estimates import RECORD_UNITS
 from swashplate.identification.time.kinematics import PREDICTED

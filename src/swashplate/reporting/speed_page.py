@@ -25,7 +25,8 @@ from swashplate.reporting.theme import (
 )
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import Mode, linearize
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim_curve import TrimCurve
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import Source, sources_of
+from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.reporting.figures_validation import middle_horizon
 from swashplate.reporting.sections_data import method_words, used_twice
 from swashplate.reporting.sections_fit import PRIOR_HEAVY
@@ -56,7 +56,7 @@ def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
     return tuple(rows)
 
 
-def _names(flights: Sequence[Source]) -> str:
+def _names(flights: Sequence[DataSource]) -> str:
     return listed([f"{f.name or 'an unnamed flight'} ({span_words(f)})" for f in flights], most=3)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from swashplate.flights.provenance import ProcessingStep
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 
 
 def value_words(value: float | None, sigma: float | None = None) -> str:
@@ -151,7 +151,7 @@ def plain_words(value: Any) -> str:
     return text.replace("\\", "/").rsplit("/", 1)[-1] if text.startswith(("/", "~")) or text[1:3] == ":\\" else text
 
 
-def span_words(flight: Source) -> str:
+def span_words(flight: DataSource) -> str:
     """Duration, pieces and rate of a flight."""
     if not flight.segments:
         return "–"

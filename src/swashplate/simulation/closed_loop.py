@@ -298,7 +298,9 @@ def simulate_maneuver(
         controller(vehicle, start),
         duration=duration,
         reference={axis: signals[axis] for axis in commanded},
-        excitation=excitation.offsets(time - lead, inputs=vehicle.input_names, without=commanded),
+        excitation=excitation.offsets(
+            time - lead, inputs=vehicle.input_names, axes=vehicle.stick_axes, without=commanded
+        ),
         voltage=level,
         wind=wind,
         start=start,

@@ -38,6 +38,10 @@ class Derivatives:
     imperial: bool = False
     bounds: CardSpread | None = None
 
+    def page(self, *, title: str | None = None) -> Any:
+        """The page of `sp.report`, under a heading, its own where None."""
+        return resolve("compose_speeds")(self, title=title)
+
     def factor(self, name: str) -> float:
         """From SI to the unit that a derivative is shown in."""
         return factor_to_feet(*split_name(name)) if self.imperial else 1.0

@@ -11,6 +11,7 @@ from swashplate.errors import SwashError
 from swashplate.models.doubts import doubts, shaft_power
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
+from swashplate.public import resolve
 from swashplate.shown import Shown
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
@@ -27,6 +28,10 @@ class TrimCurve(Shown):
 
     vehicle: Vehicle
     trims: tuple[Trim, ...]
+
+    def page(self, *, title: str | None = None) -> Any:
+        """The page of `sp.report`, under a heading, its own where None."""
+        return resolve("compose_speeds")(self, title=title)
 
     @property
     def remarks(self) -> tuple[str, ...]:

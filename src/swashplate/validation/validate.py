@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
@@ -26,10 +26,11 @@ from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
 from swashplate.validation.black_box import Motion
-from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
+from swashplate.validation.calibration import calibrate
 from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
-from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
+from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
+from swashplate.validation.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import THRESHOLDS, verdict
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_json
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle

@@ -25,7 +25,7 @@ from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.matrix_operations import JaxMatrices
-from swashplate.filtering.observer import Estimate, arriving, corrected, predicted
+from swashplate.filtering.observer import ObserverEstimate, arriving, corrected, predicted
 from swashplate.filtering.periodic_gain import steady_gains
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.catalogue import vehicle
@@ -60,14 +60,14 @@ def test_constant_gains_are_the_filters_after_a_long_time() -> None:
     gains, covariances = steady_gains(plan, numbers, linearize(controller.vehicle, controller.start), 2)
     assert gains.shape == (2, len(plan.names), 12)
     assert not np.any(gains[1][:, 6:])  # no motion capture in between
-    estimate = Estimate(controller.first_estimate().mean, covariances[0])
+    estimate = ObserverEstimate(controller.first_estimate().mean, covariances[0])
     w = np.append(controller.start.inputs, controller.start.environment.voltage)[:, None]
 
     def cycle(mean: Any, P: Any) -> Any:
         M = JaxMatrices()
         for due in ([1.0, 1.0], [1.0, 0.0]):
             y = M.value(lambda e, w: arriving(plan, numbers, e, w, M.xp), mean, w)
-            after, _, _ = corrected(plan, numbers, Estimate(mean, P), y, due, w, M)
+            after, _, _ = corrected(plan, numbers, ObserverEstimate(mean, P), y, due, w, M)
             mean, P = predicted(plan, numbers, after, w, due, M)
         return mean, P
 

@@ -12,11 +12,12 @@ import swashplate as sp
 from simulated_flights import ten_seconds
 from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.validation.calibration import CALIBRATION, calibrate, first_part
+from swashplate.validation.calibration import calibrate, first_part
 from swashplate.validation.prediction import Predictions, predict
+from swashplate.validation.spans import CALIBRATION
 from swashplate.validation.validate import observer_of, validate
 from swashplate.validation.validation import PREDICTORS, Validation
 

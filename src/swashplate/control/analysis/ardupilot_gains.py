@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array, Complex
-from swashplate.identification.frequency.handling import Margins, Reading, margins
+from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import model_margins
 from swashplate.identification.frequency.reading_accuracy import Fitted, response_of
 from swashplate.models.linear.linear_vehicle import structure_of
@@ -50,17 +50,17 @@ class Suggestion:
 
     axis: str
     parameters: dict[str, float]
-    margins: Margins
+    margins: ResponseMargins
     peak: float
     words: str
     flown: dict[str, float]
-    flown_margins: Margins
+    flown_margins: ResponseMargins
     flown_peak: float
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types."""
 
-        def read(m: Margins) -> dict[str, list[float]]:
+        def read(m: ResponseMargins) -> dict[str, list[float]]:
             return {name: [r.value, r.sigma] for name, r in vars(m).items()}
 
         told = {"margins": read(self.margins), "flown_margins": read(self.flown_margins)}
@@ -78,7 +78,7 @@ class Suggestion:
         return f"{words}  {self.words}" if self.parameters else words.rstrip("\n")
 
 
-def _margin_words(m: Margins, peak: float) -> str:
+def _margin_words(m: ResponseMargins, peak: float) -> str:
     where = f" at {m.omega_180.value:.3g} rad/s" if m.omega_180.value > 0.0 else ""
     return (
         f"phase margin {m.phase_margin!r} deg, gain margin {m.gain_margin!r} dB{where}, largest sensitivity {peak:.2f}"
@@ -154,7 +154,7 @@ class _Loop:
         gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
         return np.asarray(pid * _first_order(s, k.get("FLTE", 0.0)) * gyro, dtype=np.complex128)
 
-    def margins(self, gains: Mapping[str, float], omega: Array) -> tuple[Margins, float]:
+    def margins(self, gains: Mapping[str, float], omega: Array) -> tuple[ResponseMargins, float]:
         """Margins, with bounds where a fit has them, and the sensitivity's peak."""
         controller = self.controller(gains, omega)
         loop = np.asarray(controller * self.plant(omega), dtype=np.complex128)
@@ -176,7 +176,7 @@ def _first_order(s: Complex, hertz: float) -> Complex | float:
 
 
 def _suggest(loop: _Loop, known: Mapping[str, float]) -> Suggestion:
-    nothing = Margins(*[Reading(float("nan"))] * 4)
+    nothing = ResponseMargins(*[ReadNumber(float("nan"))] * 4)
     names = [f"ATC_RAT_{loop.axis}_{name}" for name in _GAINS]
     flown = {name: known[name] for name in names if name in known}
     unstable = loop.unstable

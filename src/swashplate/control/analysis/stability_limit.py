@@ -15,7 +15,7 @@ from swashplate.control.lqg.analysis import Analysis, analyse_loop
 from swashplate.control.lqg.design import design, design_states, regulated
 from swashplate.control.lqg.weights import bryson
 from swashplate.errors import ControllerError
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import LinearModel, linearize
@@ -87,14 +87,14 @@ def limit(vehicle: Vehicle, *, rate: float, servo: float, disc: float = 0.5, lon
     return Limit(rate, servo, free.margins.delay, aware, free.margins.together.alpha, free.spread["x"])
 
 
-def _kept(plan: Plan, numbers: Numbers, model: LinearModel, vehicle: Vehicle, delay: int, disc: float) -> bool:
+def _kept(plan: ObserverPlan, numbers: Numbers, model: LinearModel, vehicle: Vehicle, delay: int, disc: float) -> bool:
     try:
         return _loop(plan, numbers, model, vehicle, delay).margins.together.alpha >= disc
     except ControllerError:
         return False
 
 
-def _loop(plan: Plan, numbers: Numbers, model: LinearModel, vehicle: Vehicle, delay: int) -> Analysis:
+def _loop(plan: ObserverPlan, numbers: Numbers, model: LinearModel, vehicle: Vehicle, delay: int) -> Analysis:
     """The cyclic loops of a controller that knows of this delay of the servos [samples]."""
     late = replace(plan, delays=tuple(delay if name in SERVOS else 0 for name in vehicle.input_names))
     names = (*model.states, *design_states(vehicle, late.delays)[plan.n :])

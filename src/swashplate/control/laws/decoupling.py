@@ -55,7 +55,7 @@ class Decoupler(NamedTuple):
     across_v_linear: float
 
 
-class Servos(NamedTuple):
+class ServoCommands(NamedTuple):
     """Servo commands, and the part 0 to 1 of the wanted command that fitted into their limits."""
 
     roll: Scalar
@@ -173,7 +173,7 @@ def fit_into_limits(
     lower: tuple[Scalar, Scalar],
     upper: tuple[Scalar, Scalar],
     xp: Backend,
-) -> Servos:
+) -> ServoCommands:
     """A command that keeps its direction when it does not fit.
 
     Args:
@@ -190,7 +190,7 @@ def fit_into_limits(
     base = tuple(o + share * (h - o) for h, o in zip(held, origin, strict=True))
     added = tuple(w - h for w, h in zip(wanted, held, strict=True))
     kept = _share(base, added, lower, upper, xp)
-    return Servos(base[0] + kept * added[0], base[1] + kept * added[1], kept)
+    return ServoCommands(base[0] + kept * added[0], base[1] + kept * added[1], kept)
 
 
 def _share(base: Any, added: Any, lower: Any, upper: Any, xp: Backend) -> Scalar:

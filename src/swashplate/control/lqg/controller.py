@@ -22,7 +22,7 @@ from swashplate.errors import ControllerError
 from swashplate.filtering import constant_gain, disturbances, observer
 from swashplate.filtering.batched_matrices import StackMatrices
 from swashplate.filtering.matrix_operations import JaxMatrices, Matrices
-from swashplate.filtering.observer import Estimate, Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import BIASED, readings
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.frames import Vector
@@ -50,19 +50,19 @@ class Carried(NamedTuple):
         law: memory of the feedback.
     """
 
-    estimate: Estimate
+    estimate: ObserverEstimate
     given: list[list[Any]]
     counts: list[Any]
     law: list[Any]
 
 
-def late_inputs(plan: Plan) -> list[int]:
+def late_inputs(plan: ObserverPlan) -> list[int]:
     """The input of each late command, in the order of the design's states."""
     return [j for j, delay in enumerate(plan.delays) for _ in range(delay)]
 
 
 def lqg_step(
-    plan: Plan,
+    plan: ObserverPlan,
     numbers: Numbers,
     feedback: Feedback,
     carried: Carried,
@@ -122,7 +122,7 @@ def lqg_step(
 
 
 # ---- rows --------------------------------------------------------------------------------------------------------
-def sizes(plan: Plan) -> tuple[int, int, int]:
+def sizes(plan: ObserverPlan) -> tuple[int, int, int]:
     """Of what is carried: estimates, rows of their covariance (none with constant gains), counts."""
     if not plan.sensors:
         return 0, 0, 0
@@ -130,12 +130,12 @@ def sizes(plan: Plan) -> tuple[int, int, int]:
     return N, 0 if plan.period else N, len(plan.sensors) + (1 if plan.period else 0)
 
 
-def carried_size(plan: Plan) -> int:
+def carried_size(plan: ObserverPlan) -> int:
     N, rows, counts = sizes(plan)
     return N + rows * rows + (max(plan.delays) + 1) * plan.inputs + counts + LAW_MEMORY
 
 
-def carried_from(plan: Plan, row: Any, M: JaxMatrices) -> Carried:
+def carried_from(plan: ObserverPlan, row: Any, M: JaxMatrices) -> Carried:
     """What is carried, from a flat row."""
     N, rows, counts = sizes(plan)
     m, depth = plan.inputs, max(plan.delays) + 1
@@ -143,7 +143,7 @@ def carried_from(plan: Plan, row: Any, M: JaxMatrices) -> Carried:
     given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
     rest = rest[depth * m :]
     return Carried(
-        Estimate(M.matrix(row[:N], N, 1), covariance),
+        ObserverEstimate(M.matrix(row[:N], N, 1), covariance),
         given,
         [rest[i] for i in range(counts)],
         [rest[counts + i] for i in range(LAW_MEMORY)],
@@ -155,7 +155,7 @@ def carried_row(carried: Carried, M: JaxMatrices) -> Any:
     return jnp.concatenate([*(M.flat(part) for part in carried.estimate), M.row(flat)])
 
 
-def _shapes(plan: Plan, speeds: int) -> list[tuple[int, ...]]:
+def _shapes(plan: ObserverPlan, speeds: int) -> list[tuple[int, ...]]:
     n, m, late = plan.n, plan.inputs, sum(plan.delays)
     N, channels = len(plan.names), len(plan.channels)
     parameters = len(plan.equations.vehicle.parameter_names) + 2
@@ -169,7 +169,7 @@ def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
     return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
 
 
-def numbers_from(plan: Plan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
+def numbers_from(plan: ObserverPlan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
     parts, place = [], 0
     for shape in _shapes(plan, speeds):
         size = int(np.prod(shape))
@@ -188,7 +188,7 @@ class SensedStep:
     vehicles (`stacks`) a column each.
     """
 
-    plan: Plan
+    plan: ObserverPlan
     speeds: int
     feels: bool = True
     stacks: bool = True
@@ -248,7 +248,7 @@ class SensedStep:
         return noisy, jnp.concatenate([bias, jnp.stack([seed, count + 1.0]), queue.reshape(-1, *own.shape[1:])])
 
 
-def true_readings(plan: Plan, x: Any, force: Any, bias: Any, M: JaxMatrices) -> Any:
+def true_readings(plan: ObserverPlan, x: Any, force: Any, bias: Any, M: JaxMatrices) -> Any:
     """All channels of a true state row, without noise."""
     body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
     named = {name: bias[i] for i, name in enumerate(plan.biases)}
@@ -270,7 +270,7 @@ class Lqg:
     """
 
     vehicle: Vehicle
-    plan: Plan
+    plan: ObserverPlan
     numbers: Numbers
     feedback: Feedback
     start: Trim
@@ -315,7 +315,7 @@ class Lqg:
         known = [] if plan.period else [estimate.covariance.ravel()]
         return np.concatenate([estimate.mean.ravel(), *known, tail])
 
-    def first_estimate(self) -> Estimate:
+    def first_estimate(self) -> ObserverEstimate:
         """At the trim, stored readings included."""
         plan, n = self.plan, self.plan.n
         N, own = len(plan.names), n + 6 + len(plan.biases)
@@ -331,7 +331,7 @@ class Lqg:
                 found = _stored(plan, self.numbers, mean, w)
                 mean, G = (np.asarray(part, dtype=np.float64) for part in found)
                 P = G @ P @ G.T
-        return Estimate(mean, P)
+        return ObserverEstimate(mean, P)
 
     def _sensor_memory(self, seed: int) -> Array:
         plan = self.plan
@@ -367,13 +367,13 @@ class Lqg:
         return replace(self, start=start, seed=self.seed if seed is None else seed)
 
 
-def _stored(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
+def _stored(plan: ObserverPlan, numbers: Numbers, mean: Any, w: Any) -> Any:
     made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
     return _stored_compiled(plan, made, jnp.asarray(mean), jnp.asarray(w))
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _stored_compiled(plan: Plan, numbers: Numbers, mean: Any, w: Any) -> Any:
+def _stored_compiled(plan: ObserverPlan, numbers: Numbers, mean: Any, w: Any) -> Any:
     M = JaxMatrices()
     flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])
     return M.linearised(lambda e, w: observer.keeping(plan, numbers, e, w, M.xp), mean, flags)

@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.analysis import Watched
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.law import Feedback
 from swashplate.control.lqg.optimal import regulator
+from swashplate.control.lqg.steady_loop import Watched
 from swashplate.control.lqg.weights import (
     ALLOWED,
     EFFORT,
@@ -32,7 +32,7 @@ from swashplate.control.lqg.weights import (
 from swashplate.errors import ControllerError
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.disturbances import Unrest
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import Suite
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
@@ -41,7 +41,6 @@ from swashplate.simulation.discretisation import with_late_inputs, zero_order_ho
 from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.speeds import trims_over_speed
-from swashplate.simulation.trim import Trim
 
 Holding = Literal["place", "speed"]
 HOLDINGS: tuple[Holding, ...] = ("place", "speed")
@@ -109,7 +108,7 @@ def design(
     if voltage is not None or "voltage_nominal" in vehicle.parameter_names:
         around = around._replace(voltage=voltage if voltage is not None else vehicle.card.values()["voltage_nominal"])
     trims = trims_over_speed(vehicle, speeds, environment=around)
-    plan = Plan(
+    plan = ObserverPlan(
         equations_of(vehicle), tuple(sensors), float(rate), tuple(int(np.ceil(d * rate - 1e-9)) for d in waits)
     ).checked()
     models = [linearize(vehicle, at) for at in trims]
@@ -193,7 +192,7 @@ def _slowed(designed: Callable[[Array], list[Array]], most: Array, loops: Sequen
     return gains
 
 
-def regulated(model: LinearModel, plan: Plan, holding: Holding, Q: Array, R: Array, *, where: str) -> Array:
+def regulated(model: LinearModel, plan: ObserverPlan, holding: Holding, Q: Array, R: Array, *, where: str) -> Array:
     """The gain over `design_states`; a place that is not held has zeros."""
     F, G, names = design_model(model, plan, holding)
     kept = [i for i, name in enumerate(names) if holding == "place" or name not in ("x", "y")]
@@ -222,7 +221,7 @@ def regulated(model: LinearModel, plan: Plan, holding: Holding, Q: Array, R: Arr
     return K
 
 
-def design_model(model: LinearModel, plan: Plan, holding: Holding) -> tuple[Array, Array, tuple[str, ...]]:
+def design_model(model: LinearModel, plan: ObserverPlan, holding: Holding) -> tuple[Array, Array, tuple[str, ...]]:
     """Sampled model of states, late commands and integrals, with the names of its states."""
     F, G = zero_order_hold(model.A, model.B, plan.dt)
     F, G, added = with_late_inputs(F, G, plan.delays)
@@ -254,10 +253,3 @@ def require_rate(model: LinearModel, rate: float, *, where: str) -> None:
                 channel="rate",
                 hint=f"Run the controller at {np.ceil(_SAMPLES * frequency):.0f} Hz or more.",
             )
-
-
-def start_of(vehicle: Vehicle, trim: Trim) -> Trim:
-    """The trim itself, if it is one of the vehicle's."""
-    if trim.state_names != vehicle.state_names:
-        raise ControllerError("the start is a trim of another vehicle.", where=vehicle.name)
-    return trim

@@ -16,7 +16,7 @@ from swashplate.control.lqg.law import INTEGRALS, Feedback
 from swashplate.errors import CardError, ControllerError
 from swashplate.filtering import observer
 from swashplate.filtering.disturbances import Unrest
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import KINDS, Sensor
 from swashplate.models.card import card_from
 from swashplate.models.catalogue import from_card
@@ -118,7 +118,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
             raise ControllerError(f"'{sensor.kind}' is no sensor with these sigmas.", where=path, channel="sensors")
     if not rate > 0.0 or not all(np.all(np.isfinite(part)) for part in parts.values()):
         raise ControllerError("holds numbers that are not finite, or no positive rate.", where=path)
-    plan = Plan(equations_of(vehicle), sensors, rate, tuple(round(wait * rate) for wait in waits)).checked()
+    plan = ObserverPlan(equations_of(vehicle), sensors, rate, tuple(round(wait * rate) for wait in waits)).checked()
     if steady is not None:
         expected = (len(plan.names), len(plan.channels))
         if steady.ndim != 3 or steady.shape[1:] != expected or not np.all(np.isfinite(steady)):
@@ -147,7 +147,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
     return Lqg(vehicle, plan, numbers, feedback, start, unrest)
 
 
-def _check_sizes(vehicle: Vehicle, plan: Plan, f: Feedback, path: str | Path) -> None:
+def _check_sizes(vehicle: Vehicle, plan: ObserverPlan, f: Feedback, path: str | Path) -> None:
     S, n, m = f.speeds.size, plan.n, plan.inputs
     expected: dict[str, tuple[int, ...]] = dict.fromkeys(_SINGLE, ()) | dict.fromkeys(("battery", "low", "high"), (m,))
     expected |= {"speeds": (S,), "states": (S, n), "inputs": (S, m)}

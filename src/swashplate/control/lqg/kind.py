@@ -11,10 +11,11 @@ from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.kinds import ControllerKind, TracedStep
-from swashplate.control.lqg.analysis import observed_loop, sensitivity
+from swashplate.control.lqg.analysis import sensitivity
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.file import lqg_document, lqg_from
 from swashplate.control.lqg.other_model import differences
+from swashplate.control.lqg.steady_loop import observed_loop
 from swashplate.control.lqg.traced import lqg_function, measured_names
 from swashplate.control.lqg.transfer import flown_on
 from swashplate.errors import ControllerError

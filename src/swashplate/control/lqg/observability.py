@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.optimal import Direction, plain, shares, unseen
+from swashplate.control.lqg.optimal import UnreachedDirection, plain, shares, unseen
 from swashplate.control.lqg.weights import typical
 from swashplate.filtering import disturbances, observer
 from swashplate.filtering.disturbances import DISTURBED, Unrest
-from swashplate.filtering.observer import Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.riccati import gain_at
 from swashplate.filtering.sampled_observer_model import SampledObserverModel, sampled_observer_model
 from swashplate.filtering.sensor_suite import BIASED, Suite
@@ -105,8 +105,8 @@ class Observability:
     """
 
     sensors: Suite
-    hidden: tuple[Direction, ...]
-    faint: tuple[Direction, ...]
+    hidden: tuple[UnreachedDirection, ...]
+    faint: tuple[UnreachedDirection, ...]
     known: tuple[Known, ...]
     seconds: float
 
@@ -125,7 +125,7 @@ class Observability:
         return "\n".join(lines)
 
 
-def in_words(direction: Direction) -> str:
+def in_words(direction: UnreachedDirection) -> str:
     """A direction as a sentence: one state, or states that only show together."""
     named = [(WORDS.get(name, name), value) for name, value in direction.shares]
     if len(named) == 1:
@@ -156,7 +156,7 @@ def observability(
         unrest: what disturbs the vehicle.
     """
     prompt = tuple(replace(sensor, delay=0.0) for sensor in sensors)
-    plan = Plan(equations_of(vehicle), prompt, rate, (0,) * len(vehicle.input_names)).checked()
+    plan = ObserverPlan(equations_of(vehicle), prompt, rate, (0,) * len(vehicle.input_names)).checked()
     chosen = unrest or disturbances.unrest_of(vehicle.card)
     fade, process = observer.process_noise(plan, chosen)
     numbers = Numbers(parameter_row(vehicle, trim.environment), fade, process, observer.measurement_noise(plan))
@@ -192,8 +192,8 @@ def _gramian(F: Array, H: Array, samples: int) -> Array:
 
 
 def _faint(
-    model: SampledObserverModel, readings: Array, scale: Array, hidden: tuple[Direction, ...], *, samples: int
-) -> tuple[Direction, ...]:
+    model: SampledObserverModel, readings: Array, scale: Array, hidden: tuple[UnreachedDirection, ...], *, samples: int
+) -> tuple[UnreachedDirection, ...]:
     """Directions of states and biases that change the readings by less than their noise, but for hidden ones."""
     kept = [i for i, name in enumerate(model.names) if not name.startswith("disturbance ")]
     F = (model.F * scale[None, :] / scale[:, None])[np.ix_(kept, kept)]
@@ -213,7 +213,7 @@ def _faint(
         return ()
     sizes = np.array([float(v @ W @ v) for v in plain(rest).T])
     return tuple(
-        Direction(1.0 + 0.0j, shares(vector, names), float(np.sqrt(max(size, 0.0))))
+        UnreachedDirection(1.0 + 0.0j, shares(vector, names), float(np.sqrt(max(size, 0.0))))
         for vector, size in zip(plain(rest).T, sizes, strict=True)
     )
 

@@ -27,7 +27,7 @@ from swashplate.errors import ControllerError
 from swashplate.filtering import observer
 from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.matrix_operations import JaxMatrices
-from swashplate.filtering.observer import Estimate, Numbers, Plan
+from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.identification.core.records import uniform_table
@@ -169,7 +169,14 @@ def _measured_body(pose: Array, rates: Array, dt: float) -> Array:
 
 @partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
 def _along(
-    plan: Plan, steps: int, numbers: Numbers, mean: Any, covariance: Any, pose: Any, driving: Any, body: Any
+    plan: ObserverPlan,
+    steps: int,
+    numbers: Numbers,
+    mean: Any,
+    covariance: Any,
+    pose: Any,
+    driving: Any,
+    body: Any,
 ) -> Any:
     M = JaxMatrices()
     n = plan.n
@@ -183,7 +190,7 @@ def _along(
 
         return rk4_steps(rates, e, lambda *_: w, plan.dt, count)
 
-    def correct(state: tuple[Estimate, Any], seen: tuple[Any, Any], now: tuple[Any, Any]) -> Any:
+    def correct(state: tuple[ObserverEstimate, Any], seen: tuple[Any, Any], now: tuple[Any, Any]) -> Any:
         """The rival without a filter begins at what is measured."""
         (estimate, rival), (y, measured), (w, due) = state, seen, now
         estimate, innovation, S = observer.corrected(plan, numbers, estimate, y, [due], w, M)
@@ -191,11 +198,11 @@ def _along(
         ahead = moved(estimate.mean, w, steps)[p, 0], moved(rival, w, steps)[p, 0]
         return (estimate, rival), (estimate.mean[:n, 0], innovation[:, 0], S, *ahead)
 
-    def predict(state: tuple[Estimate, Any], now: tuple[Any, Any]) -> tuple[Estimate, Any]:
+    def predict(state: tuple[ObserverEstimate, Any], now: tuple[Any, Any]) -> tuple[ObserverEstimate, Any]:
         (estimate, rival), (w, _) = state, now
         return observer.predicted(plan, numbers, estimate, w, [1.0], M), moved(rival, w, 1)
 
-    start = Estimate(mean, covariance), mean.at[n:].set(0.0)
+    start = ObserverEstimate(mean, covariance), mean.at[n:].set(0.0)
     due = jnp.where(jnp.arange(len(pose)) % plan.sampling[0].every == 0, 1.0, 0.0)
     seen, now = (pose[:, :, None], body), (driving[:, :, None], due)
     return filtered(start, seen, now, correct=correct, predict=predict)[0]

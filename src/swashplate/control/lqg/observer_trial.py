@@ -56,7 +56,7 @@ class Consistency:
 
 
 @dataclass(frozen=True)
-class Trial:
+class ObserverTrial:
     """Many flights under an observer.
 
     Attributes:
@@ -94,7 +94,7 @@ def trial(
     gusts: Gusts | None = None,
     substeps: int = 4,
     reference: Sequence[float] | None = None,
-) -> Trial:
+) -> ObserverTrial:
     """Fly a controller with its observer, once per seed.
 
     Args:
@@ -153,7 +153,7 @@ def trial(
     away = truth[judged][..., :3] - wanted[:3]
     place = np.sqrt(np.mean(np.sum(away[..., :2] ** 2, axis=-1), axis=0))
     height = np.sqrt(np.mean(away[..., 2] ** 2, axis=0))
-    return Trial(made, place, height, truth, estimates, sigmas)
+    return ObserverTrial(made, place, height, truth, estimates, sigmas)
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)

@@ -26,7 +26,7 @@ _NAMED = 0.3
 
 
 @dataclass(frozen=True)
-class Direction:
+class UnreachedDirection:
     """A combination of states that a mode moves in and that no input reaches, or no sensor sees.
 
     Attributes:
@@ -47,7 +47,9 @@ class Direction:
         )
 
 
-def unseen(F: Array, H: Array, names: Sequence[str], *, scale: Array, all_modes: bool = False) -> tuple[Direction, ...]:
+def unseen(
+    F: Array, H: Array, names: Sequence[str], *, scale: Array, all_modes: bool = False
+) -> tuple[UnreachedDirection, ...]:
     """Directions that no output sees, of modes that do not decay (or of all), by the test at every eigenvalue.
 
     Args:
@@ -58,7 +60,7 @@ def unseen(F: Array, H: Array, names: Sequence[str], *, scale: Array, all_modes:
     """
     balanced = F * scale[None, :] / scale[:, None], H * scale[None, :]
     outputs = balanced[1] / max(float(np.linalg.norm(balanced[1], 2)), 1e-300)
-    found: list[Direction] = []
+    found: list[UnreachedDirection] = []
     for z in _modes(balanced[0], all_modes):
         test = np.vstack([balanced[0] - z * np.eye(F.shape[0]), outputs])
         _, values, right = np.linalg.svd(test)
@@ -66,7 +68,7 @@ def unseen(F: Array, H: Array, names: Sequence[str], *, scale: Array, all_modes:
         if blind:
             vectors = np.column_stack([_turned_real(right[i].conj()) for i in blind])
             margin = float(values[blind[-1]] / values[0])
-            found += [Direction(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
+            found += [UnreachedDirection(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
     return tuple(found)
 
 
@@ -78,7 +80,7 @@ def plain(basis: Array) -> Array:
     return np.asarray(turned / np.linalg.norm(turned, axis=0), dtype=np.float64)
 
 
-def unreached(F: Array, G: Array, names: Sequence[str], *, scale: Array) -> tuple[Direction, ...]:
+def unreached(F: Array, G: Array, names: Sequence[str], *, scale: Array) -> tuple[UnreachedDirection, ...]:
     """Directions of modes that do not decay and that no input reaches (the dual of `unseen`)."""
     return unseen(F.T, G.T, names, scale=1.0 / scale)
 

@@ -14,7 +14,7 @@ import numpy as np
 from swashplate.control.lqg.controller import Carried, Lqg, lqg_step, sizes
 from swashplate.control.lqg.law import LAW_MEMORY
 from swashplate.filtering.matrix_operations import Scalars
-from swashplate.filtering.observer import Estimate
+from swashplate.filtering.observer import ObserverEstimate
 from swashplate.physics.backend import Backend, CasadiBackend
 from swashplate.simulation.closed_loop import REFERENCES
 
@@ -84,7 +84,7 @@ def lqg_function(controller: Lqg) -> Any:
     given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
     counts = [rest[depth * m + i] for i in range(sensors)]
     law = [rest[depth * m + sensors + i] for i in range(LAW_MEMORY)]
-    estimate = Estimate(memory[:N], casadi.reshape(memory[N : N + rows * rows], rows, rows))
+    estimate = ObserverEstimate(memory[:N], casadi.reshape(memory[N : N + rows * rows], rows, rows))
     gains = [casadi.DM(np.asarray(each)) for each in controller.feedback.gains]
     feedback = controller.feedback._replace(gains=gains)
     numbers = controller.numbers

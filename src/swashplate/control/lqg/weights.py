@@ -9,7 +9,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
-from swashplate.filtering.observer import Plan
+from swashplate.filtering.observer import ObserverPlan
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import LinearModel
 
@@ -100,7 +100,7 @@ def square(weights: Any) -> Array:
     return np.diag(found) if found.ndim == 1 else found
 
 
-def total_delays(plan: Plan, *, computation: float | None = None) -> Array:
+def total_delays(plan: ObserverPlan, *, computation: float | None = None) -> Array:
     """What lies between a motion and the answer to it, by input [s].
 
     The input's delay, half a sample of hold, the age of the quickest sensor's reading (an observer bridges the slower
@@ -115,7 +115,7 @@ def total_delays(plan: Plan, *, computation: float | None = None) -> Array:
     return np.array(plan.delays) * plan.dt + 0.5 * plan.dt + age + left
 
 
-def crossover_limits(plan: Plan, models: Sequence[LinearModel], *, computation: float | None = None) -> Array:
+def crossover_limits(plan: ObserverPlan, models: Sequence[LinearModel], *, computation: float | None = None) -> Array:
     """The crossover that each input's loop should stay below [rad/s]: 1 / (3 total delay).
 
     A mode that does not damp itself is held only by a loop that crosses above it: the limit of the inputs that hold it

@@ -15,18 +15,8 @@ from swashplate.arrays import Array
 from swashplate.errors import ManeuverError
 from swashplate.flights.maneuvers import multisine
 
-AXES: Mapping[str, tuple[Mapping[str, float], ...]] = {
-    "roll": ({"servo_roll": 1.0}, {"A1": 1.0}, {"lateral": 1.0}),
-    "pitch": ({"servo_pitch": 1.0}, {"B1": 1.0}, {"longitudinal": 1.0}),
-    "yaw": ({"motor_upper": 1.0, "motor_lower": -1.0}, {"theta0T": 1.0}, {"pedal": 1.0}),
-    "heave": ({"motor_upper": 1.0, "motor_lower": 1.0}, {"theta0": 1.0}, {"collective": 1.0}),
-}
-"""Which inputs an axis moves, in the sense of the commands: the first set that a vehicle has.
-
-They are a coaxial helicopter's, a single rotor's and those of the ready linear models.
-
-servo_pitch and B1 positive are nose down; yaw is nose right, of theta0T with a clockwise rotor.
-"""
+AXES = ("roll", "pitch", "yaw", "heave")
+"""What a maneuver moves, where it names no input; which inputs that are is the vehicle's to say."""
 
 DEFAULT_AMPLITUDE: Mapping[str, float] = {"roll": 0.2, "pitch": 0.2, "yaw": 0.005, "heave": 0.03}
 """Largest deflection [of the command's unit 1] where none is given."""
@@ -64,8 +54,21 @@ class Maneuver:
             axis: np.where(inside, self.amplitude * shape, 0.0) for axis, shape in zip(self.axes, shapes, strict=True)
         }
 
-    def offsets(self, time: Array, *, inputs: Iterable[str], without: Collection[str] = ()) -> dict[str, Array]:
+    def offsets(
+        self,
+        time: Array,
+        *,
+        inputs: Iterable[str],
+        axes: Mapping[str, Mapping[str, float]] | None = None,
+        without: Collection[str] = (),
+    ) -> dict[str, Array]:
         """What to add to each input at times [s] counted from the maneuver's start, leaving out some of its axes.
+
+        Args:
+            time: [s].
+            inputs: of the vehicle.
+            axes: which inputs an axis moves, and by what share: `Vehicle.stick_axes`. What is no axis is an input.
+            without: axes that somebody else moves.
 
         Raises:
             ManeuverError: where an axis moves an input that the vehicle does not have.
@@ -75,12 +78,10 @@ class Maneuver:
         for axis, signal in self.signals(time).items():
             if axis in without:
                 continue
-            sets = (*AXES.get(axis, ()), {axis: 1.0})  # a model's own input may be called as an axis
-            moved = next((chosen for chosen in sets if chosen.keys() <= added.keys()), sets[0])
-            for name, share in moved.items():
+            for name, share in (axes or {}).get(axis, {axis: 1.0}).items():
                 if name not in added:
                     raise ManeuverError(
-                        f"axis '{axis}' moves '{name}', which the vehicle does not have.",
+                        f"moves '{name}', which the vehicle does not have.",
                         channel=axis,
                         hint=f"Its inputs are {', '.join(names)}.",
                     )

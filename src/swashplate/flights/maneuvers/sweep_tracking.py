@@ -5,8 +5,8 @@ time. The signal is turned back by the sweep's phase, smoothed over a few cycles
 demodulation (Bloomfield 2000, ch. 7), counted in cycles instead of seconds, so that its bandwidth is a share of the
 frequency. The phase is at first that of the ridge of the signal's scalogram, then the signal's own, smoothed.
 
-Programs sweep by a law. All usual ones (linear, exponential, Tischler's) have a frequency a + b exp(c t); where it holds,
-the phase is the law's, the window is long, and the sweep is followed beyond the ridge's ends. Hands keep no law.
+Programs sweep by a law. All usual ones (linear, exponential, Tischler's) have a frequency a + b exp(c t); where it
+holds, the phase is the law's, the window is long, and the sweep is followed beyond the ridge's ends. Hands keep no law.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ _SMOOTH = 4.0
 """Standard deviation [points] over which a ridge's steps of an eighth of an octave are rounded off."""
 _STEADY = 0.8
 """Share of a sweep's power that must be left in the long window for its law to hold."""
+_CLEAR, _OTHER_TIMES, _LEVEL = 2.5, (-0.4, -0.2, 0.2, 0.4), 1.5
+"""Power of a sweep over that of the same course at other times (shares of the record), both smoothed over cycles, from
+which on it counts: two fifths may be what the loop makes of gusts."""
 _FADED = 0.25
 """Of a lawful sweep's median amplitude: there it ends."""
 
@@ -70,10 +73,17 @@ class Course:
     lawful: bool
 
     def in_signal(self, values: Array) -> Array:
-        """The part of a signal that follows the sweep, zero before and after it, shape (n,)."""
-        envelope = _envelope(values[self.inside], self.phase, _BY_LAW if self.lawful else _BY_HAND)
+        """The part of a signal that follows the sweep, zero before and after it, shape (n,).
+
+        It is zero too where what follows the same course at other times is nearly as strong: that is no sweep's.
+        """
+        cycles = _BY_LAW if self.lawful else _BY_HAND
+        envelope = _envelope(values[self.inside], self.phase, cycles)
+        others = [np.roll(values, round(share * values.size))[self.inside] for share in _OTHER_TIMES]
+        levels = [_level(_envelope(other, self.phase, cycles), self.phase) for other in others]
+        clear = _level(envelope, self.phase) >= _CLEAR * np.median(levels, axis=0)
         found = np.zeros(values.shape)
-        found[self.inside] = 2.0 * np.real(envelope * np.exp(1j * self.phase))
+        found[self.inside] = np.where(clear, 2.0 * np.real(envelope * np.exp(1j * self.phase)), 0.0)
         return found
 
 
@@ -109,7 +119,7 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
     def fitted(c: float) -> tuple[float, Array]:
         columns = basis(at, c) * size[:, None]
         found = np.linalg.lstsq(columns, phase * size, rcond=None)[0]
-        return float(np.sum((columns @ found - phase * size) ** 2)), found
+        return float(np.sum((columns @ found - phase * size) ** 2)), np.asarray(found, dtype=np.float64)
 
     grid = np.linspace(-2.0, 10.0, 49)
     best = int(np.argmin([fitted(float(c))[0] for c in grid]))
@@ -140,6 +150,11 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
     return Course(inside, whole[begin:end], lawful=True)
 
 
+def _level(envelope: Complex, phase: Array) -> Array:
+    """Power of an envelope, smoothed over cycles."""
+    return np.asarray(np.real(_envelope(np.abs(envelope) ** 2 * np.exp(1j * phase), phase, _LEVEL)))
+
+
 def _run_around(loud: NDArray[np.bool_], first: int, last: int) -> NDArray[np.int64]:
     """First and behind-last place of what is loud without a break before `first` and behind `last`."""
     before, after = np.flatnonzero(~loud[:first]), np.flatnonzero(~loud[last:])
@@ -161,4 +176,5 @@ def _envelope(values: Array, phase: Array, cycles: float) -> Complex:
     )
     places, own = (at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0
     held = np.maximum(weight, 1e-12)
-    return np.interp(own, places, real / held) + 1j * np.interp(own, places, imaginary / held)
+    found = np.interp(own, places, real / held) + 1j * np.interp(own, places, imaginary / held)
+    return np.asarray(found, dtype=np.complex128)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.arrays import Array
@@ -14,6 +15,9 @@ from swashplate.identification.core.result import Direction
 
 _BLIND = 1.0
 """A direction whose standard deviation exceeds this many scales is named as one that the data hardly see."""
+
+_LEAST_FREE = 0.05
+"""Part of a line's error that is taken to be left in its residual at least."""
 
 _NO_INFORMATION = 1e-9
 """Data information per squared scale below which a parameter without a prior cannot be estimated at all."""
@@ -79,6 +83,29 @@ def corrected_covariance(
     return np.asarray(plain @ middle @ plain)
 
 
+def sandwich(plain: Array, residuals: Sequence[Array], slopes: Sequence[Array], *, lags: int) -> Array:
+    """Covariance by what the residuals are, whatever their size and their size over frequency: M^-1 B M^-1.
+
+    B sums the products of the scores S_t' v_t over lines up to `lags` apart, tapered linearly (White 1980; Newey and
+    West 1987). Each residual counts as if the line had been left out of the fit, v / (1 - S M^-1 S'): a line that the
+    fit runs through says nothing of its own error (MacKinnon and White 1985).
+
+    Args:
+        plain: M^-1 = inv(sum S' S), shape (p, p), scaled.
+        residuals: per block of neighbouring lines, weighted, shape (n, m). slopes: their derivatives, (n, m, p).
+        lags: lines that may be correlated; few beside n.
+    """
+    middle = np.zeros_like(plain)
+    for residual, slope in zip(residuals, slopes, strict=True):
+        leverage = np.einsum("nmp,pq,nmq->nm", slope, plain, slope)
+        left_out = residual / np.maximum(1.0 - leverage, _LEAST_FREE)
+        scores = np.einsum("nm,nmp->np", left_out, slope)
+        for lag in range(min(lags, len(scores) - 1) + 1):
+            product = scores[: len(scores) - lag].T @ scores[lag:] * (1.0 - lag / (lags + 1.0))
+            middle += product if lag == 0 else product + product.T
+    return np.asarray(plain @ middle @ plain)
+
+
 def _taken(sensitivity: Array, plain: Array) -> tuple[Array, Array]:
     """Two rows of which the products over time are what the fit takes out of a white error, each (n, m, p)."""
     seen = sensitivity.transpose(1, 2, 0)
@@ -110,7 +137,7 @@ def _spread(correlation: Array, sensitivity: Array) -> Array:
     return np.asarray((left.T @ (spectrum @ moved).reshape(-1, moved.shape[2])).real)
 
 
-def marginal_information(information: Array, prior: Array, places: Array) -> Array:
+def marginal_information(information: Array, prior: Array, places: Array | NDArray[np.int64]) -> Array:
     """What the data say about some entries when all others are unknown (Schur complement), scaled.
 
     The others keep their priors, so that a nuisance nobody can see does not make the rest blind.

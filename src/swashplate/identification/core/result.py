@@ -14,10 +14,10 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 from swashplate.public import resolve
 from swashplate.shown import Shown
 
@@ -169,7 +169,7 @@ class Result(Shown, Generic[Model, Details]):
     noise: Noise | None = None
     nuisance: Nuisance | None = None
     comparisons: tuple[Compared, ...] = ()
-    data: tuple[Source, ...] = ()
+    data: tuple[DataSource, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -216,6 +216,15 @@ class Result(Shown, Generic[Model, Details]):
     def name(self) -> str:
         """The model's name."""
         return str(getattr(self.model, "name", "transfer functions"))
+
+    @property
+    def vehicle(self) -> Any:
+        """The model as `swashplate.vehicle` loads it from its file: it trims, flies, exports and is controlled.
+
+        Raises:
+            IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
+        """
+        return resolve("vehicle_of_result")(self)
 
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:

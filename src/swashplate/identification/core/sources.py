@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from swashplate.flights.provenance import ProcessingStep
 
 
 @dataclass(frozen=True)
-class Source:
+class DataSource:
     """A flight, or a piece of one, without its signals.
 
     Attributes:
@@ -39,17 +40,17 @@ class Source:
     segments: tuple[tuple[float, float], ...] = ()
     rate: float = float("nan")
 
-    def same_log(self, other: Source) -> bool:
+    def same_log(self, other: DataSource) -> bool:
         """True for two parts of one log: equal hashes of the file, or equal signals where there is no file."""
         if self.sha256 or other.sha256:
             return self.sha256 == other.sha256
         return self.signals == other.signals != ""
 
 
-def source_of(flight: Flight) -> Source:
+def source_of(flight: Flight) -> DataSource:
     """What a result keeps of a flight."""
     said = flight.provenance
-    return Source(
+    return DataSource(
         name=said.source,
         sha256=said.sha256,
         signals=_signals(flight),
@@ -63,8 +64,35 @@ def source_of(flight: Flight) -> Source:
     )
 
 
-def sources_of(flights: Iterable[Flight]) -> tuple[Source, ...]:
+def sources_of(flights: Iterable[Flight]) -> tuple[DataSource, ...]:
     return tuple(source_of(flight) for flight in flights)
+
+
+def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, str]]:
+    """Hashes of flights by their names, as settings keep them: of the file, and of the conditioned signals.
+
+    Where two flights have one name (windows of a log, simulations) only what both share is told.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for flight in flights:
+        name = flight.provenance.source or "flight"
+        own = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
+        before = found.get(name, own)
+        found[name] = {key: value if before[key] == value else "" for key, value in own.items()}
+    return found
+
+
+_INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
+
+
+def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> tuple[DataSource, ...]:
+    """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
+    made = []
+    for name in names:
+        found = _INTERVAL.fullmatch(name)
+        own = known.get(name if found is None else found["name"], {})
+        made.append(DataSource(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
+    return tuple(made)
 
 
 def _signals(flight: Flight) -> str:

@@ -16,7 +16,7 @@ from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Result, correlation_of
 from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 
 METHODS = ("output-error", "filter-error", "prediction-error")
 
@@ -110,7 +110,7 @@ def result_of(
     start: Model,
     units: Sequence[str],
     method: str,
-    data: Sequence[Source],
+    data: Sequence[DataSource],
     settings: Mapping[str, Any],
     seconds: float,
     ties: Sequence[Estimate] = (),

@@ -16,7 +16,7 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadNumber:
     """A number read off a response (NaN where there is none), with its standard deviation (NaN where unknown)."""
 
     value: float
@@ -41,16 +41,16 @@ class Handling:
         phase_delay_line: from a coherence-weighted line between omega_180 and twice of it [s].
     """
 
-    bandwidth_phase: Reading
-    bandwidth_gain: Reading
-    bandwidth: Reading
-    omega_180: Reading
-    phase_delay: Reading
-    phase_delay_line: Reading
+    bandwidth_phase: ReadNumber
+    bandwidth_gain: ReadNumber
+    bandwidth: ReadNumber
+    omega_180: ReadNumber
+    phase_delay: ReadNumber
+    phase_delay_line: ReadNumber
 
 
 @dataclass(frozen=True)
-class Margins:
+class ResponseMargins:
     """Of a broken loop, the least of each kind where it crosses several times; NaN where it never does.
 
     Attributes:
@@ -58,10 +58,10 @@ class Margins:
         omega_180: frequency of -180 degrees, or whole turns further [rad/s]. gain_margin: there [dB].
     """
 
-    crossover: Reading
-    phase_margin: Reading
-    omega_180: Reading
-    gain_margin: Reading
+    crossover: ReadNumber
+    phase_margin: ReadNumber
+    omega_180: ReadNumber
+    gain_margin: ReadNumber
 
 
 @dataclass(frozen=True)
@@ -159,23 +159,23 @@ def handling_qualities(
     by_phase = curve.crossing(curve.phase, -135.0)
     level = curve.at(curve.gain, w180) + 6.0
     by_gain = curve.crossing(np.where(curve.omega <= w180, curve.gain, -np.inf), level, last=True)
-    phase_reading = Reading(by_phase, curve.sigma(by_phase)) if by_phase else Reading(float("nan"))
-    gain_reading = Reading(by_gain, curve.sigma(by_gain, gain=True)) if by_gain else Reading(float("nan"))
+    phase_reading = ReadNumber(by_phase, curve.sigma(by_phase)) if by_phase else ReadNumber(float("nan"))
+    gain_reading = ReadNumber(by_gain, curve.sigma(by_gain, gain=True)) if by_gain else ReadNumber(float("nan"))
     both = [r for r in (phase_reading, gain_reading) if np.isfinite(r.value)]
     counted = phase_reading if command == "attitude" or not both else min(both, key=lambda r: r.value)
     two_point, line = _phase_delays(curve, w180)
-    return Handling(phase_reading, gain_reading, counted, Reading(w180, s180), two_point, line)
+    return Handling(phase_reading, gain_reading, counted, ReadNumber(w180, s180), two_point, line)
 
 
-def _phase_delays(curve: _Curve, w180: float) -> tuple[Reading, Reading]:
-    nothing = Reading(float("nan"))
+def _phase_delays(curve: _Curve, w180: float) -> tuple[ReadNumber, ReadNumber]:
+    nothing = ReadNumber(float("nan"))
     if curve.omega[-1] < 1.2 * w180:
         return nothing, nothing
     two_point = nothing
     if curve.omega[-1] >= 2.0 * w180:
         lag = -(curve.at(curve.phase, 2.0 * w180) + 180.0)
         sigma = np.degrees(curve.at(curve.error, 2.0 * w180)) / (57.3 * 2.0 * w180)
-        two_point = Reading(lag / (57.3 * 2.0 * w180), float(sigma))
+        two_point = ReadNumber(lag / (57.3 * 2.0 * w180), float(sigma))
     inside = (curve.omega >= w180) & (curve.omega <= 2.0 * w180)
     if inside.sum() < 3:
         return two_point, nothing
@@ -185,10 +185,10 @@ def _phase_delays(curve: _Curve, w180: float) -> tuple[Reading, Reading]:
     total = float(weight @ x**2)
     slope = float(weight @ (x * y)) / total
     sigma = float(np.sqrt((weight * x) ** 2 @ np.degrees(curve.error[inside]) ** 2)) / total
-    return two_point, Reading(-slope / (57.3 * 2.0), sigma / (57.3 * 2.0))
+    return two_point, ReadNumber(-slope / (57.3 * 2.0), sigma / (57.3 * 2.0))
 
 
-def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Margins:
+def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> ResponseMargins:
     """Crossover, phase and gain margin of a broken loop L, negative feedback (unit gain at -180 degrees is the limit).
 
     Args:
@@ -197,27 +197,27 @@ def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Margi
         error: its random error; None where it is not known.
     """
     curve = _curve(omega, loop, error, None)
-    nothing = Reading(float("nan"))
+    nothing = ReadNumber(float("nan"))
     pm = gm = cross = phase_cross = nothing
     margin = [(abs(_wrapped(curve.at(curve.phase, w) + 180.0)), w) for w in curve.crossings(curve.gain, 0.0)]
     if margin:
         at = min(margin)[1]
-        cross = Reading(at, curve.sigma(at, gain=True))
+        cross = ReadNumber(at, curve.sigma(at, gain=True))
         value = _wrapped(curve.at(curve.phase, at) + 180.0)
         # Along the curve the phase at unit gain also moves as the crossing does.
         turn = curve.slope(curve.phase, at) * curve.sigma(at, gain=True)
-        pm = Reading(value, float(np.hypot(np.degrees(curve.at(curve.error, at)), turn)))
+        pm = ReadNumber(value, float(np.hypot(np.degrees(curve.at(curve.error, at)), turn)))
     turns = range(int(np.floor(curve.phase.min() / 360.0)) - 1, int(np.ceil(curve.phase.max() / 360.0)) + 1)
     room = [(abs(curve.at(curve.gain, w)), w) for k in turns for w in curve.crossings(curve.phase, 180.0 + 360.0 * k)]
     if room:
         # Where it is unstable already, the gain that has to go.
         unstable = pm.value < 0.0 if margin else float(np.median(curve.gain)) > 0.0
         at = (min(room) if not unstable else min((-curve.at(curve.gain, w), w) for _, w in room))[1]
-        phase_cross = Reading(at, curve.sigma(at))
+        phase_cross = ReadNumber(at, curve.sigma(at))
         slide = curve.slope(curve.gain, at) * curve.sigma(at)
         spread = 20.0 * np.log10(1.0 + curve.at(curve.error, at))
-        gm = Reading(-curve.at(curve.gain, at), float(np.hypot(spread, slide)))
-    return Margins(cross, pm, phase_cross, gm)
+        gm = ReadNumber(-curve.at(curve.gain, at), float(np.hypot(spread, slide)))
+    return ResponseMargins(cross, pm, phase_cross, gm)
 
 
 def _wrapped(degrees: float) -> float:

@@ -12,8 +12,8 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.identification.frequency.handling import (
     Handling,
-    Margins,
-    Reading,
+    ReadNumber,
+    ResponseMargins,
     attitude_of,
     handling_qualities,
     margins,
@@ -29,7 +29,7 @@ OWN = 0.25
 """Share of an output's power that an input must have made for the output's axis to be its own."""
 
 _WIDE = np.geomspace(0.3, 300.0, 800)
-_Kind = TypeVar("_Kind", Handling, Margins)
+_Kind = TypeVar("_Kind", Handling, ResponseMargins)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Line:
 
     response: str
     source: str
-    read: Handling | Margins | None
+    read: Handling | ResponseMargins | None
     problem: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -54,7 +54,7 @@ class Line:
 
     def __repr__(self) -> str:
         head, r = f"{self.response} ({self.source}): ", self.read
-        if isinstance(r, Margins):
+        if isinstance(r, ResponseMargins):
             head += f"crossover {r.crossover!r} rad/s, phase margin {r.phase_margin!r} deg, "
             return head + f"gain margin {r.gain_margin!r} dB at {r.omega_180!r} rad/s"
         if r is None:
@@ -114,17 +114,17 @@ def margin_lines(responses: FrequencyResponse, fit: Fitted, targets: Sequence[Ta
         lines.append(Line(wanted.name, "flight", margins(omega, h[inside], error=error[inside])))
         wide = np.geomspace(omega[0] / 10.0, omega[-1] * 10.0, 800)
 
-        def by_model(h: Complex, wide: Array = wide) -> Margins:
+        def by_model(h: Complex, wide: Array = wide) -> ResponseMargins:
             return margins(wide, h)
 
-        lines.append(_of_model(wanted.name, fit, wanted.output, wanted.input, wide, by_model, Margins))
+        lines.append(_of_model(wanted.name, fit, wanted.output, wanted.input, wide, by_model, ResponseMargins))
     return lines
 
 
-def model_margins(fit: Fitted, output: str, input: str, omega: Array, controller: Complex) -> Margins:
+def model_margins(fit: Fitted, output: str, input: str, omega: Array, controller: Complex) -> ResponseMargins:
     """Margins of controller and fitted model in one loop, with what the model's bounds make of them."""
-    found = _of_model("", fit, output, input, omega, lambda h: margins(omega, controller * h), Margins).read
-    assert isinstance(found, Margins)
+    found = _of_model("", fit, output, input, omega, lambda h: margins(omega, controller * h), ResponseMargins).read
+    assert isinstance(found, ResponseMargins)
     return found
 
 
@@ -149,7 +149,7 @@ def _of_model(
     value, sigma = spread(fit, output, input, omega, numbers)
     if not np.isfinite(value).any() and kind is Handling:
         return Line(title, "model", None, "the phase does not fall through -180 degrees")
-    return Line(title, "model", kind(*(Reading(float(v), float(s)) for v, s in zip(value, sigma, strict=True))))
+    return Line(title, "model", kind(*(ReadNumber(float(v), float(s)) for v, s in zip(value, sigma, strict=True))))
 
 
 def _pilots(attitude: Complex) -> Complex:

@@ -14,7 +14,9 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.accuracy import blind_directions, sandwich
 from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.result import Direction
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 
 POINTS = 20
@@ -248,6 +250,48 @@ class ResponseCost:
             rows += [gain * _DB * error.real, phase * _DEG * error.imag]
             derivatives += [(gain * _DB)[:, None] * slope.real, (phase * _DEG)[:, None] * slope.imag]
         return np.concatenate(rows), np.concatenate(derivatives) * self.row.scale
+
+
+NOT_FOLLOWED = "the model follows no response: J of each is above 1000, so that its numbers mean nothing."
+_HOPELESS = 10.0 * ACCEPTABLE
+
+
+def followed(numbers: Array, costs: Sequence[float]) -> bool:
+    """Whether a fit may be used: finite numbers, and at least one response that the model goes along with."""
+    return bool(np.all(np.isfinite(numbers))) and min(costs) <= _HOPELESS
+
+
+NEIGHBOURS = 1
+"""Points of a response that may err together: they are a tenth of a decade apart, and windows blur less than that."""
+
+
+def accuracy_of_fit(cost: ResponseCost, row: Array) -> tuple[Array, tuple[Direction, ...]]:
+    """What the errors themselves say of a fit: covariance, and combinations that the responses hardly see.
+
+    The plain bound takes J for a likelihood. This one takes the errors as they are, the misfit of the model included,
+    and allows for neighbouring lines that err together; errors of different responses are taken as independent.
+
+    Returns:
+        Covariance in the parameters' units, shape (p, p), NaN where a parameter leaves no trace; and the directions.
+    """
+    residual, slopes = cost.residuals(row)
+    size, names = len(cost.row.entries), [entry.name for entry in cost.row.entries]
+    information = slopes.T @ slopes
+    if np.any(np.diag(information) <= 0.0) or not np.all(np.isfinite(slopes)):
+        return np.full((size, size), np.nan), ()
+    blocks, at = [], 0
+    for wanted in cost.targets:
+        n = wanted.omega.size
+        if not wanted.ceiling:
+            both = slice(at, at + n), slice(at + n, at + 2 * n)
+            blocks.append((np.stack([residual[b] for b in both], 1), np.stack([slopes[b] for b in both], 1)))
+        at += n if wanted.ceiling else 2 * n
+    residuals, derivatives = [b[0] for b in blocks], [b[1] for b in blocks]
+    spread = np.sqrt(np.diag(information))
+    plain = np.linalg.pinv(information / np.outer(spread, spread), hermitian=True) / np.outer(spread, spread)
+    found = sandwich(plain, residuals, derivatives, lags=NEIGHBOURS) * np.outer(cost.row.scale, cost.row.scale)
+    noise = max(float(np.mean(np.concatenate([r.ravel() for r in residuals]) ** 2)), 1e-300)
+    return found, blind_directions(names, information / noise)
 
 
 def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:

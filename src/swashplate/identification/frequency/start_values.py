@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.identification.frequency.response_cost import POINTS, Target, target
+from swashplate.identification.frequency.response_cost import Target, target
 from swashplate.identification.frequency.state_space_fit import fit_targets
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.simulation.linearize import LinearModel
+
+if TYPE_CHECKING:
+    from swashplate.simulation.linearize import LinearModel
 
 _FAST = 1e-9
 
@@ -151,24 +153,3 @@ def _matched(model: StateSpaceModel, targets: Sequence[Target], *, seed: int) ->
         raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
     found = fit_targets(model, targets, seed=seed, iterations=40)
     return model.with_values({name: found.model.parameters[name].value for name in found.names})
-
-
-def from_transfer_functions(
-    model: StateSpaceModel, fits: Sequence[TransferFunctionFit], *, seed: int = 0
-) -> StateSpaceModel:
-    """The model with start values that answer as fitted transfer functions do, over the bands of their fits.
-
-    Transfer functions are smooth and quick to fit well; matching them from many starts leaves the model near enough for
-    the fit to the flight's own responses.
-
-    Raises:
-        IdentificationError: where none of them joins an output and an input of the model.
-    """
-    targets = []
-    for fit in fits:
-        for function, wanted in zip(fit.model, fit.targets, strict=True):
-            if function.output in model.outputs and function.input in model.inputs:
-                omega = np.geomspace(wanted.omega[0], wanted.omega[-1], POINTS)
-                h = function.response(omega)
-                targets.append(Target(function.output, function.input, omega, h, np.ones(POINTS)))
-    return _matched(model, targets, seed=seed)

@@ -11,16 +11,19 @@ import numpy as np
 
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.sources import Source
+from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
 from swashplate.identification.frequency.response_cost import (
     ACCEPTABLE,
+    NOT_FOLLOWED,
     ResponseComparison,
     Target,
     accuracy_of,
+    accuracy_of_fit,
     ceiling,
+    followed,
     target,
 )
 from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
@@ -81,7 +84,7 @@ def fit_state_space(
         seed=seed,
         progress=progress,
         began=began,
-        data=[Source(name) for name in responses.sources],
+        data=responses.data,
         settings={
             "sources": list(responses.sources),
             "method": responses.method,
@@ -141,7 +144,7 @@ def fit_targets(
     seed: int = 0,
     progress: Callable[[int, float], None] | None = None,
     began: float | None = None,
-    data: Sequence[Source] = (),
+    data: Sequence[DataSource] = (),
     settings: Mapping[str, Any] | None = None,
 ) -> StateSpaceFit:
     """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
@@ -177,6 +180,8 @@ def fit_targets(
             for name, p in found.parameters.items()
         },
     )
+    corrected, directions = accuracy_of_fit(cost, optimum.row)
+    wider = np.sqrt(np.diag(corrected))
     every = cost.each(optimum.row)
     costs = tuple(every[: len(targets)])
     place = {name: i for i, name in enumerate(model.free)}
@@ -187,6 +192,7 @@ def fit_targets(
             start=model.parameters[name].value,
             value=p.value,
             sigma=p.cramer_rao if name in place else np.nan,
+            sigma_corrected=float(wider[place[name]]) if name in place else np.nan,
             insensitivity=p.insensitivity if name in place else np.nan,
             tie=p.tie.text if p.tie is not None else "",
             fixed=not p.free and p.tie is None,
@@ -203,6 +209,8 @@ def fit_targets(
         warnings.append(f"the model answers where the flight shows nothing: {', '.join(over)}.")
     answers, _ = cost.evaluate(optimum.row)
     covariance = correlation * np.outer(cramer_rao, cramer_rao)
+    failed = not followed(numbers, costs)
+    problems += [NOT_FOLLOWED] if failed else []
     return Result(
         method="frequency responses",
         model=found,
@@ -210,7 +218,9 @@ def fit_targets(
         estimates=estimates,
         names=model.free,
         covariance=covariance,
-        covariance_corrected=np.full_like(covariance, np.nan),
+        covariance_corrected=corrected,
+        directions=directions,
+        failed=failed,
         correlation=correlation,
         details=StateSpaceDetails(
             left_out=left_out,

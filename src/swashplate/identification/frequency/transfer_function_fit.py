@@ -16,20 +16,24 @@ from swashplate.flights.schema import channel
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.scoring import Optimum, minimise
-from swashplate.identification.core.sources import Source
 from swashplate.identification.frequency.response_cost import (
+    NOT_FOLLOWED,
     ResponseComparison,
     ResponseCost,
     Target,
     accuracy_of,
+    accuracy_of_fit,
     cost_of,
+    followed,
     target,
 )
 from swashplate.identification.frequency.transfer_function_starts import starts
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
 from swashplate.models.linear.transfer_function import USUAL, Form, TransferFunction
+from swashplate.models.vehicle import Vehicle
 
 _ROUGH, _FOLLOWED = 12, 3
 """Iterations of every start, and how many of them are followed to the end."""
@@ -62,7 +66,7 @@ TransferFunctionFit = Result[tuple[TransferFunction, ...], TransferFunctionDetai
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedStructure:
     """One structure that was tried: its form, number of parameters, mean J and the fit."""
 
     form: Form
@@ -139,7 +143,7 @@ def suggest(
     forms: Sequence[Form] = USUAL,
     least_coherence: float = 0.6,
     seed: int = 0,
-) -> tuple[Trial, tuple[Trial, ...]]:
+) -> tuple[TriedStructure, tuple[TriedStructure, ...]]:
     """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
 
     Hardly: J within 10 of, or within 1.5 times, the least J of all (the pair of Tischler and Remple's "acceptable" and
@@ -152,7 +156,7 @@ def suggest(
     trials = []
     for form in forms:
         fit = _as_told(_fit(wanted, form, fixed={}, seed=seed), responses)
-        trials.append(Trial(form, len(fit.estimates), fit.cost, fit))
+        trials.append(TriedStructure(form, len(fit.estimates), fit.cost, fit))
     trials.sort(key=lambda trial: (trial.parameters, trial.cost))
     least = min(trial.cost for trial in trials)
     good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]
@@ -163,8 +167,7 @@ def _as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> Transfer
     """The fit with its gains' units, and with what its responses were warned of: it is no better than they are."""
     pairs = tuple(f"{t.output} / {t.input}:" for t in fit.targets)
     heard = tuple(words for words in (*responses.warnings, *responses.problems) if words.startswith(pairs))
-    data = tuple(Source(name) for name in responses.sources)
-    return _with_gain_units(replace(fit, warnings=(*fit.warnings, *heard), data=data), responses)
+    return _with_gain_units(replace(fit, warnings=(*fit.warnings, *heard), data=responses.data), responses)
 
 
 def _with_gain_units(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
@@ -252,6 +255,8 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
     values = spread | found
     _, slopes = cost.residuals(optimum.row)
     bounds = accuracy_of(slopes / cost.row.scale)
+    corrected, directions = accuracy_of_fit(cost, optimum.row)
+    wider = np.sqrt(np.diag(corrected))
     place = {name: i for i, name in enumerate(free)}
     estimates = tuple(
         Estimate(name, _unit(name), values[name], values[name], fixed=True)
@@ -262,6 +267,7 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
             cost.row.entries[place[name]].start,
             float(values[name]),
             sigma=float(bounds[0][place[name]]),
+            sigma_corrected=float(wider[place[name]]),
             insensitivity=float(bounds[1][place[name]]),
             at_bound=name in optimum.at_bound,
         )
@@ -272,6 +278,7 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
     costs = tuple(cost_of(h, t) for h, t in zip(responses, targets, strict=True))
     first = {n: cost.row.entries[place[n]].start for n in free}
     covariance = bounds[2] * np.outer(bounds[0], bounds[0])
+    failed = not followed(optimum.row, costs)
     return Result(
         method="frequency responses",
         model=made,
@@ -279,11 +286,14 @@ def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed
         estimates=estimates,
         names=tuple(free),
         covariance=covariance,
-        covariance_corrected=np.full_like(covariance, np.nan),
+        covariance_corrected=corrected,
+        directions=directions,
+        failed=failed,
         correlation=bounds[2],
         details=TransferFunctionDetails(form),
         history=optimum.history,
         converged=optimum.converged,
+        problems=(NOT_FOLLOWED,) if failed else (),
         warnings=_words(made, costs, estimates),
         comparisons=tuple(ResponseComparison(t, h, c) for t, h, c in zip(targets, responses, costs, strict=True)),
         settings={"form": form.text, "fixed": dict(spread), "seed": seed},
@@ -364,3 +374,10 @@ def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function")
         "parameters": {},
     }
     return parse(tomli_w.dumps(document), path=name)
+
+
+def vehicle_of(result: Result[Any, Any]) -> Vehicle:
+    """What `Result.vehicle` is, for any kind of model."""
+    if isinstance(result.model, Vehicle):
+        return result.model
+    return linear_vehicle(result.model if isinstance(result.model, StateSpaceModel) else as_state_space(result))

@@ -12,6 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.public import resolve
 
@@ -66,6 +67,11 @@ class FrequencyResponse:
     settings: Mapping[str, Any] = field(default_factory=dict)
     direct: Complex | None = None
     direct_error: Array | None = None
+
+    @property
+    def data(self) -> tuple[DataSource, ...]:
+        """The records with the hashes of their files and signals, "" where they came from elsewhere."""
+        return sources_named(self.sources, self.settings.get("hashes", {}))
 
     def place(self, output: str, input: str) -> tuple[int, int]:
         """Indices of a pair.
@@ -127,7 +133,8 @@ class FrequencyResponse:
         import control
 
         data = np.moveaxis(self.response, 0, -1)
-        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs))
+        name = ", ".join(self.sources) or "responses"  # python-control's plots fail without one
+        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name=name)
 
     @staticmethod
     def from_control(frd: Any) -> FrequencyResponse:

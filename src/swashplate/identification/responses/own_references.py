@@ -1,7 +1,8 @@
 """Sweeps as their own references: what a loop makes of gusts is not in the part of a stick that follows its sweep.
 
-Autopilots say when they sweep and by which law: the reference is that law. Every other sweep is looked for in the inputs
-themselves, and followed there (`sweep_tracking`). Doublets, steps and what a pilot does between sweeps are no part of it.
+Autopilots say when they sweep and by which law: the reference is that law. Every other sweep is looked for in the
+inputs themselves, and followed there (`sweep_tracking`). Doublets, steps and what a pilot does between sweeps are no
+part of it.
 """
 
 from __future__ import annotations
@@ -63,9 +64,8 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
         for one in found
     ]
     power = np.array([np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(found, followed, strict=True)])
-    whole = np.array(
-        [np.mean(pieces[one.piece].values[one.course.inside, : len(inputs)] ** 2, axis=0) for one in found]
-    )
+    own = [pieces[one.piece].values[one.course.inside, : len(inputs)] for one in found]
+    whole = np.array([np.mean(part**2, axis=0) for part in own])
     size = np.sqrt(power)
     largest = np.maximum(size.max(axis=0), 1e-300)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -21,6 +21,7 @@ from swashplate.identification.core.record_facts import (
     slowest_of,
     unit_of,
 )
+from swashplate.identification.core.sources import hashes
 from swashplate.identification.responses import response_warnings
 from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
@@ -97,9 +98,9 @@ def respond(
 ) -> FrequencyResponse:
     """Frequency responses of outputs to inputs, all inputs conditioned on each other, composite over windows.
 
-    A sweep is its own reference: without a recorded one, every sweep that the logs tell of or that is seen in the inputs
-    is followed along its own frequency, and what follows it serves as the reference (`own_references`). The direct
-    estimate is kept beside it, and where the two differ by more than their errors, a warning says so.
+    A sweep is its own reference: without a recorded one, every sweep that the logs tell of or that is seen in the
+    inputs is followed along its own frequency, and what follows it serves as the reference (`own_references`). The
+    direct estimate is kept beside it, and where the two differ by more than their errors, a warning says so.
 
     Args:
         flights: conditioned to one rate; each unbroken piece is a record.
@@ -210,7 +211,9 @@ def respond(
     warnings += blur_words
     warnings += response_warnings.mixing_words(made)
     warnings += response_warnings.lead_words(made)
-    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
+    unmoved = response_warnings.still(flights, (*inputs, *outputs))
+    problems += response_warnings.correlated(made, dead=unmoved)
+    warnings += response_warnings.untold(made, dead=unmoved)
     problems += response_warnings.incoherent(made)
     if not references:
         axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
@@ -234,6 +237,7 @@ def respond(
             "averages": [m.averages for m in matrices],
             **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),
+            "hashes": hashes(flights),
             "means": means(flights, (*inputs, *outputs)),
         },
     )

@@ -72,6 +72,8 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
             continue
         mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
         mean[i] = -1.0
+        if found.method != "direct" and mean.max() < MIXED:
+            continue  # it is not that inputs move together: references tell too little (`untold`)
         pair = tuple(sorted((name, found.inputs[int(np.argmax(mean))])))
         together.setdefault(pair, []).append(_hertz(found.omega, lost))
     return [
@@ -80,6 +82,22 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         "best in a sweep of each."
         for (one, other), bands in together.items()
     ]
+
+
+def untold(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
+    """Inputs of which references tell too little somewhere inside the band that they tell."""
+    words = []
+    for i, name in enumerate(found.inputs):
+        known = np.isfinite(found.response[:, :, i]).any(axis=1)
+        lost = ~known & np.isfinite(found.input_power[:, i])
+        if found.method == "direct" or name in dead or not lost.any():
+            continue
+        teller = "the references tell" if found.method == "joint" else "its sweep tells"
+        words.append(
+            f"{teller} too little of '{name}' at {_bands(found.omega, lost)}, where a loop's answer to gusts rules it: no "
+            "number is given there. Sweep slower or larger."
+        )
+    return words
 
 
 def incoherent(found: FrequencyResponse) -> list[str]:
@@ -136,7 +154,7 @@ def biased_by_feedback(free: FrequencyResponse, direct: FrequencyResponse) -> ND
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.abs(np.log(direct.response / free.response))
         bound = np.maximum(3.0 * np.hypot(free.error, direct.error), np.log(10.0) / 20.0)
-        off = (free.error < SURE) & (apart > bound)
+        off = apart > bound
     inner = np.zeros_like(off)
     inner[1:-1] = off[1:-1] & off[:-2] & off[2:]
     wide = inner.copy()
@@ -182,10 +200,11 @@ def without_unswept(
         return found, [f"no sweep of {names} was found: these responses are direct, and a loop may bias them."]
     response = found.response.copy()
     response[: lines[-1] + 1][:, :, unswept] = np.nan
+    low, high = found.omega[lines[[0, -1]]] / TWO_PI
     return replace(found, response=response), [
-        f"no sweep of {names} was found, and at {found.omega[lines[0]] / TWO_PI:.3g}-"
-        f"{found.omega[lines[-1]] / TWO_PI:.3g} Hz feedback biases the direct estimates of the other inputs: no number is "
-        "given for it up to there. Name its excitation with --references; --direct gives the direct estimate."
+        f"no sweep of {names} was found, and at {low:.3g}-{high:.3g} Hz feedback biases the direct estimates of the "
+        "other inputs: no number is given for it up to there. Name its excitation with --references; --direct gives the "
+        "direct estimate."
     ]
 
 

@@ -18,7 +18,8 @@ import jax
 import jax.numpy as jnp
 
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, Gain, Nuisance, StochasticModel, commands
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel, commands
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.start_states import start_state, steady_flight
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
@@ -28,7 +29,7 @@ _TOGETHER = 64
 
 
 @dataclass(frozen=True)
-class Plan:
+class FilterPlan:
     """What compiled code depends on: everything but numbers.
 
     Attributes:
@@ -50,7 +51,7 @@ class Plan:
         return (row * data["scale"])[: len(self.layout.free)]
 
 
-def unpack(plan: Plan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
+def unpack(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]:
     """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
     numbers = row * data["scale"]
     k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
@@ -71,7 +72,7 @@ def _by_record(data: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
 
 
 @partial(jax.jit, static_argnums=0)
-def innovations(plan: Plan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
+def innovations(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
     """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
     parameters, nuisances, noise = unpack(plan, data, row)
 
@@ -132,7 +133,7 @@ def _beginning(
     parameters: Any,
     noise: Noise,
     nuisance: Nuisance,
-) -> tuple[Any, Gain, FilterState]:
+) -> tuple[Any, FilterGain, FilterState]:
     """What reaches the vehicle, the filter's gain and its first guess."""
     value, rate, velocity = motion
     reaching = commands(model.vehicle, model.dt, u, nuisance)
@@ -153,7 +154,7 @@ def _beginning(
 
 
 # ---- derivatives ---------------------------------------------------------------------------------------------------
-def tangents(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any, Any]:
+def tangents(plan: FilterPlan, data: Any, row: Any, states: FilterState) -> tuple[Any, Any]:
     """Derivatives of `innovations` by every entry of the row.
 
     Args:
@@ -172,14 +173,14 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     soon = jax.jit(function, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 
     @wraps(function)
-    def chosen(plan: Plan, *rest: Any) -> Any:
+    def chosen(plan: FilterPlan, *rest: Any) -> Any:
         return (soon if plan.model.vehicle.traits.heavy else swiftly)(plan, *rest)
 
     return chosen
 
 
 @_compiled
-def _slopes(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any, Any, Any, Any]:
+def _slopes(plan: FilterPlan, data: Any, row: Any, states: FilterState) -> tuple[Any, Any, Any, Any]:
     """Each sample's tangent plane (records, n, ...).
 
     Returns:
@@ -210,7 +211,7 @@ def _slopes(plan: Plan, data: Any, row: Any, states: FilterState) -> tuple[Any, 
 
 
 @_compiled
-def _straightened(plan: Plan, data: Any, row: Any, planes: tuple[Any, Any, Any, Any]) -> Any:
+def _straightened(plan: FilterPlan, data: Any, row: Any, planes: tuple[Any, Any, Any, Any]) -> Any:
     """Derivatives by the row of the filter that steps along tangent planes."""
     model = plan.model
     here = plan.numbers(data, row)

@@ -9,6 +9,7 @@ unstable aircraft is as easy as a stable one; drift and noise outside the band d
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,16 +17,21 @@ from scipy.optimize import least_squares
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
+from swashplate.identification.core.accuracy import blind_directions, marginal_information, sandwich
 from swashplate.identification.core.records import uniform_table
 from swashplate.identification.core.result import Estimate, Result, correlation_of
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.core.time_fit import TimeDetails
+from swashplate.identification.estimators import Data, Question
+from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 
 METHOD = "output error over frequencies"
 _ROUNDS = 5
+_NEIGHBOURS = 1
+"""Lines whose errors may go together: the ends of a record leak into them."""
 
 
 def fit_in_frequency(
@@ -90,6 +96,10 @@ def fit_in_frequency(
     information = 2.0 * jacobian.T @ jacobian
     covariance = np.linalg.pinv(information, hermitian=True)
     spread = np.sqrt(np.abs(np.diag(covariance)))
+    corrected = _corrected(2.0 * covariance, residuals(start), jacobian, [len(piece[0]) for piece in pieces])[:k, :k]
+    scale = np.array([abs(value) or 1.0 for value in start[:k]])
+    alone = marginal_information(information, np.zeros_like(information), np.arange(k, dtype=np.int64))
+    failed = not np.all(np.isfinite(spread[:k])) or not solved.success
     estimates = tuple(
         Estimate(
             p,
@@ -97,6 +107,7 @@ def fit_in_frequency(
             model.parameters[p].value,
             float(start[i]),
             sigma=float(spread[i]),
+            sigma_corrected=float(np.sqrt(max(corrected[i, i], 0.0))),
             insensitivity=float(1.0 / np.sqrt(max(information[i, i], 1e-300))),
             at_bound=bool(start[i] <= low[i] or start[i] >= high[i]),
         )
@@ -109,14 +120,26 @@ def fit_in_frequency(
         estimates=estimates,
         names=model.free,
         covariance=covariance[:k, :k],
-        covariance_corrected=np.full((k, k), np.nan),
+        covariance_corrected=corrected,
         correlation=correlation_of(covariance[:k, :k]),
         details=TimeDetails(np.diag(sigma**2)),
         history=tuple(history),
         converged=bool(solved.success),
+        failed=failed,
+        problems=("the search has found no least cost: its numbers mean nothing.",) if failed else (),
+        directions=blind_directions(model.free, alone * np.outer(scale, scale)),
         data=sources_of(flights),
         settings={"band": list(band), "outputs": list(names), "records": sources},
     )
+
+
+def _corrected(plain: Array, residual: Array, jacobian: Array, lines: Sequence[int]) -> Array:
+    """`sandwich` over the lines of every record: noise need not be white over the band."""
+    outputs, both = residual.size // (2 * sum(lines)), []
+    for part in (residual, jacobian):
+        real, imaginary = np.split(part.reshape(2 * sum(lines), outputs, -1), 2)
+        both.append(np.split(np.concatenate([real, imaginary], axis=1), np.cumsum(lines)[:-1]))
+    return sandwich(plain, [block[:, :, 0] for block in both[0]], both[1], lags=_NEIGHBOURS)
 
 
 def _transformed(
@@ -157,3 +180,25 @@ def _answer(
         lag = np.array([model.delay(o, name) for o in names])
         answer = answer + h * np.exp(-1j * omega[:, None] * lag) * u[:, i, None]
     return np.asarray(answer)
+
+
+@dataclass(frozen=True)
+class LinesEstimator:
+    """`fit_in_frequency` as an estimator."""
+
+    takes: frozenset[str] = frozenset({"outputs", "band"})
+
+    def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
+        if isinstance(data, FrequencyResponse):
+            return "it fits records in time"
+        return "" if isinstance(model, StateSpaceModel) else "it fits state-space models"
+
+    def estimate(
+        self, model: StateSpaceModel, data: tuple[Flight, ...], question: Question
+    ) -> Result[StateSpaceModel, TimeDetails]:
+        if question.band is None:
+            raise IdentificationError("is not said, and this method needs it.", channel="band", hint="band=(0.1, 5.0)")
+        return fit_in_frequency(model, data, band=question.band, outputs=question.outputs)
+
+
+FREQUENCY_LINES = LinesEstimator()

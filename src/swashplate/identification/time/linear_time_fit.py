@@ -23,7 +23,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import Source, sources_of
+from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -121,7 +121,7 @@ def linear_result(
     solved: Solved,
     *,
     method: str,
-    data: Sequence[Source],
+    data: Sequence[DataSource],
     settings: Mapping[str, Any],
     seconds: float,
 ) -> Result[StateSpaceModel, TimeDetails]:

@@ -16,13 +16,14 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, mean_nuisance, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record, logs
-from swashplate.identification.time.innovations import Plan, innovations, tangents, unpack
+from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, unpack
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.start_states import mean_velocity, slopes
 
@@ -143,7 +144,7 @@ class PredictionError:
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
-        self._plan = Plan(self.model, table.layout, len(self.logs), tuple(_NUISANCE), noises)
+        self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(_NUISANCE), noises)
         self._data = {
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
             "value": jnp.asarray(np.stack([value[0] for value, _ in first])),

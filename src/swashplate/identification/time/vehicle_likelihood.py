@@ -30,7 +30,6 @@ from swashplate.models.nesting import leaves
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.simulation.discretisation import gathered_noise
 from swashplate.simulation.dynamics import (
     CONSTANTS,
     SURROUNDINGS,
@@ -39,6 +38,7 @@ from swashplate.simulation.dynamics import (
     row_force,
     row_rates,
 )
+from swashplate.simulation.gathered_noise import gathered_noise
 from swashplate.simulation.runge_kutta import rk4_step
 
 FORCES = ("ax", "ay", "az")

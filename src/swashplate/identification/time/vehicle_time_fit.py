@@ -18,7 +18,7 @@ from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.parameters import Free, Parameterization, parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.sources import Source, sources_of
+from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -113,7 +113,7 @@ def vehicle_result(
     solved: Solved,
     *,
     method: str,
-    data: Sequence[Source],
+    data: Sequence[DataSource],
     settings: Mapping[str, Any],
     seconds: float,
 ) -> Result[Vehicle, TimeDetails]:

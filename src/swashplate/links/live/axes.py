@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import control
 import numpy as np
@@ -18,7 +17,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.discretisation import zero_order_hold
 from swashplate.simulation.linearize import LinearModel
 
-STICKS = ("roll", "pitch", "yaw", "heave")
+STICKS = AXES
 _OUTPUTS = ("p", "q", "r", "w")
 _MOVED = ("phi", "theta", "psi", "z")
 _SENSE = np.array([1.0, -1.0, 1.0, -1.0])
@@ -113,9 +112,9 @@ def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
 def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:
     """Inputs by axis: those whose names say it, otherwise those that move the axes most."""
     names = vehicle.input_names
-    found: dict[str, Any] = {a: next((s for s in AXES[a] if s.keys() <= set(names)), None) for a in STICKS}
+    found: dict[str, Mapping[str, float]] = dict(vehicle.stick_axes)
     excited = {axis: axis for axis in STICKS}
-    if None in found.values():
+    if not set(STICKS) <= set(found):
         if len(names) < len(STICKS):
             raise SwashError(
                 f"has the inputs {', '.join(names)}: too few for four sticks.",

@@ -210,7 +210,7 @@ class World:
         Raises:
             ManeuverError: where the vehicle lacks what it moves.
         """
-        maneuver.offsets(np.zeros(1), inputs=self.vehicle.input_names)
+        maneuver.offsets(np.zeros(1), inputs=self.vehicle.input_names, axes=self.vehicle.stick_axes)
         self._maneuver = (maneuver, self.ticks)
 
     @property
@@ -320,7 +320,7 @@ class World:
         if now >= maneuver.duration:
             self._maneuver = None
             return none
-        offsets = maneuver.offsets(np.array([now]), inputs=self.vehicle.input_names)
+        offsets = maneuver.offsets(np.array([now]), inputs=self.vehicle.input_names, axes=self.vehicle.stick_axes)
         return np.array([offsets[name][0] for name in self.vehicle.input_names])
 
     # ---- looking -----------------------------------------------------------------------------------------------

@@ -16,6 +16,8 @@ from starlette.types import ASGIApp
 from swashplate.links.logs import requests as ask
 from swashplate.links.logs.desk import BINS, MOST_LOGS, Desk
 from swashplate.links.logs.remedies import Remedy
+from swashplate.links.logs.spectra import spectra
+from swashplate.links.logs.track import track
 from swashplate.links.logs.uploads import PIECE
 from swashplate.links.web.guard import Guard
 from swashplate.links.web.libraries import PAGE as SHARED
@@ -80,6 +82,15 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
             wanted=ask.rows(_MOST_TRACES, _LOG, _NAME),
             span=ask.rows(1, ask.number, ask.number),
         ),
+        _post(
+            "/spectra",
+            lambda log, channel, start, stop: spectra(desk.log(log), channel, start, stop),
+            log=_LOG,
+            channel=_NAME,
+            start=ask.number,
+            stop=ask.number,
+        ),
+        _post("/track", lambda log: track(desk.log(log)), log=_LOG),
         _post("/align", desk.align, first=_LOG, second=_LOG),
         _post("/common", desk.common, numbers=_numbers),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 
 from swashplate.links.logs.remedies import Remedy
 
@@ -74,7 +75,9 @@ IMPORT = "import swashplate as sp"
 def inspected(read: Read) -> Code:
     """Looking at a log."""
     shell = " ".join(part for part in ("swash inspect", read.named(), read.words) if part)
-    return Code(f"Read {read.file}", shell, "\n".join([IMPORT, read.python(), "print(sp.inspect(flight))"]))
+    return Code(
+        f"Read {PurePath(read.file).name}", shell, "\n".join([IMPORT, read.python(), "print(sp.inspect(flight))"])
+    )
 
 
 def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tuple[float, float] | None) -> Code:
@@ -93,4 +96,21 @@ def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tupl
 def aligned(first: Read, second: Read) -> Code:
     """Bringing a log on the clock of another one."""
     lines = [IMPORT, first.python("first"), second.python("second"), "print(sp.synchronise(first, second))"]
-    return Code(f"Align {second.file} with {first.file}", "", "\n".join(lines))
+    return Code(f"Align {PurePath(second.file).name} with {PurePath(first.file).name}", "", "\n".join(lines))
+
+
+def spectra(read: Read, channel: str, start: float, stop: float, *, rotor: bool) -> Code:
+    """The density of a channel, and what a rotor shakes into it."""
+    part = f"'{channel}', start={start:.6g}, stop={stop:.6g}"
+    lines = [IMPORT, read.python(), f"density = sp.spectrum(flight, {part})", "print(density)"]
+    lines.append(f"over_time = sp.spectrogram(flight, {part})")
+    if rotor:
+        lines.append(f"print(sp.harmonics(flight, {part}))")
+    return Code(f"Spectrum of {channel}", "", "\n".join(lines))
+
+
+def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:
+    """The channels of the track over time; where place and attitude are whole, `swash replay` draws it too."""
+    lines = [IMPORT, read.python(), f"figure = flight.plot(channels={list(channels)!r})", 'figure.savefig("track.pdf")']
+    shell = f"swash replay {read.named()} {read.words}".strip() if whole else ""
+    return Code("Track", shell, "\n".join(lines))

@@ -52,7 +52,7 @@ class YawGyro(NamedTuple):
     r_gyro: Scalar
 
 
-class Servos(NamedTuple):
+class ServoPositions(NamedTuple):
     """Where the servos stand, in the units of the controls [rad]."""
 
     theta0_servo: Scalar
@@ -83,13 +83,13 @@ class HelicopterState(NamedTuple):
     inflow: Inflow | None
     rotor: RotorSpeed | None
     gyro: YawGyro | None
-    servos: Servos | None
+    servos: ServoPositions | None
     delays: Delays | None
     engine: EngineLag | None
     grip: Grip | None
 
 
-class Loads(NamedTuple):
+class HelicopterLoads(NamedTuple):
     """What acts on the fuselage by contributor, and how the moving parts move."""
 
     main_rotor: Contribution
@@ -103,7 +103,7 @@ class Loads(NamedTuple):
     inflow: Inflow | None
     rotor: RotorSpeed | None
     gyro: YawGyro | None
-    servos: Servos | None
+    servos: ServoPositions | None
     delays: Delays | None
     engine: EngineLag | None
     grip: Grip | None
@@ -121,7 +121,7 @@ CONTRIBUTORS = ("main_rotor", "tail_rotor", "tailplane", "fin", "fuselage", "gro
 
 def loads(
     state: HelicopterState, inputs: Any, par: Any, env: Environment, xp: Backend, *, options: HelicopterOptions
-) -> Loads:
+) -> HelicopterLoads:
     """Forces and moments on the fuselage by contributor, without gravity, and the rates of everything that moves."""
     body = state.body
     sense, density = options.sense, env.air_density
@@ -140,7 +140,7 @@ def loads(
             (-par.cyclic_limit, par.cyclic_limit),
             (par.tail_low, par.tail_high),
         )
-        servo_rates = Servos(
+        servo_rates = ServoPositions(
             *(
                 actuators.servo_rate(
                     at, to, time_constant=par.servo_time, fastest=par.servo_speed, low=low, high=high, xp=xp
@@ -225,7 +225,7 @@ def loads(
         )
         force, moment, bending = ground_contact.skid_loads(body, skids, xp, state.grip)
         touching = Contribution(force, moment)
-    return Loads(
+    return HelicopterLoads(
         lifted,
         frame.tail_rotor,
         frame.tailplane,
@@ -254,7 +254,7 @@ def _late(states: Delays, sticks: Controls, delay: Scalar) -> tuple[Delays, Cont
     return Delays(*(rate for rate, _ in rates), *(change for _, change in rates)), out
 
 
-def _sum(acting: Loads) -> Contribution:
+def _sum(acting: HelicopterLoads) -> Contribution:
     force, moment = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     for part in acting.contributions().values():
         force, moment = force + part.force, moment + part.moment

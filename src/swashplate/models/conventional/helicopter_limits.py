@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.models.conventional.helicopter import HelicopterState, Loads, loads
+from swashplate.models.conventional.helicopter import HelicopterLoads, HelicopterState, loads
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
@@ -29,7 +29,7 @@ def shaft_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) 
     return float(_loads(vehicle, x, u, environment).power)
 
 
-def _loads(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> Loads:
+def _loads(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> HelicopterLoads:
     """What acts at a state."""
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
     inputs: Any = vehicle.inputs(*(float(value) for value in u))

@@ -17,9 +17,9 @@ from functools import cache, partial
 from typing import Any, NamedTuple
 
 from swashplate.errors import CardError
-from swashplate.flights.maneuvers.series import AXES
 from swashplate.models.card import Card
-from swashplate.models.traits import Axis, Traits
+from swashplate.models.traits import Traits
+from swashplate.models.usual_axes import usual_axes
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
@@ -126,14 +126,8 @@ def linear(card: Card) -> Vehicle:
         input_limits=limits,
         derivatives=partial(derivatives, structure=own),
         specific_force=partial(specific_force, structure=own),
-        traits=replace(TRAITS, no_trim=grounded, rest=_rest) if grounded else replace(TRAITS, axes=_axes(inputs)),
+        traits=replace(TRAITS, no_trim=grounded, rest=_rest) if grounded else replace(TRAITS, axes=usual_axes(inputs)),
     )
-
-
-def _axes(inputs: tuple[str, ...]) -> tuple[Axis, ...]:
-    """The axes of inputs that are called as usual."""
-    usual = {axis: next((s for s in sets if s.keys() <= set(inputs)), None) for axis, sets in AXES.items()}
-    return tuple(Axis(axis, moved) for axis, moved in usual.items() if moved is not None)
 
 
 def _not_flying(states: tuple[str, ...], units: Mapping[str, str]) -> str:

@@ -136,7 +136,7 @@ def bode_matrix(rows: Sequence[Sequence[Pair | None]], *, identifier: str = "bod
                     domain=[left, min(1.0, left + width)],
                     anchor=f"y{n}",
                     matches=None if number == 1 else "x",
-                    showticklabels=last,
+                    showticklabels=last and lowest,
                     type="log",
                 )
                 top -= high + _BETWEEN

@@ -81,8 +81,9 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
             figsize=(width, scale * sum(shares) + sum(legends)), layout="constrained", facecolor=ground
         )
         heights = np.add(shares, legends)
+        apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
         parts: list[Any] = [made]
-        if len(shares) > 1:
+        if apart:
             parts = list(made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
         for part, figure in zip(parts, figures, strict=True):
             part.set_facecolor(ground)

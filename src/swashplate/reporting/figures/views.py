@@ -6,7 +6,6 @@ in a notebook.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +14,10 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.registry import nearest
 from swashplate.reporting.figures import bode_matrix
 from swashplate.reporting.figures.interactive import interactive
+from swashplate.reporting.figures.of_comparison import section_of_comparison, section_of_residuals
 from swashplate.reporting.figures.of_flight import over_time, section_of_flight, section_of_inspection
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
@@ -27,6 +28,8 @@ from swashplate.reporting.structure import Block, Cell, Figure, Report, Section,
 from swashplate.simulation.derivatives_over_speed import Derivatives
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim_curve import TrimCurve
+from swashplate.validation.compare import ModelComparison
+from swashplate.validation.residuals import Residuals
 from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
@@ -49,6 +52,10 @@ def section_of(shown: Any) -> Section:
         return _of_trims(shown)
     if isinstance(shown, Derivatives):
         return _of_derivatives(shown)
+    if isinstance(shown, ModelComparison):
+        return section_of_comparison(shown)
+    if isinstance(shown, Residuals):
+        return section_of_residuals(shown)
     if isinstance(shown, LinearModel):
         return Section("modes", "Linear model", (eigenvalues({"model": shown.modes()}), _listing(repr(shown))))
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
@@ -134,11 +141,10 @@ def _chosen(shown: Any, name: str | None) -> Figure:
     if name is None:
         return next(iter(found.values()))
     if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
         raise SwashError(
             f"is no figure of it; there are {', '.join(found)}.",
             channel=name,
-            hint=f"Did you mean '{near[0]}'?" if near else None,
+            hint=nearest(name, found) or None,
         )
     return found[name]
 

@@ -13,9 +13,10 @@ from swashplate.control.analysis.check import ControlCheck, check_controller, wi
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.analysis.stability import loop_modes, margins_at, margins_of, modes_of
 from swashplate.control.laws.autopilot import autopilot
-from swashplate.control.lqg.analysis import Watched, analyse
+from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
+from swashplate.control.lqg.steady_loop import Watched
 from swashplate.control.lqg.weights import crossover_limits, total_delays
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite

@@ -12,10 +12,11 @@ from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.stability import margins_of, modes_of
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.laws.autopilot_kind import KIND as LAW
-from swashplate.control.lqg.analysis import analyse, observed_loop
+from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
 from swashplate.control.lqg.other_model import differences
+from swashplate.control.lqg.steady_loop import observed_loop
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import swashplate as sp
 from swashplate.errors import ManeuverError
 from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE, KINDS, Maneuver, parse
 
@@ -62,15 +63,16 @@ def test_multisine_axes_are_uncorrelated_and_flat() -> None:
 
 
 def test_axes_move_the_right_inputs() -> None:
+    axes = sp.vehicle("coax").stick_axes
     time = np.array([0.1])
-    heave = parse("step:collective,1s,0.1").offsets(time, inputs=INPUTS)
-    yaw = parse("step:yaw,1s,0.1").offsets(time, inputs=INPUTS)
-    named = parse("step:motor_upper,1s,0.1").offsets(time, inputs=INPUTS)
+    heave = parse("step:collective,1s,0.1").offsets(time, inputs=INPUTS, axes=axes)
+    yaw = parse("step:yaw,1s,0.1").offsets(time, inputs=INPUTS, axes=axes)
+    named = parse("step:motor_upper,1s,0.1").offsets(time, inputs=INPUTS, axes=axes)
     assert [heave[name][0] for name in INPUTS] == [0.1, 0.1, 0.0, 0.0]
     assert [yaw[name][0] for name in INPUTS] == [-0.1, 0.1, 0.0, 0.0]
     assert [named[name][0] for name in INPUTS] == [0.0, 0.1, 0.0, 0.0]
     with pytest.raises(ManeuverError, match="moves 'rudder'"):
-        parse("step:rudder,1s").offsets(time, inputs=INPUTS)
+        parse("step:rudder,1s").offsets(time, inputs=INPUTS, axes=axes)
 
 
 @pytest.mark.parametrize(
@@ -116,3 +118,11 @@ def test_any_text_parses_or_is_explained(text: str) -> None:
     except ManeuverError:
         return
     assert found.duration > 0.0
+
+
+def test_a_multirotor_says_itself_which_motors_an_axis_moves() -> None:
+    x8 = sp.vehicle("x8")
+    moved = parse("step:heave,1s,0.1").offsets(np.array([0.1]), inputs=x8.input_names, axes=x8.stick_axes)
+    assert all(values[0] == pytest.approx(0.1) for values in moved.values())
+    turned = parse("step:yaw,1s,0.1").offsets(np.array([0.1]), inputs=x8.input_names, axes=x8.stick_axes)
+    assert {np.sign(values[0]) for values in turned.values()} == {1.0, -1.0}

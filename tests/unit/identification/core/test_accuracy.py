@@ -151,3 +151,29 @@ def test_a_parameter_without_a_trace_is_refused_and_one_with_a_prior_is_not() ->
     with pytest.raises(IdentificationError, match=r"a\.mat: a1: the flight carries no information about it"):
         accuracy.refuse_unseen(_row(2), information, where="a.mat")
     accuracy.refuse_unseen(_row(2, sigma=1.0), information, where="a.mat")
+
+
+def test_the_sandwich_is_the_scatter_of_errors_of_any_size_and_colour() -> None:
+    """A straight line through 400 experiments whose errors grow along the axis and go together over neighbours."""
+    rng = np.random.default_rng(7)
+    n, times = 240, 400
+    axis = np.linspace(0.0, 1.0, n)
+    slope = np.stack([np.ones(n), axis], axis=1)
+    plain = np.linalg.inv(slope.T @ slope)
+    size = 0.02 + 0.2 * axis**2
+    errors = size[:, None] * _first_order(rng, (n, times), 0.25)
+    scatter = np.std(plain @ slope.T @ errors, axis=1)
+    residuals = errors - slope @ (plain @ slope.T @ errors)
+    told = [
+        np.sqrt(np.diag(accuracy.sandwich(plain, [v[:, None]], [slope[:, None, :]], lags=4))) for v in residuals.T[:60]
+    ]
+    np.testing.assert_allclose(np.mean(told, axis=0), scatter, rtol=0.15)
+    usual = np.sqrt(np.diag(plain) * np.mean(residuals**2))
+    assert np.abs(np.log(usual[1] / scatter[1])) > 0.3  # one size and no colour: it would not do
+
+
+def test_blocks_of_the_sandwich_know_nothing_of_each_other() -> None:
+    rng = np.random.default_rng(8)
+    v, slope, plain = rng.standard_normal((50, 1)), rng.standard_normal((50, 1, 2)), 1e-3 * np.eye(2)
+    both = accuracy.sandwich(plain, [v, v], [slope, slope], lags=3)
+    np.testing.assert_allclose(both, 2.0 * accuracy.sandwich(plain, [v], [slope], lags=3))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_transfer_function import exact
 
-from swashplate.identification.frequency.handling import Handling, Margins, Reading, margins
+from swashplate.identification.frequency.handling import Handling, ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines, own_input
 from swashplate.identification.frequency.reading_accuracy import answers
 from swashplate.identification.frequency.state_space_fit import fit_state_space
@@ -48,11 +48,11 @@ def drawn(fit: TransferFunctionFit, number: int) -> list[TransferFunction]:
 def test_bounds_of_margins_are_those_of_drawn_models(lag: tuple[FrequencyResponse, TransferFunctionFit]) -> None:
     found, fit = lag
     line = next(a for a in margin_lines(found, fit, fit.targets) if a.source == "model")
-    assert isinstance(line.read, Margins)
+    assert isinstance(line.read, ResponseMargins)
     omega = np.geomspace(0.3, 300.0, 800)
     others = [margins(omega, model.response(omega)) for model in drawn(fit, 300)]
     for name in ("crossover", "phase_margin", "gain_margin", "omega_180"):
-        read: Reading = getattr(line.read, name)
+        read: ReadNumber = getattr(line.read, name)
         scatter = 10.0 * np.std([getattr(m, name).value for m in others])
         assert read.sigma == pytest.approx(scatter, rel=0.15), name
     omega = np.geomspace(1.0, 50.0, 9)

@@ -14,10 +14,10 @@ from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, IdentificationError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.core.result import Estimate, percent
-from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_transfer_functions
+from swashplate.identification.frequency.start_values import at_flown_trim, from_linear_model, from_models
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.state_space_words import words
-from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
+from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linearised_model import model_of
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -180,9 +180,24 @@ def test_fit_finds_the_truth_and_comes_back_from_its_file(tmp_path: Path) -> Non
     page = sp.report(again, exact(rotor()), path=tmp_path / "report.html").read_text(encoding="utf-8")
     assert "J_ave" in page
     drawn = again.draw_values(500, seed=1)
-    assert np.std(drawn["tau_f"]) == pytest.approx(fit["tau_f"].sigma, rel=0.15)
+    assert np.std(drawn["tau_f"]) == pytest.approx(fit["tau_f"].sigma_corrected, rel=0.15)
+    plain = again.draw_values(500, seed=1, corrected=False)
+    assert np.std(plain["tau_f"]) == pytest.approx(fit["tau_f"].sigma, rel=0.15)
+    assert not fit.failed
+    assert fit.vehicle.structure == fit.model
     same = sp.identify(structure("rotor_body"), exact(rotor()))
     assert [e.value for e in same.estimates] == [e.value for e in fit.estimates]
+
+
+def test_a_model_that_follows_no_response_has_failed() -> None:
+    """A wrong sign of the only input, held: J stays far above all use."""
+    true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
+    wrong = true.with_values({"Zcol": 27.0}, free=False)
+    fit = fit_state_space(wrong, _at_points(true, noise=0.0, seed=1), starts=1)
+    assert fit.failed
+    assert "follows no response" in fit.problems[-1]
+    with pytest.raises(IdentificationError, match="has failed"):
+        fit.draw_values(3, seed=1)
 
 
 def test_cramer_rao_is_what_noise_scatters() -> None:
@@ -191,13 +206,17 @@ def test_cramer_rao_is_what_noise_scatters() -> None:
     Phase errors of the same size weigh 0.01745 (57.3 / 8.686)^2 = 0.76 of the gain's, so the factor is a little less.
     """
     true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
-    found, bounds = [], []
+    found, bounds, corrected = [], [], []
     for seed in range(60):
         fit = fit_state_space(true, _at_points(true, noise=0.03, seed=seed), starts=1)
+        corrected.append([fit[n].sigma_corrected for n in fit.names])
         found.append([fit.model.parameters[n].value for n in fit.names])
         bounds.append([fit.model.parameters[n].cramer_rao for n in fit.names])
     factor = np.std(found, axis=0) / np.mean(bounds, axis=0) / (np.sqrt(2.0) * 0.03 * 20 / np.log(10))
     assert np.all((factor > 0.7) & (factor < 1.3)), factor
+    # The corrected bound knows how large the errors are: it is the scatter itself.
+    ratio = np.std(found, axis=0) / np.mean(corrected, axis=0)
+    assert np.all((ratio > 0.7) & (ratio < 1.4)), ratio
 
 
 def _at_points(model: StateSpaceModel, *, noise: float, seed: int) -> FrequencyResponse:
@@ -315,11 +334,11 @@ def test_unusable_questions_are_refused() -> None:
         model.with_values({"Lbb": 1.0})
 
 
-def test_start_values_from_transfer_functions() -> None:
+def test_start_values_from_models() -> None:
     true = structure("heave").with_values({"Zw": -2.0, "Zcol": -27.0, "tau_collective": 0.05})
     responses = exact(true)
     fit = fit_transfer_function(responses, "0/1-1s", input="mixer_collective")
-    start = from_transfer_functions(structure("heave"), [fit])
+    start = from_models(structure("heave"), [as_state_space(fit)], responses)
     for name in ("Zw", "Zcol", "tau_collective"):
         assert start.parameters[name].value == pytest.approx(true.parameters[name].value, rel=0.02)
 

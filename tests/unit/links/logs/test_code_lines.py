@@ -17,6 +17,8 @@ from swashplate.cli.app import app
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.desk import Desk
 from swashplate.links.logs.remedies import Remedy
+from swashplate.links.logs.spectra import spectra
+from swashplate.links.logs.track import track
 
 
 @pytest.fixture
@@ -84,6 +86,24 @@ def test_one_log_brought_on_the_clock_of_another(desk: Desk, capsys: pytest.Capt
     found = desk.align(1, 2)
     python(found["code"])
     assert capsys.readouterr().out.strip() == found["words"]
+
+
+def test_the_spectrum_of_a_channel(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
+    found = spectra(desk.log(1), "p", 2.0, 28.0)
+    names = python(found["code"])
+    assert names["density"].density[1:].tolist() == pytest.approx(found["density"].tolist())
+    assert found["words"] in capsys.readouterr().out
+    assert found["rotor"]["speed"] is None
+    assert "no rotor speed" in found["rotor"]["words"]
+
+
+def test_the_track(desk: Desk, folder: Path) -> None:
+    found = track(desk.log(1))
+    python(found["code"])
+    assert (folder / "track.pdf").is_file()
+    assert found["code"]["shell"] == "", "a log without a place is nothing for swash replay"
+    assert found["notes"] == ["The log has no place: the attitude is drawn at one point."]
+    assert found["angles"][:, 0].max() == pytest.approx(desk.log(1).ready.values("phi").max(), abs=1e-3)
 
 
 def test_every_option_of_a_reading_is_in_both() -> None:

@@ -163,6 +163,17 @@ def test_a_request_of_another_form_is_refused(asking: Asking, content: bytes) ->
     assert answer.json()["problem"].startswith("the request ")
 
 
+def test_what_has_no_motion_has_no_track_and_too_short_a_stretch_no_spectrum(asking: Asking, tmp_path: Path) -> None:
+    number = asking.drop("g.csv", table(tmp_path / "g.csv", names="alpha_lower beta_lower p q"))
+    status, words = asking.refused("/track", log=number)
+    assert (status, "no place" in words) == (422, True)
+    status, words = asking.refused("/spectra", log=number, channel="p", start=1.0, stop=1.1)
+    assert (status, "expected at least 32" in words) == (422, True)
+    picture = asking.post("/spectra", log=number, channel="p", start=0.0, stop=30.0)["picture"]
+    assert {len(row) for row in picture["shade"]} == {len(picture["shade"][0])}
+    assert max(max(row) for row in picture["shade"]) == 255
+
+
 def test_a_log_or_channel_that_is_none_is_told(asking: Asking, tmp_path: Path) -> None:
     assert asking.refused("/traces", wanted=[[999, "p", 0.0, 1.0]], bins=10) == (422, "log 999 is not open.")
     number = asking.drop("f.csv", table(tmp_path / "f.csv"))

@@ -59,7 +59,7 @@ function place(log) {
   const [first] = ready();
   if (!first || first.id === log.id || offsets.has(log.id)) return;
   const dated = log.epoch && first.epoch ? log.epoch - first.epoch : null;
-  const together = dated !== null && Math.abs(dated) < 86400;
+  const together = dated !== null && log.start + dated < first.stop && log.stop + dated > first.start;
   offsets.set(log.id, offset(first) + (together ? dated : first.start - log.start));
 }
 

@@ -8,13 +8,15 @@ import * as log_list from "./log_list.js";
 import * as parameters from "./parameters.js";
 import * as plots from "./plots.js";
 import { post } from "./server.js";
+import * as spectrum from "./spectrum.js";
 import * as state from "./state.js";
 import * as theme from "./theme.js";
+import * as track from "./track.js";
 import * as trouble from "./trouble.js";
 import * as views from "./views.js";
 
-const FIRST = ["p", "q", "r", "phi", "theta", "psi", "mixer_roll", "mixer_pitch", "mixer_yaw", "servo_roll", "servo_pitch", "motor_lower", "motor_upper", "stick_roll", "stick_pitch", "stick_yaw"];
-const MOST = 4; // charts that are drawn unasked
+const FIRST = { Rates: 3, Attitude: 3, Commands: 4, Position: 3 }; // channels that are drawn unasked, by group
+const MOST = 3; // charts of them
 let known = "";
 
 // What is drawn of a log that has just come: rates, attitude and commands where it has them, else its first channels.
@@ -28,7 +30,10 @@ function greet() {
   for (const chart of state.charts) chart.channels = chart.channels.filter((name) => there.has(name));
   for (let i = state.charts.length - 1; i >= 0; i--) if (!state.charts[i].channels.length) state.charts.splice(i, 1);
   if (grown || !state.charts.length) {
-    for (const name of FIRST) if (state.charts.length < MOST) state.draw(name, true);
+    for (const [title, count] of Object.entries(FIRST)) {
+      const of = [...there.values()].filter((channel) => channel.group === title && !/^q[wxyz]$/.test(channel.name));
+      if (state.charts.length < MOST) for (const channel of of.slice(0, count)) state.draw(channel.name, true);
+    }
     if (!state.charts.length) for (const name of [...there.keys()].slice(0, 3)) state.draw(name, true);
   }
   views.count();
@@ -36,7 +41,7 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, drop]) part.begin();
+for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, drop]) part.begin();
 state.on("logs", greet);
 theme.begin();
 const told = await log_list.refresh();
