@@ -40,7 +40,7 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 def places() -> dict[str, str]:
     """Every public name and where it is defined, "package.module:name"."""
-    return {"read": "swashplate:read", **{name: public.place(name) for name in public.NAMES}}
+    return {name: public.place(name) for name in public.NAMES}
 
 
 def reference() -> str:
@@ -51,7 +51,7 @@ def reference() -> str:
     """
     grouped: dict[str, list[str]] = {folder: [] for folder in GROUPS}
     for name, place in sorted(places().items(), key=lambda item: item[0].lower()):
-        folder = "flights" if name == "read" else place.split(":")[0].split(".")[1]
+        folder = place.split(":")[0].split(".")[1]
         grouped[folder].append(entry(name, place))
     parts = [f"## {GROUPS[folder]}\n\n" + "\n\n".join(made) for folder, made in grouped.items() if made]
     return "```{py:module} swashplate\n```\n\n" + "\n\n".join(parts)
