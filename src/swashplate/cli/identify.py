@@ -215,7 +215,9 @@ def show(
         )
     elif not quiet:
         console().print(fit_table(fit))
+        from swashplate.cli.outputs import place_of
+
         lines = [f"! {text}" for _, text in banners(fit, validation)]
         lines += [f"{label + ':':11} {words}" for label, words, _ in summary(fit, validation)]
-        lines += [f"Report:     {out / 'report.html' if out else 'not written (give --out DIR)'}"]
+        lines += [f"Report:     {place_of(out, 'report.html', FILES) if out else 'not written (give --out DIR)'}"]
         typer.echo("\n" + "\n".join(lines))
