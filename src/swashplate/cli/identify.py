@@ -129,6 +129,9 @@ def show(made: Identification, *, out: Path | None, json: bool, quiet: bool) -> 
     if json:
         typer.echo(as_json(made.to_document()))
     elif not quiet:
+        from swashplate.api.identification import FILES
+        from swashplate.cli.outputs import place_of
+
         console().print(fit_table(made.fit) if hasattr(made.fit.model, "card") else repr(made.fit))
-        place = out / "report.html" if out else "not written (give --out DIR)"
+        place = place_of(out, "report.html", FILES) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))
