@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from swashplate.flights.flight import Flight
     from swashplate.flights.inspect import inspect
     from swashplate.flights.maneuvers.series import parse as maneuver
+    from swashplate.flights.rotor_speed import rotor_speed
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.state_space_fit import fit_state_space
@@ -133,6 +134,7 @@ __all__ = [
     "replay",
     "report",
     "respond",
+    "rotor_speed",
     "show_replay",
     "simulate",
     "simulate_adaptive",

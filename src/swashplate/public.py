@@ -39,6 +39,7 @@ _LIGHT: Mapping[str, str] = {
     "read_control": "swashplate.export.control_json:read_control",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
+    "rotor_speed": "swashplate.flights.rotor_speed:rotor_speed",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",
     "structure": "swashplate.models.catalogue:structure",
     "suggest_gains": "swashplate.api.gains:suggest_gains",
