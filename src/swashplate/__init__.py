@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
     from swashplate.flights.readers.read import read
+    from swashplate.flights.rotor_speed import rotor_speed
     from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
@@ -183,6 +184,7 @@ __all__ = [
     "report",
     "residuals",
     "respond",
+    "rotor_speed",
     "show_replay",
     "simulate",
     "simulate_adaptive",

@@ -54,6 +54,7 @@ _LIGHT: Mapping[str, str] = {
     "respond": "swashplate.identification.responses.respond:respond",
     "spectrogram": "swashplate.flights.spectrum:spectrogram",
     "spectrum": "swashplate.flights.spectrum:spectrum",
+    "rotor_speed": "swashplate.flights.rotor_speed:rotor_speed",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",
     "structure": "swashplate.models.catalogue:structure",
     "suggest_gains": "swashplate.api.gains:suggest_gains",

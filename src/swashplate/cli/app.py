@@ -29,6 +29,7 @@ from swashplate.cli import (
     plot,
     replay,
     respond,
+    rotor_speed,
     simulate,
     trim,
     validate,
@@ -83,6 +84,7 @@ app.command("replay", short_help="Look at a logged flight beside a model's predi
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("plot", short_help="Draw logs over time or frequency, several over each other.")(plot.plot)
+app.command("rotor-speed", short_help="Measure rotor speed from vibration in a log.")(rotor_speed.rotor_speed)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
