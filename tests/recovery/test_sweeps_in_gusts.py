@@ -140,10 +140,10 @@ def test_fifty_seeds(truth: StateSpaceModel) -> None:
         {
             "title": "Sweeps as their own references, in gusts from none to severe",
             "text": "50 seeds, ten in each wind, each flown by a program and by hand (irregular speed and size, "
-            "pauses, corrections): four records of 120 s of the published R-50 in a hold, no reference recorded. Of the points "
-            f"called usable (coherence of 0.6 or more) {share:.1f} % lie within max(1 dB, 3 errors) and max(7 deg, 3 "
-            f"errors) (99 wanted); of those that the true reference makes usable {kept:.1f} % are called so "
-            "(90 wanted). The last column: the direct estimate at the points that it calls usable.",
+            "pauses, corrections): four records of 120 s of the published R-50 in a hold, no reference recorded. "
+            f"Of the points called usable (coherence of 0.6 or more) {share:.1f} % lie within max(1 dB, 3 errors) and "
+            f"max(7 deg, 3 errors) (99 wanted); of those that the true reference makes usable {kept:.1f} % are "
+            "called so (90 wanted). The last column: the direct estimate at the points that it calls usable.",
             "columns": ["flown", "gusts", "points", "right [%]", "of what could be [%]", "direct right [%]"],
             "rows": rows,
             "passed": bool(passed),

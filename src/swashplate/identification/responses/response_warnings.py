@@ -94,8 +94,8 @@ def untold(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
             continue
         teller = "the references tell" if found.method == "joint" else "its sweep tells"
         words.append(
-            f"{teller} too little of '{name}' at {_bands(found.omega, lost)}, where a loop's answer to gusts rules it: no "
-            "number is given there. Sweep slower or larger."
+            f"{teller} too little of '{name}' at {_bands(found.omega, lost)}, where a loop's answer to gusts rules it: "
+            "no number is given there. Sweep slower or larger."
         )
     return words
 
@@ -203,8 +203,8 @@ def without_unswept(
     low, high = found.omega[lines[[0, -1]]] / TWO_PI
     return replace(found, response=response), [
         f"no sweep of {names} was found, and at {low:.3g}-{high:.3g} Hz feedback biases the direct estimates of the "
-        "other inputs: no number is given for it up to there. Name its excitation with --references; --direct gives the "
-        "direct estimate."
+        "other inputs: no number is given for it up to there. Name its excitation with --references; --direct gives "
+        "the direct estimate."
     ]
 
 
