@@ -70,7 +70,7 @@ def tipping(**values: float) -> Vehicle:
     )
 
 
-def tipped(seed: int, *, seconds: float = 12.0, dt: float = 0.04, gust: float = 1.0) -> Flight:
+def tipped(seed: int, *, seconds: float = 12.0, dt: float = 0.04, gust: float = 1.0, noise: float = 1.0) -> Flight:
     """A record at 25 Hz: steps and a sine on top of a feedback, straight between samples, gusts on both rates."""
     random, n, fine = np.random.default_rng(seed), round(seconds / dt), 20
     t, x, rows, xp = np.arange(n) * dt, np.zeros(2), [], FloatBackend()
@@ -85,5 +85,5 @@ def tipped(seed: int, *, seconds: float = 12.0, dt: float = 0.04, gust: float = 
             now = Stick(stick[k] + (stick[after] - stick[k]) * (i + 0.5) / fine)
             dx = np.array(rates(Tilt(*x), now, Numbers(**TRUTH), Environment(), xp))
             x = x + dt / fine * dx + gust * GUST * np.sqrt(dt / fine) * random.standard_normal(2)
-    seen = np.array(rows) + NOISE * random.standard_normal((n, 2))
+    seen = np.array(rows) + noise * NOISE * random.standard_normal((n, 2))
     return Flight({"uniform": stream(t, {"stick": stick, "theta": seen[:, 0], "q": seen[:, 1]}, {"stick": "1"})})
