@@ -35,6 +35,7 @@ class Question:
         keep_unexcited, wind: see `identify`.
         environment: wind, density and gravity.
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
+        horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
         progress: told the iteration and the cost.
     """
 
@@ -50,6 +51,7 @@ class Question:
     environment: Environment | None = None
     shifts: bool | None = None
     biases: Sequence[str] = ()
+    horizon: Sequence[float] | None = None
     progress: Callable[[int, float], None] | None = None
 
     @property

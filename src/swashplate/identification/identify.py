@@ -34,6 +34,7 @@ def identify(
     environment: Environment | None = None,
     shifts: bool | None = None,
     biases: Sequence[str] = (),
+    horizon: Sequence[float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Any, Any]:
     """Identify a model's parameters from one or more conditioned flights, or from frequency responses.
@@ -60,6 +61,9 @@ def identify(
         environment: wind, density and gravity, for equations of your own.
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
+        horizon: (FIRST, LAST) in seconds: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead
+            small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
+            of this criterion, corrected for predictions that overlap.
         progress: called with the iteration's number and cost.
 
     Returns:
@@ -90,15 +94,21 @@ def identify(
         environment=environment,
         shifts=shifts,
         biases=tuple(biases),
+        horizon=None if horizon is None else tuple(horizon),
         progress=progress,
     )
     name, estimator = _suited(model, data, method)
     unheard = sorted(set(question.asked) - estimator.takes)
     if unheard:
+        others = [
+            n for n in ESTIMATORS if set(unheard) <= ESTIMATORS[n].takes and not ESTIMATORS[n].unsuited(model, data)
+        ]
         raise IdentificationError(
             f"the method '{name}' does not know it for this model; it takes {', '.join(sorted(estimator.takes))}.",
             channel=", ".join(unheard),
-            hint="Leave it away, or choose another method.",
+            hint=f"Leave it away, or choose method {' or '.join(n.split('/')[0] for n in others)}."
+            if others
+            else "Leave it away, or choose another method.",
         )
     return estimator.estimate(model, data, question)
 

@@ -18,7 +18,7 @@ from swashplate.identification.core.parameters import Free, parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import sources_of
-from swashplate.identification.core.time_fit import TimeDetails, check_method, result_of, solve
+from swashplate.identification.core.time_fit import TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
@@ -42,6 +42,7 @@ def fit_vehicle(
     shifts: bool = False,
     biases: Sequence[str] = (),
     iterations: int = 80,
+    horizon: Sequence[float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Vehicle, TimeDetails]:
     """Fit parameters of a vehicle's equations to records in time by maximum likelihood.
@@ -60,6 +61,7 @@ def fit_vehicle(
         shifts: constants in the states' rates, per record.
         biases: outputs with a constant of their own, per record.
         iterations: at most this many.
+        horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         progress: called with the iteration and the cost.
 
     Returns:
@@ -71,6 +73,7 @@ def fit_vehicle(
     """
     began = time.perf_counter()
     check_method(method)
+    ahead = ahead_of(horizon, method)
     enable_double_precision()
     enable_compilation_cache()
     outputs = tuple(outputs)
@@ -80,6 +83,13 @@ def fit_vehicle(
     if unknown:
         raise IdentificationError(f"is none of the outputs {', '.join(outputs)}.", channel=", ".join(unknown))
     table = parameterize(vehicle, free, ties=ties, priors=priors)
+    beside = [*(item.name for item in table.of_records), *table.noises]
+    if beside:
+        raise IdentificationError(
+            f"'{method}' has no such constants of records and no such noise.",
+            channel=", ".join(beside),
+            hint="Free it with method 'prediction-error' of a helicopter whose pose was tracked, or shifts and biases.",
+        )
     pieces = records(flights, vehicle, outputs=outputs)
     likelihood = VehicleErrors(
         table,
@@ -89,7 +99,7 @@ def fit_vehicle(
         shifts=shifts,
         biases=tuple(biases),
     )
-    solved = solve(likelihood, iterations=iterations, progress=progress)
+    solved = solve(likelihood, iterations=iterations, progress=progress, horizon=ahead)
     sources = tuple(piece.name for piece in pieces)
     values = table.identified([solved.numbers[n] for n in table.names])
     origin = f"identified by {method} from {', '.join(sources)}"
@@ -128,9 +138,12 @@ class VehicleEstimator:
     """`fit_vehicle` by one of its methods, as an estimator."""
 
     method: str
-    takes: frozenset[str] = frozenset(
-        {"free", "ties", "priors", "outputs", "iterations", "environment", "shifts", "biases", "progress"}
-    )
+
+    @property
+    def takes(self) -> frozenset[str]:
+        filtered = set() if self.method == "output-error" else {"horizon"}
+        usual = {"free", "ties", "priors", "outputs", "iterations", "environment", "shifts", "biases", "progress"}
+        return frozenset(usual | filtered)
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         if isinstance(data, FrequencyResponse):
@@ -163,6 +176,7 @@ class VehicleEstimator:
             shifts=bool(question.shifts),
             biases=question.biases,
             iterations=80 if question.iterations is None else question.iterations,
+            horizon=question.horizon,
             progress=question.progress,
         )
 
