@@ -43,7 +43,14 @@ _BALANCE = (
     Free("tau_gust_vertical", 1.0, source="how long gusts of heave last"),
     Free("drift_vertical", 1.0, source="how heave drifts"),
 )
+_SYMMETRY = "symmetry, give or take what bent levers, unlike servos and a skew bar make of it"
+_ASYMMETRY = (
+    Free("linkage_asymmetry_lower", 0.1, 0.0, 0.15, source=_SYMMETRY),
+    Free("phase_asymmetry_lower", 0.1, 0.0, 0.15, source=_SYMMETRY),
+    Free("linkage_asymmetry_upper", 0.1, 0.0, 0.15, source=_SYMMETRY),
+)
 _TIES = (*_PAPER_TIES, *_LINEAR_TIES)
+_BALANCED_TIES = (*_TIES, "k_thrust_lower = 3.1531e-05 / 2.2607e-05 * k_thrust_upper")
 _SET = (("bar_heading_transport", 1.0),)
 
 CHOICES: dict[str, Choice] = {
@@ -72,7 +79,14 @@ CHOICES: dict[str, Choice] = {
         "full, and what balances torque and weight: the upper rotor's torque, both thrusts, motor trims of every "
         "record; gusts and drifts of yaw and heave with numbers of their own",
         (*_FULL, *_BALANCE),
-        (*_TIES, "k_thrust_lower = 3.1531e-05 / 2.2607e-05 * k_thrust_upper"),
+        _BALANCED_TIES,
+        _SET,
+    ),
+    "asymmetric": Choice(
+        "asymmetric",
+        "balanced, and how servos, swashplate phase and bar differ between roll and pitch",
+        (*_FULL, *_BALANCE, *_ASYMMETRY),
+        _BALANCED_TIES,
         _SET,
     ),
 }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from swashplate.errors import CardError
-from swashplate.models.card import Card
+from swashplate.models.card import Card, Parameter
 from swashplate.models.coax import UNITS, CoaxInputs, CoaxParameters, CoaxState, Drive, derivatives, specific_force
 from swashplate.models.coax_choices import CHOICES
 from swashplate.models.nesting import rebuild
@@ -58,6 +59,7 @@ def pose(vehicle: Vehicle) -> Pose:
                 lag=stabilizer_bar.phase_lag(par.k_zeta_upper, par.o_zeta_upper, state.drive.omega_upper),
                 mixing=vehicle.card.options.get("mixing", "rotation"),
                 xp=_XP,
+                linkage_asymmetry=par.linkage_asymmetry_upper,
             )
         rotors = []
         for plane, k, omega in (
@@ -127,6 +129,28 @@ TRAITS = Traits(
 )
 
 
+_SYMMETRY = Parameter(
+    value=0.0,
+    unit="1",
+    source="not in the paper; zero gives its equations",
+    status="assumed",
+    lower=-0.9,
+    upper=0.9,
+)
+_ASYMMETRIES = {
+    "linkage_asymmetry_lower": _SYMMETRY,
+    "phase_asymmetry_lower": replace(_SYMMETRY, unit="rad", lower=-0.7, upper=0.7),
+    "linkage_asymmetry_upper": _SYMMETRY,
+}
+"""What cards that were written before these numbers do not have."""
+
+
+def _symmetric_where_silent(card: Card) -> Card:
+    """The card with the symmetric values of what it does not name."""
+    missing = {name: entry for name, entry in _ASYMMETRIES.items() if name not in card.parameters}
+    return replace(card, parameters={**card.parameters, **missing}) if missing else card
+
+
 def coax(card: Card) -> Vehicle:
     """The CoaX with a card's numbers and options (`bar`, `mixing`)."""
     options = {"bar": True, "mixing": "rotation", **card.options}
@@ -137,7 +161,7 @@ def coax(card: Card) -> Vehicle:
             where=card.where,
             channel="options",
         )
-    card.checked_against(UNITS)
+    card = _symmetric_where_silent(card).checked_against(UNITS)
     bar = StabilizerBar(0.0, 0.0) if options["bar"] else None
     bar_names = ("eta_bar", "zeta_bar") if options["bar"] else ()
     return Vehicle(

@@ -22,7 +22,7 @@ def _traced(plan: Plan, steps: tuple[int, ...], data: Any, row: Any, starts: Any
     """Measured less foretold after `steps` samples from each start, (records, starts, horizons, outputs)."""
     parameters, nuisances, noise = unpack(plan, data, row)
 
-    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, nuisance: Nuisance) -> Any:
+    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, starts: Any, nuisance: Nuisance) -> Any:
         _, _, states = filter_record(
             plan.model,
             y,
@@ -44,7 +44,7 @@ def _traced(plan: Plan, steps: tuple[int, ...], data: Any, row: Any, starts: Any
         return jax.vmap(run)(starts)
 
     own = (data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], data["velocity"])
-    return jax.vmap(one)(*own, nuisances)
+    return jax.vmap(one)(*own, starts, nuisances)
 
 
 def _foretold(
