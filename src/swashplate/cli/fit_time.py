@@ -37,6 +37,7 @@ def fit_time(
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")
     ] = None,
     iterations: Annotated[int, typer.Option("--iterations", help="At most this many.", min=1)] = 80,
+    horizon: options.HorizonAhead = None,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
@@ -81,6 +82,7 @@ def fit_time(
             biases=flying.names(biases),
             method=method,
             iterations=iterations,
+            horizon=options.seconds_ahead(horizon),
             progress=lambda i, cost: line.say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
         )
         line.say("flying the model")

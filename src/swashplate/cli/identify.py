@@ -40,7 +40,7 @@ class AskedIdentification:
 
     Attributes:
         free: a ready choice or parameter names.
-        method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as in `swashplate.identify`.
+        method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind, horizon: as in `swashplate.identify`.
     """
 
     free: str | Sequence[str] = "full"
@@ -52,6 +52,7 @@ class AskedIdentification:
     iterations: int = 60
     keep_unexcited: bool = False
     wind: bool = False
+    horizon: Sequence[float] | None = None
 
 
 def identify(
@@ -60,7 +61,7 @@ def identify(
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     free: Annotated[
-        str, typer.Option("--free", help="Ready choice (full, flight) or parameter names separated by commas.")
+        str, typer.Option("--free", help="Ready choice (full, flight, ...) or parameter names separated by commas.")
     ] = "full",
     method: Annotated[Method, typer.Option("--method", help="How to estimate.")] = Method.PREDICTION_ERROR,
     fix: Annotated[
@@ -84,6 +85,7 @@ def identify(
     wind: Annotated[
         bool, typer.Option("--wind", help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
     ] = False,
+    horizon: options.HorizonAhead = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -112,6 +114,7 @@ def identify(
         iterations=iterations,
         keep_unexcited=keep_unexcited,
         wind=wind,
+        horizon=options.seconds_ahead(horizon),
     )
     aircraft = find(vehicle)
     how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
@@ -169,6 +172,7 @@ def run(
             iterations=question.iterations,
             keep_unexcited=question.keep_unexcited,
             wind=question.wind,
+            horizon=question.horizon,
             progress=lambda i, cost: line.say(
                 "fitting", done=i, total=question.iterations, note=f"iteration {i}, cost {cost:.6g}"
             ),

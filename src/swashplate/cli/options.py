@@ -47,6 +47,14 @@ HoldOut = Annotated[
     list[str] | None,
     typer.Option("--hold-out", help="Flight that the fit never sees, to validate on.", autocompletion=_flight_names),
 ]
+HorizonAhead = Annotated[
+    str | None,
+    typer.Option(
+        "--horizon",
+        metavar="FIRST,LAST",
+        help="After maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead small, e.g. 0.25,2.",
+    ),
+]
 FlightName = Annotated[str, typer.Argument(metavar="FLIGHT", help=f"{_FLIGHT}.", autocompletion=_flight_names)]
 OutFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; it is made if missing.")
@@ -114,6 +122,11 @@ def fixed_values(texts: Sequence[str] | None) -> dict[str, float]:
     return {
         name: numbers(text, option="--fix", count=1)[0] for name, text in assignments(texts, option="--fix").items()
     }
+
+
+def seconds_ahead(text: str | None) -> tuple[float, ...] | None:
+    """`--horizon first,last`, or one number."""
+    return None if text is None else tuple(numbers(text, option="--horizon"))
 
 
 def prior_card_name(texts: Sequence[str] | None) -> tuple[str | None, list[str]]:

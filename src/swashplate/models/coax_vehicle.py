@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ from swashplate.physics import rotor, stabilizer_bar
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.physics.frames import Euler
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
@@ -107,6 +108,47 @@ def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any) -> dic
     return {**speeds, "eta_bar": attitude.phi, "zeta_bar": attitude.theta}
 
 
+_BALANCING = ("k_torque_upper", "k_torque_lower", "k_thrust_upper", "k_thrust_lower")
+
+
+def balance(start: Vehicle, found: Vehicle, trims: Mapping[str, float]) -> tuple[str, ...]:
+    """What takes the place of the yaw and the fall that the start's numbers leave in the hover that was flown.
+
+    Args:
+        start, found: before and after the fit.
+        trims: of the motors, "trim_motor_upper" and "trim_motor_lower", zero where they are not named.
+
+    Returns:
+        Nothing where the fit moved neither trims nor factors of torque and thrust.
+    """
+    before, after = start.values(), found.values()
+    moved = {n: getattr(after, n) / getattr(before, n) - 1.0 for n in _BALANCING if getattr(before, n)}
+    upper, lower = (trims.get(f"trim_motor_{side}", 0.0) for side in ("upper", "lower"))
+    if not (any(moved.values()) or upper or lower):
+        return ()
+    motors = CoaxInputs(*hover(after, after.voltage_nominal, _XP)[1])
+
+    def left(trimmed: bool) -> tuple[float, float]:
+        """Yaw [rad/s^2] and climb [m/s^2] by the start's factors at the logged commands, with the trims or without."""
+        share = 0.0 if trimmed else 1.0
+        logged = motors._replace(
+            motor_upper=motors.motor_upper - share * upper, motor_lower=motors.motor_lower - share * lower
+        )
+        speeds = settled(logged, after, after.voltage_nominal, Euler(0.0, 0.0, 0.0))
+        low, high = speeds["omega_lower"] ** 2, speeds["omega_upper"] ** 2
+        yaw = (before.k_torque_upper * high - before.k_torque_lower * low) / after.inertia_zz
+        return yaw, (before.k_thrust_upper * high + before.k_thrust_lower * low) / after.mass - LABORATORY_GRAVITY
+
+    (yaw, climb), (yaw_trimmed, climb_trimmed) = left(False), left(True)
+    factors = ", ".join(f"{name} {100.0 * share:+.1f} %" for name, share in moved.items() if share)
+    return (
+        f"balance: the numbers before the fit leave {yaw:+.1f} rad/s^2 of yaw and {climb:+.2f} m/s^2 of climb in the "
+        f"hover that was flown, {yaw_trimmed:+.1f} and {climb_trimmed:+.2f} with the motor trims found "
+        f"({upper:+.4f} upper, {lower:+.4f} lower); the factors make up for the rest ({factors or 'none moved'}). One "
+        "hover cannot tell a trim from a factor: the priors do.",
+    )
+
+
 _AXES = (
     Axis("roll", {"servo_roll": 1.0}),
     Axis("pitch", {"servo_pitch": 1.0}),
@@ -126,6 +168,7 @@ TRAITS = Traits(
     pose=pose,
     hover=hover,
     settled=settled,
+    balance=balance,
 )
 
 

@@ -103,12 +103,18 @@ def identify_flight(
     identified = _identified(
         found, likelihood.noise_of(row), likelihood.nuisance_of(row), vehicle, parameters, pieces, method
     )
+    told = constants(found)
+    if vehicle.traits.balance is not None:
+        trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
+        notes += vehicle.traits.balance(
+            vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
+        )
     return Result(
         method=method,
         model=identified,
         start=vehicle,
         estimates=parameters,
-        constants=constants(found),
+        constants=told,
         noise=likelihood.noise_of(row),
         nuisance=likelihood.nuisance_of(row),
         names=table.names,
