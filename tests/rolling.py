@@ -90,9 +90,9 @@ A = {value = 0.4}
 """
 
 
-def gusty() -> Flight:
+def gusty(seed: int = 11) -> Flight:
     """Six seconds at 50 Hz in gusts that act on the roll rate."""
-    random, dt, n = np.random.default_rng(11), 0.02, 300
+    random, dt, n = np.random.default_rng(seed), 0.02, 300
     stick = np.sign(np.sin(2.0 * np.arange(n) * dt)) * 0.2 + 0.05 * random.standard_normal(n)
     x, rows = np.zeros(2), []
     for k in range(n):

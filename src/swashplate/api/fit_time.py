@@ -25,6 +25,7 @@ def fit_time(
     start: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     iterations: int = 80,
+    horizon: Sequence[float] | None = None,
     hold_out: Flight | Iterable[Flight] = (),
     rate: float = 100.0,
     cutoff: float = 0.0,
@@ -41,6 +42,7 @@ def fit_time(
         biases: outputs with a constant of their own in each record. shifts: constants in the states' rates.
         start: start values by name. fixed: values of parameters that are held.
         iterations: at most this many.
+        horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         hold_out: flights as logged, to verify on; without them the records of the fit are shown, and marked as such.
         rate, cutoff, names: how flights are brought to one rate, see `uniform_records`.
         say: told what is being done.
@@ -63,6 +65,7 @@ def fit_time(
         biases=biases,
         method=method,
         iterations=iterations,
+        horizon=horizon,
         progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
     )
     say("flying the model")

@@ -96,6 +96,7 @@ def identify_and_validate(
     iterations: int = 60,
     keep_unexcited: bool = False,
     wind: bool = False,
+    horizon: Sequence[float] | None = None,
     names: Sequence[str] | None = None,
     say: Say = silent,
 ) -> Identification:
@@ -105,7 +106,8 @@ def identify_and_validate(
         vehicle: the equations and the numbers to start from.
         flights: conditioned, with their pose tracked.
         hold_out: conditioned flights that the fit never sees.
-        free, method, outputs, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as of `identify`.
+        free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
+        iterations, keep_unexcited, wind, horizon: as of `identify`.
         names: what the user calls the flights and the hold-outs, for messages.
         say: told what is being done.
 
@@ -136,6 +138,7 @@ def identify_and_validate(
         iterations=iterations,
         keep_unexcited=keep_unexcited,
         wind=wind,
+        horizon=horizon,
         progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
     )
     validation = None

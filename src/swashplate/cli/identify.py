@@ -22,7 +22,7 @@ def identify(
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     free: Annotated[
-        str, typer.Option("--free", help="Ready choice (full, flight) or parameter names separated by commas.")
+        str, typer.Option("--free", help="Ready choice (full, flight, ...) or parameter names separated by commas.")
     ] = "full",
     method: Annotated[
         str,
@@ -55,6 +55,7 @@ def identify(
     wind: Annotated[
         bool, typer.Option("--wind", help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
     ] = False,
+    horizon: options.HorizonAhead = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -94,6 +95,7 @@ def identify(
             iterations=iterations,
             keep_unexcited=keep_unexcited,
             wind=wind,
+            horizon=options.seconds_ahead(horizon),
             names=called,
             say=say,
         )

@@ -47,6 +47,14 @@ HoldOut = Annotated[
     list[str] | None,
     typer.Option("--hold-out", help="Flight that the fit never sees, to validate on.", autocompletion=_flight_names),
 ]
+HorizonAhead = Annotated[
+    str | None,
+    typer.Option(
+        "--horizon",
+        metavar="FIRST,LAST",
+        help="After maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead small, e.g. 0.25,2.",
+    ),
+]
 FlightName = Annotated[str, typer.Argument(metavar="FLIGHT", help=f"{_FLIGHT}.", autocompletion=_flight_names)]
 OutFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; it is made if missing.")
@@ -118,6 +126,11 @@ def numbers_by_name(texts: Sequence[str] | None, *, option: str) -> dict[str, fl
 def fixed_values(texts: Sequence[str] | None) -> dict[str, float]:
     """`--fix name=value`, repeated."""
     return numbers_by_name(texts, option="--fix")
+
+
+def seconds_ahead(text: str | None) -> tuple[float, ...] | None:
+    """`--horizon first,last`, or one number."""
+    return None if text is None else tuple(numbers(text, option="--horizon"))
 
 
 def prior_card_name(texts: Sequence[str] | None) -> tuple[str | None, list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ class Noise(NamedTuple):
     `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
+    `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces.
     """
 
     white_tilt: Any = 0.5
@@ -43,6 +45,20 @@ class Noise(NamedTuple):
     wind: Any = 0.0
     tau_wind: Any = 1.0
     speed: Any = 0.0
+    tau_gust_yaw: Any = 0.0
+    drift_yaw: Any = 0.0
+    tau_gust_vertical: Any = 0.0
+    drift_vertical: Any = 0.0
+
+
+SEPARATE: Mapping[str, tuple[str, float, float]] = {
+    "tau_gust_yaw": ("tau_gust_moment", 0.5, 0.5),
+    "drift_yaw": ("drift_moment", 0.3, 1.0),
+    "tau_gust_vertical": ("tau_gust_force", 0.5, 0.5),
+    "drift_vertical": ("drift_force", 0.03, 0.5),
+}
+"""Numbers that yaw and heave may have for themselves: what else stands for each, a first guess, and the standard
+deviation of its logarithm's prior."""
 
 
 class Unrest(NamedTuple):
@@ -87,12 +103,13 @@ def unrest_of(card: Card) -> Unrest:
     noise = card.observer.get("noise", {})
     if not noise or noise.get("wind", 0.0) > 0.0:
         return Unrest()
+    own = {name: noise.get(name, 0.0) or noise[shared] for name, (shared, *_) in SEPARATE.items() if "tau" in name}
     force, moment = np.sqrt(0.5 * noise["tau_gust_force"]), np.sqrt(0.5 * noise["tau_gust_moment"])
     return Unrest(
         force=float(force * noise["gust_horizontal"]),
-        force_down=float(force * noise["gust_vertical"]),
+        force_down=float(np.sqrt(0.5 * own["tau_gust_vertical"]) * noise["gust_vertical"]),
         moment=float(moment * noise["gust_tilt"]),
-        moment_yaw=float(moment * noise["gust_yaw"]),
+        moment_yaw=float(np.sqrt(0.5 * own["tau_gust_yaw"]) * noise["gust_yaw"]),
         force_time=noise["tau_gust_force"],
         moment_time=noise["tau_gust_moment"],
         jolt=max(noise["white_horizontal"], noise["white_vertical"]),

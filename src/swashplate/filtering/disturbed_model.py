@@ -173,7 +173,7 @@ class StochasticModel:
         white = jnp.stack(on_axes(horizontal, vertical, tilt, yaw))
         tilt, yaw, horizontal, vertical = noise[4:8]
         gust = jnp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind])[:g]
-        drift = jnp.stack(on_axes(noise.drift_force, noise.drift_force, noise.drift_moment, noise.drift_moment))
+        drift = jnp.stack(on_axes(*_shared_or_own(noise, "drift")))
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
         spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T
         Q = jax.scipy.linalg.block_diag(
@@ -189,8 +189,7 @@ class StochasticModel:
 
     def _fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
-        force, moment = noise.tau_gust_force, noise.tau_gust_moment
-        taus = [*on_axes(force, force, moment, moment), noise.tau_wind, noise.tau_wind]
+        taus = [*on_axes(*_shared_or_own(noise, "tau_gust")), noise.tau_wind, noise.tau_wind]
         return jnp.exp(-self.dt / jnp.stack(taus[: self.n_gusts]))
 
     def _floor(self, n: int) -> Any:
@@ -249,6 +248,12 @@ class StochasticModel:
             correct=lambda state, measured, _: self.correct(state, measured, gain, nuisance),
             predict=lambda state, now: self.predict(state, noise, advance, now),
         )
+
+
+def _shared_or_own(noise: Noise, kind: str) -> tuple[Any, Any, Any, Any]:
+    """A number of level, downward, tilting and yawing disturbances: down and yaw have their own, where there is one."""
+    force, down, moment, yaw = (getattr(noise, f"{kind}_{name}") for name in ("force", "vertical", "moment", "yaw"))
+    return force, jnp.where(down > 0.0, down, force), moment, jnp.where(yaw > 0.0, yaw, moment)
 
 
 _GUST_NAMES = (*DISTURBED, "x", "y")

@@ -37,6 +37,7 @@ class Question:
         environment: wind, density and gravity.
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
         band: lowest and highest frequency [Hz], for methods that fit lines of a transform.
+        horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
         progress: told the iteration and the cost.
     """
 
@@ -53,6 +54,7 @@ class Question:
     shifts: bool | None = None
     biases: Sequence[str] = ()
     band: tuple[float, float] | None = None
+    horizon: Sequence[float] | None = None
     progress: Callable[[int, float], None] | None = None
 
     @property

@@ -35,6 +35,7 @@ def identify(
     shifts: bool | None = None,
     biases: Sequence[str] = (),
     band: tuple[float, float] | None = None,
+    horizon: Sequence[float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Any, Any]:
     """Identify a model's parameters from one or more conditioned flights, or from frequency responses.
@@ -63,6 +64,9 @@ def identify(
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
         band: lowest and highest frequency [Hz] for the method "frequency-lines".
+        horizon: (FIRST, LAST) in seconds: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead
+            small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
+            of this criterion, corrected for predictions that overlap.
         progress: called with the iteration's number and cost.
 
     Returns:
@@ -94,15 +98,21 @@ def identify(
         shifts=shifts,
         biases=tuple(biases),
         band=band,
+        horizon=None if horizon is None else tuple(horizon),
         progress=progress,
     )
     name, estimator = _suited(model, data, method)
     unheard = sorted(set(question.asked) - estimator.takes)
     if unheard:
+        others = [
+            n for n in ESTIMATORS if set(unheard) <= ESTIMATORS[n].takes and not ESTIMATORS[n].unsuited(model, data)
+        ]
         raise IdentificationError(
             f"the method '{name}' does not know it for this model; it takes {', '.join(sorted(estimator.takes))}.",
             channel=", ".join(unheard),
-            hint="Leave it away, or choose another method.",
+            hint=f"Leave it away, or choose method {' or '.join(n.split('/')[0] for n in others)}."
+            if others
+            else "Leave it away, or choose another method.",
         )
     return estimator.estimate(model, data, question)
 

@@ -76,6 +76,9 @@ UNITS: dict[str, str] = {
     "bar_heading_transport": "1",
     "design_angle_upper": "rad",
     "design_angle_lower": "rad",
+    "linkage_asymmetry_lower": "1",
+    "phase_asymmetry_lower": "rad",
+    "linkage_asymmetry_upper": "1",
 }
 """Every parameter and its unit, in the order of the equations' tuple."""
 
@@ -179,6 +182,7 @@ def loads(
             lag=stabilizer_bar.phase_lag(par.k_zeta_upper, par.o_zeta_upper, drive.omega_upper),
             mixing=mixing,
             xp=xp,
+            linkage_asymmetry=par.linkage_asymmetry_upper,
         )
         held = _turning(drive.omega_upper, par.k_drive_upper, xp)
         upper = TipPathPlane(held * upper.alpha, held * upper.beta)
@@ -191,6 +195,8 @@ def loads(
         lag=stabilizer_bar.phase_lag(par.k_zeta_lower, par.o_zeta_lower, drive.omega_lower),
         mixing=mixing,
         xp=xp,
+        linkage_asymmetry=par.linkage_asymmetry_lower,
+        phase_asymmetry=par.phase_asymmetry_lower,
     )
     held = _turning(drive.omega_lower, par.k_drive_lower, xp)
     lower_rates = swashplate.lower_rotor_rates(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from swashplate.errors import CardError
-from swashplate.models.card import Card
+from swashplate.models.card import Card, Parameter
 from swashplate.models.coax import UNITS, CoaxInputs, CoaxParameters, CoaxState, Drive, derivatives, specific_force
 from swashplate.models.coax_choices import CHOICES
 from swashplate.models.nesting import rebuild
@@ -17,6 +18,7 @@ from swashplate.physics import rotor, stabilizer_bar
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.drive_train import steady_speed
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.physics.frames import Euler
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
@@ -58,6 +60,7 @@ def pose(vehicle: Vehicle) -> Pose:
                 lag=stabilizer_bar.phase_lag(par.k_zeta_upper, par.o_zeta_upper, state.drive.omega_upper),
                 mixing=vehicle.card.options.get("mixing", "rotation"),
                 xp=_XP,
+                linkage_asymmetry=par.linkage_asymmetry_upper,
             )
         rotors = []
         for plane, k, omega in (
@@ -105,6 +108,47 @@ def settled(inputs: Any, parameters: Any, voltage: Scalar, attitude: Any) -> dic
     return {**speeds, "eta_bar": attitude.phi, "zeta_bar": attitude.theta}
 
 
+_BALANCING = ("k_torque_upper", "k_torque_lower", "k_thrust_upper", "k_thrust_lower")
+
+
+def balance(start: Vehicle, found: Vehicle, trims: Mapping[str, float]) -> tuple[str, ...]:
+    """What takes the place of the yaw and the fall that the start's numbers leave in the hover that was flown.
+
+    Args:
+        start, found: before and after the fit.
+        trims: of the motors, "trim_motor_upper" and "trim_motor_lower", zero where they are not named.
+
+    Returns:
+        Nothing where the fit moved neither trims nor factors of torque and thrust.
+    """
+    before, after = start.values(), found.values()
+    moved = {n: getattr(after, n) / getattr(before, n) - 1.0 for n in _BALANCING if getattr(before, n)}
+    upper, lower = (trims.get(f"trim_motor_{side}", 0.0) for side in ("upper", "lower"))
+    if not (any(moved.values()) or upper or lower):
+        return ()
+    motors = CoaxInputs(*hover(after, after.voltage_nominal, _XP)[1])
+
+    def left(trimmed: bool) -> tuple[float, float]:
+        """Yaw [rad/s^2] and climb [m/s^2] by the start's factors at the logged commands, with the trims or without."""
+        share = 0.0 if trimmed else 1.0
+        logged = motors._replace(
+            motor_upper=motors.motor_upper - share * upper, motor_lower=motors.motor_lower - share * lower
+        )
+        speeds = settled(logged, after, after.voltage_nominal, Euler(0.0, 0.0, 0.0))
+        low, high = speeds["omega_lower"] ** 2, speeds["omega_upper"] ** 2
+        yaw = (before.k_torque_upper * high - before.k_torque_lower * low) / after.inertia_zz
+        return yaw, (before.k_thrust_upper * high + before.k_thrust_lower * low) / after.mass - LABORATORY_GRAVITY
+
+    (yaw, climb), (yaw_trimmed, climb_trimmed) = left(False), left(True)
+    factors = ", ".join(f"{name} {100.0 * share:+.1f} %" for name, share in moved.items() if share)
+    return (
+        f"balance: the numbers before the fit leave {yaw:+.1f} rad/s^2 of yaw and {climb:+.2f} m/s^2 of climb in the "
+        f"hover that was flown, {yaw_trimmed:+.1f} and {climb_trimmed:+.2f} with the motor trims found "
+        f"({upper:+.4f} upper, {lower:+.4f} lower); the factors make up for the rest ({factors or 'none moved'}). One "
+        "hover cannot tell a trim from a factor: the priors do.",
+    )
+
+
 _AXES = (
     Axis("roll", {"servo_roll": 1.0}),
     Axis("pitch", {"servo_pitch": 1.0}),
@@ -125,7 +169,30 @@ TRAITS = Traits(
     pose=pose,
     hover=hover,
     settled=settled,
+    balance=balance,
 )
+
+
+_SYMMETRY = Parameter(
+    value=0.0,
+    unit="1",
+    source="not in the paper; zero gives its equations",
+    status="assumed",
+    lower=-0.9,
+    upper=0.9,
+)
+_ASYMMETRIES = {
+    "linkage_asymmetry_lower": _SYMMETRY,
+    "phase_asymmetry_lower": replace(_SYMMETRY, unit="rad", lower=-0.7, upper=0.7),
+    "linkage_asymmetry_upper": _SYMMETRY,
+}
+"""What cards that were written before these numbers do not have."""
+
+
+def _symmetric_where_silent(card: Card) -> Card:
+    """The card with the symmetric values of what it does not name."""
+    missing = {name: entry for name, entry in _ASYMMETRIES.items() if name not in card.parameters}
+    return replace(card, parameters={**card.parameters, **missing}) if missing else card
 
 
 def coax(card: Card) -> Vehicle:
@@ -138,7 +205,7 @@ def coax(card: Card) -> Vehicle:
             where=card.where,
             channel="options",
         )
-    card.checked_against(UNITS)
+    card = _symmetric_where_silent(card).checked_against(UNITS)
     bar = StabilizerBar(0.0, 0.0) if options["bar"] else None
     bar_names = ("eta_bar", "zeta_bar") if options["bar"] else ()
     return Vehicle(

@@ -88,6 +88,8 @@ class Traits:
             they are found where they rest.
         doubts: what of its equations does not hold at a state, in words by kind; None where nothing is known.
         power: of a state, the shaft power [W]; None where it has none.
+        balance: from the vehicle before a fit, the one after it and the motors' trims, what keeps it in balance, in
+            words; None where nothing is to be said.
         voltage_seconds: over which a logged voltage is averaged each way: long where it sags slowly and is noisy, short
             where the motors' commands are shares of it.
     """
@@ -117,4 +119,5 @@ class Traits:
     settled: Settled | None = None
     doubts: Doubts | None = None
     power: Callable[[Model, Array, Array, Environment], float] | None = None
+    balance: Callable[[Model, Model, Mapping[str, float]], Sequence[str]] | None = None
     voltage_seconds: float = 8.0

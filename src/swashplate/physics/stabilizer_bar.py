@@ -37,15 +37,23 @@ def stabilizer_bar_rates(
 
 
 def upper_tip_path_plane(
-    bar: StabilizerBar, attitude: Euler, *, linkage: Scalar, lag: Scalar, mixing: str, xp: Backend
+    bar: StabilizerBar,
+    attitude: Euler,
+    *,
+    linkage: Scalar,
+    lag: Scalar,
+    mixing: str,
+    xp: Backend,
+    linkage_asymmetry: Scalar = 0.0,
 ) -> TipPathPlane:
     """Tilt of the upper rotor from the bar's tilt in body axes (Fankhauser et al., eqs 9 to 11).
 
     A lag in the upper rotor's sense (counter-clockwise from above) turns the tilt vector by -lag about body z
-    (`mixing` = "rotation"). The paper prints a plus in (11) (`mixing` = "as_printed"), which is no rotation.
+    (`mixing` = "rotation"). The paper prints a plus in (11) (`mixing` = "as_printed"), which is no rotation. Not in the
+    paper: `linkage_asymmetry` a lets the bar's roll tilt act by 1 + a and its pitch tilt by 1 - a times the linkage.
     """
-    alpha_bar = bar.eta - attitude.phi
-    beta_bar = bar.zeta - attitude.theta
+    alpha_bar = (1.0 + linkage_asymmetry) * (bar.eta - attitude.phi)
+    beta_bar = (1.0 - linkage_asymmetry) * (bar.zeta - attitude.theta)
     c, s = xp.cos(lag), xp.sin(lag)
     sign = 1.0 if mixing == "as_printed" else -1.0
     return TipPathPlane(

@@ -31,19 +31,32 @@ class FlapResponse(NamedTuple):
 
 
 def swashplate_tilt(
-    servo_roll: Scalar, servo_pitch: Scalar, *, linkage: Scalar, lag: Scalar, mixing: str, xp: Backend
+    servo_roll: Scalar,
+    servo_pitch: Scalar,
+    *,
+    linkage: Scalar,
+    lag: Scalar,
+    mixing: str,
+    xp: Backend,
+    linkage_asymmetry: Scalar = 0.0,
+    phase_asymmetry: Scalar = 0.0,
 ) -> TipPathPlane:
     """Steady tilt that the servos ask for [rad] (Fankhauser et al., eqs 13 and 14).
 
     Commands (+1, +1) ask for a lean to the right and forward, the vector (1, -1) in (alpha, beta). The lag turns it in
     the lower rotor's sense, clockwise from above, by +lag about body z (`mixing` = "rotation"). The paper prints a
     minus in (13) (`mixing` = "as_printed"); that pair is no rotation and singular at 45 deg.
+
+    Not in the paper: `linkage_asymmetry` a gives the roll servo 1 + a and the pitch servo 1 - a times the linkage,
+    `phase_asymmetry` d [rad] turns the roll servo's tilt by lag + d and the pitch servo's by lag - d: what a bent lever
+    or two unlike servos do. Zeros give the paper's pair.
     """
-    c, s = xp.cos(lag), xp.sin(lag)
     sign = -1.0 if mixing == "as_printed" else 1.0
+    roll, pitch = (1.0 + linkage_asymmetry) * servo_roll, (1.0 - linkage_asymmetry) * servo_pitch
+    of_roll, of_pitch = lag + phase_asymmetry, lag - phase_asymmetry
     return TipPathPlane(
-        linkage * (servo_roll * c + sign * servo_pitch * s),
-        linkage * (servo_roll * s - servo_pitch * c),
+        linkage * (roll * xp.cos(of_roll) + sign * pitch * xp.sin(of_pitch)),
+        linkage * (roll * xp.sin(of_roll) - pitch * xp.cos(of_pitch)),
     )
 
 

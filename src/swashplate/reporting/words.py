@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from swashplate.filtering.disturbances import SEPARATE
 from swashplate.flights.provenance import ProcessingStep
 from swashplate.identification.core.sources import DataSource
 
@@ -40,7 +41,8 @@ def _plain(text: str) -> str:
 def noise_told(noise: Mapping[str, float]) -> dict[str, float]:
     """A noise model without the wind that was not asked for."""
     calm = () if noise.get("wind", 0.0) > 0.0 else ("wind", "tau_wind", "speed")
-    return {name: float(value) for name, value in noise.items() if name not in calm}
+    shared = [name for name in SEPARATE if not noise.get(name, 0.0) > 0.0]
+    return {name: float(value) for name, value in noise.items() if name not in (*calm, *shared)}
 
 
 def percent(value: float, *, digits: int = 0) -> str:

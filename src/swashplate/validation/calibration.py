@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.parameters import Parameterization, trim_of_record
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.time.prediction_error import PredictionError
@@ -25,7 +26,13 @@ def first_part(record: Record, seconds: float) -> Record:
 
 
 def calibrate(
-    vehicle: Vehicle, record: Record, *, noise: Noise, prior: Nuisance, seconds: float = CALIBRATION
+    vehicle: Vehicle,
+    record: Record,
+    *,
+    noise: Noise,
+    prior: Nuisance,
+    seconds: float = CALIBRATION,
+    trims: Mapping[str, float] | None = None,
 ) -> Nuisance:
     """Delays, trims and lever arm of a record by maximum likelihood over its first seconds, the vehicle held.
 
@@ -34,9 +41,12 @@ def calibrate(
 
     Args:
         prior: centre of the priors, e.g. what the fit found on its own records.
+        trims: further trims to find, and the standard deviations of their priors; None: what the vehicle's card says.
     """
+    further = vehicle.card.observer.get("trims", {}) if trims is None else trims
+    table = Parameterization(vehicle, (), of_records=tuple(trim_of_record(n, sigma) for n, sigma in further.items()))
     likelihood = PredictionError(
-        Parameterization(vehicle, ()), [first_part(record, seconds)], noise=noise, estimate_noise=False, nuisance=prior
+        table, [first_part(record, seconds)], noise=noise, estimate_noise=False, nuisance=prior
     )
     found = likelihood.unpack(minimise(likelihood, iterations=30).row)[1]
     return Nuisance(*(float(np.asarray(value).ravel()[0]) for value in found))

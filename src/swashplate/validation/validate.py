@@ -91,6 +91,7 @@ def validate(
         vehicle, published = model, published or started_from(model)
     alone = _same_numbers(vehicle, published)
     noise, prior = observer_of(vehicle)
+    trims = vehicle.card.observer.get("trims", {})
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
@@ -120,7 +121,7 @@ def validate(
             if rivals and alone:
                 rivals[name] = rivals["model"]
                 continue
-            nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration)
+            nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
             rivals[name] = _Rival(
                 flown,
                 nuisance,

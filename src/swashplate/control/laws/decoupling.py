@@ -39,6 +39,7 @@ class Decoupler(NamedTuple):
         k_drive, o_drive, k_voltage, voltage_nominal: the lower rotor's speed (eq. 22).
         across_u, across_v: roll tilt per u |u|, pitch tilt per v |v| [rad s^2/m^2].
         across_u_linear, across_v_linear: the same per speed [rad s/m].
+        linkage_asymmetry, phase_asymmetry: how the servos differ [1, rad] (`physics.swashplate.swashplate_tilt`).
     """
 
     linkage: float
@@ -53,6 +54,8 @@ class Decoupler(NamedTuple):
     across_v: float
     across_u_linear: float
     across_v_linear: float
+    linkage_asymmetry: float = 0.0
+    phase_asymmetry: float = 0.0
 
 
 class ServoCommands(NamedTuple):
@@ -130,6 +133,8 @@ def decoupler(
         across_v=counted * card["a_beta_v"],
         across_u_linear=counted * card["a_alpha_u_linear"],
         across_v_linear=counted * card["a_beta_v_linear"],
+        linkage_asymmetry=card.get("linkage_asymmetry_lower", 0.0),
+        phase_asymmetry=card.get("phase_asymmetry_lower", 0.0),
     )
 
 
@@ -156,14 +161,19 @@ def decouple(
 
     The disc's steady tilt across the motion is -(across u) in alpha and (across v) in beta (eqs 13, 14). The disc is
     asked for alpha = linkage roll + across u and beta = -linkage pitch + across v; then the mixing is inverted:
-    alpha = linkage (s1 c + m s2 s), beta = linkage (s1 s - s2 c) with determinant -linkage^2 (c^2 + m s^2).
+    alpha = linkage (s1 c1 + m s2 s2'), beta = linkage (s1 s1' - s2 c2) with c1, s1' of the roll servo's lag and c2, s2'
+    of the pitch servo's, which are the same without asymmetry; the determinant is -linkage^2 (c1 c2 + m s1' s2').
     """
     lag = estimated_lag(law, motor_lower, voltage)
-    c, s = xp.cos(lag), xp.sin(lag)
+    of_roll, of_pitch = lag + law.phase_asymmetry, lag - law.phase_asymmetry
+    c1, s1, c2, s2 = xp.cos(of_roll), xp.sin(of_roll), xp.cos(of_pitch), xp.sin(of_pitch)
     alpha = roll + (law.across_u * u * xp.abs(u) + law.across_u_linear * u) / law.linkage
     beta = -pitch + (law.across_v * v * xp.abs(v) + law.across_v_linear * v) / law.linkage
-    scale = c * c + law.mixing * s * s
-    return (c * alpha + law.mixing * s * beta) / scale, (s * alpha - c * beta) / scale
+    scale = c1 * c2 + law.mixing * s1 * s2
+    return (
+        (c2 * alpha + law.mixing * s2 * beta) / (scale * (1.0 + law.linkage_asymmetry)),
+        (s1 * alpha - c1 * beta) / (scale * (1.0 - law.linkage_asymmetry)),
+    )
 
 
 def fit_into_limits(

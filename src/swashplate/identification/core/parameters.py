@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swashplate.errors import CardError, ExpressionError, IdentificationError
+from swashplate.filtering.disturbances import SEPARATE
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.models.card import Card
 from swashplate.models.choices import Free as Free
 from swashplate.models.linear.expressions import Expression, parse_tie
@@ -54,6 +56,8 @@ class Parameterization:
         ties: tied names and their expressions, in an order in which each uses only what stands before.
         held: what is not free and stands at the value of the prior card.
         prior_card: whose correlations the priors have (None: they are independent).
+        of_records: constants that every log has of its own, beside the usual ones.
+        noises: numbers of the noise that yaw or heave have for themselves.
     """
 
     vehicle: Vehicle
@@ -61,6 +65,8 @@ class Parameterization:
     ties: tuple[tuple[str, Expression], ...] = ()
     held: tuple[str, ...] = ()
     prior_card: Card | None = None
+    of_records: tuple[Free, ...] = ()
+    noises: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,8 +133,9 @@ def parameterize(
 
     Args:
         vehicle: whose parameters they are.
-        free: a ready choice of the vehicle (`Vehicle.choices`; CoaX: "flight", "full"; helicopter: "rotor", "full") or
-            parameter names.
+        free: a ready choice of the vehicle (`Vehicle.choices`; CoaX: "flight", "full", ...; helicopter: "rotor",
+            "full") or parameter names. Among the names may be constants of every record ("trim_motor_upper") and
+            numbers of the noise that yaw and heave have for themselves (`filtering.disturbances.SEPARATE`).
         ties: "name = expression" each, beside those of the choice; one here replaces the choice's for the same name.
         fixed: values held for parameters that are not to move, whatever the choice says of them.
         priors: mean and standard deviation by name; a prior here replaces the choice's.
@@ -163,7 +170,7 @@ def parameterize(
         _possible(vehicle, name, value, "fixed")
     vehicle = vehicle.with_values(held)
     wanted = [item for item in wanted if item.name not in held]
-    _known(vehicle, [f.name for f in wanted])
+    _known(vehicle, [f.name for f in wanted if f.name not in _beside(vehicle)])
     taken: tuple[str, ...] = ()
     if prior_card is not None:
         vehicle, wanted, taken = _from_card(vehicle, wanted, prior_card, {*held, *(parse_tie(t)[0] for t in texts)})
@@ -172,9 +179,19 @@ def parameterize(
     for name, expression in tied:
         _known(vehicle, [name, *expression.names])
     _once([f.name for f in wanted], [name for name, _ in tied], held)
+    beside = [item for item in wanted if item.name in _beside(vehicle)]
+    wanted = [item for item in wanted if item.name not in _beside(vehicle)]
     if not wanted:
         raise IdentificationError("no parameter is free.", hint=f"Ready choices: {', '.join(ready) or 'none'}.")
-    table = Parameterization(vehicle, tuple(wanted), _in_order(dict(tied)), taken, prior_card)
+    table = Parameterization(
+        vehicle,
+        tuple(wanted),
+        _in_order(dict(tied)),
+        taken,
+        prior_card,
+        tuple(item for item in beside if item.name not in SEPARATE),
+        tuple(item.name for item in beside if item.name in SEPARATE),
+    )
     _check_ties(table)
     return table
 
@@ -211,7 +228,7 @@ def _from_card(
 
 def _with_priors(vehicle: Vehicle, wanted: list[Free], priors: Mapping[str, tuple[float, float]]) -> list[Free]:
     for name, (mean, sigma) in priors.items():
-        _known(vehicle, [name])
+        _known(vehicle, [] if name in _trims(vehicle) else [name])
         if not (sigma > 0.0 and np.isfinite(mean)):
             raise IdentificationError(
                 f"prior is {mean} with sigma {sigma}, expected a number and a positive one.", channel=name
@@ -274,10 +291,27 @@ def _as_free(vehicle: Vehicle, item: str | Free) -> Free:
     if isinstance(item, Free):
         return item
     known = {free.name: free for choice in vehicle.choices.values() for free in choice.free}
+    if item in _beside(vehicle):
+        return known.get(item) or (Free(item, 1.0) if item in SEPARATE else trim_of_record(item))
     if item in known:
         return replace(known[item], mean=None, sigma=None)
     _known(vehicle, [item])
     return Free(item, abs(vehicle.card.parameters[item].value) or 0.01)
+
+
+def trim_of_record(name: str, sigma: float = 0.05) -> Free:
+    """A trim that every record has of its own, about zero."""
+    return Free(name, 0.02, 0.0, sigma, source="usual of a trim")
+
+
+def _trims(vehicle: Vehicle) -> tuple[str, ...]:
+    """Trims of the vehicle's inputs that a record can have."""
+    return tuple(name for name in (f"trim_{i}" for i in vehicle.input_names) if name in Nuisance._fields)
+
+
+def _beside(vehicle: Vehicle) -> frozenset[str]:
+    """What may be freed and stands on no card: trims of records, and noise of yaw's and heave's own."""
+    return frozenset((*_trims(vehicle), *SEPARATE))
 
 
 def _known(vehicle: Vehicle, names: Iterable[str]) -> None:

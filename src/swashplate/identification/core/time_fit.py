@@ -12,11 +12,13 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Result, correlation_of
 from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
 from swashplate.identification.core.sources import DataSource
+from swashplate.identification.core.time_likelihood import TimeErrors
 
 METHODS = ("output-error", "filter-error", "prediction-error")
 
@@ -63,12 +65,15 @@ class RecordLikelihood(Likelihood, Protocol):
 
 @dataclass(frozen=True)
 class Solved:
-    """Where a likelihood has its optimum.
+    """Where a likelihood has its optimum, or its errors some time ahead.
 
     Attributes:
         numbers: of the model, by name.
         likelihood, optimum: what was minimised, and where the search ended.
-        plain, corrected: covariances of the whole row in the entries' units (p, p).
+        plain, corrected: covariances of the moved entries in their units (p, p).
+        row: the entries that moved last.
+        whole: the likelihood's row where the search ended.
+        horizon: of the errors ahead that were minimised, None for one step.
     """
 
     numbers: Mapping[str, float]
@@ -76,10 +81,18 @@ class Solved:
     optimum: Optimum
     plain: Array
     corrected: Array
+    row: Row
+    whole: Array
+    horizon: Horizon | None = None
 
 
 def solve(
-    likelihood: RecordLikelihood, *, iterations: int, progress: Progress | None, start: Array | None = None
+    likelihood: RecordLikelihood,
+    *,
+    iterations: int,
+    progress: Progress | None,
+    start: Array | None = None,
+    horizon: Horizon | None = None,
 ) -> Solved:
     """The optimum of a likelihood whose first entries are the model's parameters.
 
@@ -88,9 +101,15 @@ def solve(
         iterations: at most this many.
         progress: told about every iteration.
         start: scaled row to begin with (None: the entries' starts).
+        horizon: of the errors ahead that are minimised afterwards, None: none.
+
+    Raises:
+        IdentificationError: where the model diverges, at the first guess or ahead.
     """
-    row = likelihood.row
     optimum = minimise(likelihood, start=start, iterations=iterations, tolerance=0.02, progress=progress)
+    if horizon is not None:
+        return _solved_ahead(likelihood, optimum, horizon, iterations=iterations, progress=progress)
+    row = likelihood.row
     known = np.zeros_like(optimum.information)  # beforehand, of the model's parameters
     of_model = np.ix_(row.places("parameter"), row.places("parameter"))
     known[of_model] = row.prior_information[of_model]
@@ -100,7 +119,24 @@ def solve(
     corrected = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
     units = np.outer(row.scale, row.scale)
     named = dict(zip(row.names, map(float, _numbers(row, optimum.row)), strict=True))
-    return Solved(named, likelihood, optimum, plain * units, corrected * units)
+    return Solved(named, likelihood, optimum, plain * units, corrected * units, row, optimum.row)
+
+
+def _solved_ahead(
+    likelihood: RecordLikelihood, first: Optimum, horizon: Horizon, *, iterations: int, progress: Progress | None
+) -> Solved:
+    """The optimum of the errors ahead, from that of the likelihood."""
+    if not isinstance(likelihood, TimeErrors):
+        raise IdentificationError("no filter runs ahead of its record with this method.", channel="horizon")
+    criterion = MultiStepErrors(likelihood, first.row, likelihood.records, horizon=horizon)
+    optimum = minimise(criterion, start=criterion.start, iterations=iterations, tolerance=0.02, progress=progress)
+    row, prior = criterion.row, criterion.row.prior(optimum.row)[2]
+    plain = accuracy.covariance(row, optimum.information, prior)
+    white, sensitivities, rest = criterion.whitened(optimum.row)
+    corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
+    units, whole = np.outer(row.scale, row.scale), criterion.whole(optimum.row)
+    named = dict(zip(likelihood.row.names, map(float, _numbers(likelihood.row, whole)), strict=True))
+    return Solved(named, likelihood, optimum, plain * units, corrected * units, row, whole, horizon)
 
 
 def result_of(
@@ -126,7 +162,7 @@ def result_of(
         ties: estimates that follow from the free ones.
     """
     likelihood, optimum = solved.likelihood, solved.optimum
-    row, k = likelihood.row, len(units)
+    row, k = solved.row, len(units)
     spread, wider = (np.sqrt(np.maximum(np.diag(c), 0.0)) for c in (solved.plain, solved.corrected))
     free = tuple(
         Estimate(
@@ -164,9 +200,9 @@ def result_of(
         warnings=_words(free, optimum),
         directions=accuracy.blind_directions(row.names[:k], marginal),
         constants=tuple(_constants(solved, likelihood.records, spread, k)),
-        comparisons=likelihood.comparisons(optimum.row),
+        comparisons=likelihood.comparisons(solved.whole),
         data=tuple(data),
-        settings=dict(settings),
+        settings=dict(settings) | told_horizon(solved.horizon),
         seconds=seconds,
     )
 
@@ -175,6 +211,23 @@ def check_method(method: str) -> None:
     """That there is such a method."""
     if method not in METHODS:
         raise IdentificationError(f"'{method}' is no method; there are {', '.join(METHODS)}.", channel="method")
+
+
+def ahead_of(horizon: Sequence[float] | None, method: str) -> Horizon | None:
+    """The horizon that was asked for, None where none was.
+
+    Raises:
+        IdentificationError: for one that is none, or with output error, whose simulation nothing corrects.
+    """
+    if horizon is None:
+        return None
+    if method == "output-error":
+        raise IdentificationError(
+            "output error has no filter to predict from: its errors are those of the whole simulation.",
+            channel="horizon",
+            hint="Choose method filter-error or prediction-error, or leave the horizon away.",
+        )
+    return Horizon.of(horizon)
 
 
 def _numbers(row: Row, scaled: Array) -> Array:
@@ -186,7 +239,7 @@ def _numbers(row: Row, scaled: Array) -> Array:
 def _constants(solved: Solved, records: Sequence[Record], spread: Array, first: int) -> list[Constant]:
     """Start states, shifts, biases, gusts and gains by record."""
     made = []
-    for i, entry in list(enumerate(solved.likelihood.row.entries))[first:]:
+    for i, entry in list(enumerate(solved.row.entries))[first:]:
         name, _, number = entry.name.partition("[")
         value = solved.numbers[entry.name]
         record = records[int(number[:-1])].name if number else ""

@@ -9,6 +9,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.records import Record
 
@@ -94,6 +95,14 @@ class TimeErrors(ABC):
     @abstractmethod
     def _with_slopes(self, row: Array) -> tuple[Array, Array]:
         """The same and their slopes by every scaled entry, (n_entries, n_t, n_outputs)."""
+
+    @abstractmethod
+    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
+        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+
+    @abstractmethod
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
 
     @property
     def row(self) -> Row:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -10,12 +11,10 @@ from swashplate.arrays import Array
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.result import Constant, Estimate
-from swashplate.identification.core.scoring import Optimum
-from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.core.scoring import Likelihood, Optimum
 from swashplate.models.vehicle import Vehicle
 
-_LAGS = 1.0
+LAGS = 1.0
 """Seconds of residual correlation that the corrected bound allows for."""
 
 RECORD_UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad"}
@@ -27,14 +26,16 @@ class Found:
     """An optimum with its covariances and the step that is left to the exact one, scaled.
 
     Attributes:
-        table, likelihood, optimum: what was sought, and where the search ended.
+        table, criterion, optimum: what was sought, and where the search ended.
+        logs: names of the flights that have constants of their own.
         prior: the priors' information (p, p).
         plain, corrected: covariances (p, p) of the row, without and with the colour of the residuals.
         left: Newton's step from where the search ended (p,).
     """
 
     table: Parameterization
-    likelihood: PredictionError | OutputError
+    criterion: Criterion
+    logs: tuple[str, ...]
     optimum: Optimum
     prior: Array
     plain: Array
@@ -43,27 +44,42 @@ class Found:
 
     @property
     def places(self) -> Array:
-        return self.likelihood.row.places("parameter")
+        return self.criterion.row.places("parameter")
 
     @property
     def numbers(self) -> Array:
-        return np.asarray(self.optimum.row * self.likelihood.row.scale)
+        return np.asarray(self.optimum.row * self.criterion.row.scale)
 
     def scaled(self, covariance: Array) -> Array:
         """A covariance of the parameters in their units."""
-        scale = self.likelihood.row.scale[self.places]
+        scale = self.criterion.row.scale[self.places]
         return np.asarray(covariance[np.ix_(self.places, self.places)] * np.outer(scale, scale))
 
 
-def found_at(table: Parameterization, likelihood: PredictionError | OutputError, optimum: Optimum) -> Found:
-    """The covariances at an optimum: plain, and corrected for coloured residuals (Maine and Iliff 1981)."""
+class Criterion(Likelihood, Protocol):
+    """What was minimised: a likelihood, or errors some time ahead."""
+
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per record: whitened errors and their sensitivities, and information that lies elsewhere."""
+        ...
+
+
+def found_at(
+    table: Parameterization, likelihood: Criterion, optimum: Optimum, *, logs: tuple[str, ...], lags: int
+) -> Found:
+    """The covariances at an optimum: plain, and corrected for coloured residuals (Maine and Iliff 1981).
+
+    Args:
+        table, likelihood, optimum: what was sought, and where the search ended.
+        logs: names of the flights that have constants of their own.
+        lags: how many errors of correlation to allow for.
+    """
     prior = likelihood.row.prior(optimum.row)[2]
     plain = accuracy.covariance(likelihood.row, optimum.information, prior)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
-    lags = round(_LAGS / likelihood.model.dt)
     corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=lags)
     gradient = likelihood.scores(optimum.row)[1] + likelihood.row.prior(optimum.row)[1]
-    return Found(table, likelihood, optimum, prior, plain, corrected, -plain @ gradient)
+    return Found(table, likelihood, logs, optimum, prior, plain, corrected, -plain @ gradient)
 
 
 def estimates_of(found: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
@@ -75,7 +91,7 @@ def estimates_of(found: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], 
     sigma = np.sqrt(np.maximum(np.diag(found.scaled(found.plain)), 0.0))
     corrected = np.sqrt(np.maximum(np.diag(found.scaled(found.corrected)), 0.0))
     estimates, problems = [], []
-    scales = found.likelihood.row.scale
+    scales = found.criterion.row.scale
     total = np.diag(found.optimum.information + found.prior)[found.places]
     insensitivity = scales[found.places] / np.sqrt(np.maximum(total, 1e-300))
     for i, free in enumerate(table.free):
@@ -154,12 +170,12 @@ def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> fl
 
 def constants(found: Found) -> tuple[Constant, ...]:
     """Delays, trims and lever arms of every log."""
-    row = found.likelihood.row
+    row = found.criterion.row
     sigma = np.sqrt(np.maximum(np.diag(found.plain), 0.0)) * row.scale
     estimates = []
     for i in row.places("nuisance"):
         name, _, number = row.names[i].partition("[")
         unit = RECORD_UNITS[name.split("_")[0]]
-        record = found.likelihood.logs[int(number[:-1])]
+        record = found.logs[int(number[:-1])]
         estimates.append(Constant(record, name, unit, float(found.numbers[i]), float(sigma[i])))
     return tuple(estimates)

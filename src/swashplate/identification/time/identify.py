@@ -6,25 +6,28 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
+from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import POSE, Record, records
 from swashplate.identification.core.result import APART, Estimate, Result, correlation_of
-from swashplate.identification.core.scoring import Optimum, Progress
+from swashplate.identification.core.scoring import Optimum, Progress, minimise
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback, nelder_mead
-from swashplate.identification.time.estimates import Found, constants, estimates_of, found_at
+from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import PredictionError, in_wind
+from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -60,6 +63,7 @@ def identify_flight(
     Raises:
         IdentificationError, FlightError: see `identify`.
     """
+    horizon = None if question.horizon is None else Horizon.of(question.horizon)
     free = "full" if question.free is None else question.free
     outputs = POSE if question.outputs is None else question.outputs
     enable_double_precision()
@@ -86,24 +90,33 @@ def identify_flight(
     where = ", ".join(piece.name for piece in pieces)
     likelihood.refresh(likelihood.row.starts())
     accuracy.refuse_unseen(likelihood.row, likelihood.scores(likelihood.row.starts())[2], where=where)
-    optimum = search(likelihood, ITERATIONS if question.iterations is None else question.iterations, question.progress)
-    found = found_at(table, likelihood, optimum)
-    parameters, problems = estimates_of(found, vehicle)
-    problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(optimum.row), flights)]
+    most = ITERATIONS if question.iterations is None else question.iterations
+    optimum = search(likelihood, most, question.progress)
+    found, row = _found(table, likelihood, optimum, horizon, most, question.progress)
+    optimum, parameters, problems = found.optimum, *estimates_of(found, vehicle)
+    problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(row), flights)]
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters
         if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
     ]
-    identified = _identified(found, vehicle, parameters, pieces, method)
+    identified = _identified(
+        found, likelihood.noise_of(row), likelihood.nuisance_of(row), vehicle, parameters, pieces, method
+    )
+    told = constants(found)
+    if vehicle.traits.balance is not None:
+        trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
+        notes += vehicle.traits.balance(
+            vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
+        )
     return Result(
         method=method,
         model=identified,
         start=vehicle,
         estimates=parameters,
-        constants=constants(found),
-        noise=likelihood.noise_of(optimum.row),
-        nuisance=likelihood.nuisance_of(optimum.row),
+        constants=told,
+        noise=likelihood.noise_of(row),
+        nuisance=likelihood.nuisance_of(row),
         names=table.names,
         covariance=found.scaled(found.plain),
         covariance_corrected=found.scaled(found.corrected),
@@ -116,7 +129,7 @@ def identify_flight(
         converged=optimum.converged,
         problems=(*problems, *notes, *(() if optimum.converged else ("the iterations ran out",))),
         failed=bool(problems),
-        comparisons=likelihood.comparisons(optimum.row),
+        comparisons=likelihood.comparisons(row),
         data=sources_of(flights),
         seconds=time.perf_counter() - started,
         settings={
@@ -125,6 +138,9 @@ def identify_flight(
             "free": list(table.names),
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
             "held at the prior card": list(table.held),
+            **({"constants of every record": [f.name for f in table.of_records]} if table.of_records else {}),
+            **({"noise of its own": list(table.noises)} if table.noises else {}),
+            **told_horizon(horizon),
             "outputs": list(outputs),
             "wind": question.wind,
             "rate": 1.0 / pieces[0].dt,
@@ -182,7 +198,9 @@ def _simplex(likelihood: FlightLikelihood, iterations: int, progress: Progress |
 
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
-PREDICTION_ERROR = FlightEstimator("prediction-error", _TAKES | {"keep_unexcited", "wind"}, _prediction_error, _scoring)
+PREDICTION_ERROR = FlightEstimator(
+    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon"}, _prediction_error, _scoring
+)
 OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together)
 NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex)
 
@@ -221,8 +239,33 @@ def _hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> 
     return table, notes
 
 
+def _found(
+    table: Parameterization,
+    likelihood: FlightLikelihood,
+    optimum: Optimum,
+    horizon: Horizon | None,
+    iterations: int,
+    progress: Progress | None,
+) -> tuple[Found, Array]:
+    """What the search says, or the search for small errors ahead that follows it; and the likelihood's whole row."""
+    if horizon is None:
+        lags = round(LAGS / likelihood.model.dt)
+        return found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags), optimum.row
+    assert isinstance(likelihood, PredictionError)  # no other estimator takes a horizon
+    criterion = MultiStepErrors(likelihood, optimum.row, likelihood.pieces, horizon=horizon, settling=SETTLING)
+    ahead = minimise(criterion, start=criterion.start, iterations=iterations, progress=progress)
+    ahead = replace(ahead, converged=ahead.converged and optimum.converged)
+    return found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags), criterion.whole(ahead.row)
+
+
 def _identified(
-    found: Found, vehicle: Vehicle, estimates: Sequence[Estimate], pieces: Sequence[Record], method: str
+    found: Found,
+    noise: Noise | None,
+    nuisance: Nuisance,
+    vehicle: Vehicle,
+    estimates: Sequence[Estimate],
+    pieces: Sequence[Record],
+    method: str,
 ) -> Vehicle:
     """The identified vehicle: the card with the new numbers, where they come from, and what the observer needs."""
     sources = ", ".join(piece.name for piece in pieces)
@@ -251,9 +294,9 @@ def _identified(
             for name, entry in card.parameters.items()
         },
     )
-    row = found.optimum.row
-    noise, nuisance = found.likelihood.noise_of(row), found.likelihood.nuisance_of(row)
     observer = {"nuisance": {k: float(v) for k, v in nuisance._asdict().items()}}
+    if found.table.of_records:
+        observer["trims"] = {f.name: 0.05 if f.sigma is None else f.sigma for f in found.table.of_records}
     if noise is not None:
         observer["noise"] = {k: float(v) for k, v in noise._asdict().items()}
     card = replace(card, title=f"{vehicle.card.title}, identified from {sources}", observer=observer, path="")

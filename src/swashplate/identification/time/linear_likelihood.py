@@ -5,7 +5,7 @@ Every derivative is taken by complex steps through matrix exponentials and recur
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.filter_loop import filtered
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import TimeErrors, gain_entries
@@ -69,10 +70,36 @@ class OutputErrors(TimeErrors):
         errors = self._errors(self._stepped(row))
         return errors[0].real, errors[1:].imag / STEP * self.row.scale[:, None, None]
 
-    def _stepped(self, row: Array) -> Any:
-        """A row's numbers, plain and with a complex step in each."""
+    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
+        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        return [part[0].real for part in self._ahead(np.asarray(row * self.row.scale)[None], ahead)]
+
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
+        parts = self._ahead(self._stepped(row, places), ahead)
+        scale = self.row.scale[places][:, None, None, None]
+        return [part[0].real for part in parts], [part[1:].imag / STEP * scale for part in parts]
+
+    def _ahead(self, batch: Any, ahead: Ahead) -> list[Any]:
+        """Errors ahead of every record for a batch of rows, (n_batch, starts, horizons, outputs) each."""
+        steps = np.array(ahead.steps)
+        found = []
+        for (x, phi, c, gain, measured, drive), starts in zip(self._loops(batch), ahead.starts, strict=True):
+            after = np.asarray(_states()(x, phi, c, gain, measured, drive))[:, np.array(starts, dtype=int)]
+            told = []
+            for step in range(1, steps[-1] + 1):
+                k = np.array(starts, dtype=int) + step
+                if step in ahead.steps:
+                    told.append(measured[k].transpose(1, 0, 2) - np.einsum("pij,psj->psi", c, after))
+                after = np.einsum("pij,psj->psi", phi, after) + drive[k].transpose(1, 0, 2)
+            found.append(np.stack(told, axis=2))
+        return found
+
+    def _stepped(self, row: Array, places: Places | None = None) -> Any:
+        """A row's numbers, plain and with a complex step in each, or in some."""
         numbers = np.asarray(row * self.row.scale)
-        return numbers + 1j * STEP * np.vstack([np.zeros(numbers.size), np.eye(numbers.size)])
+        stepped = np.eye(numbers.size) if places is None else np.eye(numbers.size)[places]
+        return numbers + 1j * STEP * np.vstack([np.zeros(numbers.size), stepped])
 
     def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
         """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""
@@ -92,9 +119,12 @@ class OutputErrors(TimeErrors):
 
     def _errors(self, batch: Any) -> Any:
         """Output errors of every record, one after the other, for a batch of rows: (n_batch, n_t, n_outputs)."""
+        return np.concatenate([np.asarray(_recursion()(*loop)) for loop in self._loops(batch)], axis=1)
+
+    def _loops(self, batch: Any) -> Iterator[tuple[Any, ...]]:
+        """Of every record, what `_recursion` takes."""
         n, m = len(self.model.states), len(self.model.inputs)
         a, b, c, d, h1 = self._systems(batch)
-        parts = []
         for number, record in enumerate(self.records):
             dt, measured = record.dt, record.outputs[:, None, :]
             shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
@@ -110,8 +140,7 @@ class OutputErrors(TimeErrors):
             drive = drive + np.einsum("pij,pj->pi", g0[:, :, m:], shift)
             through = np.einsum("pij,tpj->tpi", d, u) + bias
             drive = np.concatenate([drive, np.zeros_like(drive[:1])])
-            parts.append(np.asarray(_recursion()(x, phi, c, gain, measured - through, drive)))
-        return np.concatenate(parts, axis=1)
+            yield x, phi, c, gain, measured - through, drive
 
     def _late(self, batch: Any, u: Array, dt: float) -> Any:
         """Inputs later by their delays, straight between samples, (n_t, n_batch, n_inputs)."""
@@ -151,6 +180,17 @@ def _recursion() -> Any:
     Arguments, by model first: states at the start, transitions, outputs' and innovations' matrices; by sample first:
     what is measured less what goes through, and what drives the states to the next sample.
     """
+    return _compiled(lambda errors, states: errors)
+
+
+@cache
+def _states() -> Any:
+    """The states foretold for the sample after each, (n_batch, n_t, n_states), compiled; arguments as before."""
+    return _compiled(lambda errors, states: states)
+
+
+def _compiled(chosen: Callable[[Any, Any], Any]) -> Any:
+    """The innovations' form along a record for a batch of models: what is chosen of errors and foretold states."""
     enable_double_precision()
 
     def one(x: Any, phi: Any, c: Any, gain: Any, measured: Any, drive: Any) -> Any:
@@ -162,6 +202,7 @@ def _recursion() -> Any:
             x, pushed = state
             return phi @ x + pushed
 
-        return filtered(x, measured, drive, correct=correct, predict=predict)[0]
+        errors, states = filtered(x, measured, drive, correct=correct, predict=predict)
+        return chosen(errors, states[0] @ phi.T + states[1])
 
     return jax.jit(jax.vmap(one, in_axes=(0, 0, 0, 0, 1, 1)))

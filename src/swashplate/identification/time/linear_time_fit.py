@@ -24,7 +24,7 @@ from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Result
 from swashplate.identification.core.sources import DataSource, sources_of
-from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
+from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linear_filter import FilterErrors
@@ -44,6 +44,7 @@ def fit_in_time(
     biases: Sequence[str] = (),
     method: str = "output-error",
     iterations: int = 80,
+    horizon: Sequence[float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[StateSpaceModel, TimeDetails]:
     """Fit a model's free parameters to records in time.
@@ -57,6 +58,7 @@ def fit_in_time(
         method: "output-error"; for records with gusts or an unstable aircraft "filter-error" (the gain by the gusts'
             intensities) or "prediction-error" (any gain).
         iterations: at most this many.
+        horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         progress: called with the iteration and the cost.
 
     Raises:
@@ -68,13 +70,14 @@ def fit_in_time(
     flights, model = (flights,) if isinstance(flights, Flight) else tuple(flights), structure_of(model)
     names = tuple(outputs or model.outputs)
     check_method(method)
+    ahead = ahead_of(horizon, method)
     refuse_lowpassed(flights)
     pieces, delays = linear_records(model, flights, names, biases=biases)
     kind = FilterErrors if method == "filter-error" else OutputErrors
     likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
     return linear_result(
         model,
-        solve(likelihood, iterations=iterations, progress=progress),
+        solve(likelihood, iterations=iterations, progress=progress, horizon=ahead),
         method=method,
         data=sources_of(flights),
         settings={"outputs": list(names), "shifts": shifts, "biases": list(biases)},
@@ -155,7 +158,11 @@ class LinearEstimator:
     """`fit_in_time` by one of its methods, as an estimator."""
 
     method: str
-    takes: frozenset[str] = frozenset({"outputs", "iterations", "shifts", "biases", "progress"})
+
+    @property
+    def takes(self) -> frozenset[str]:
+        filtered = set() if self.method == "output-error" else {"horizon"}
+        return frozenset({"outputs", "iterations", "shifts", "biases", "progress"} | filtered)
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         if isinstance(data, FrequencyResponse):
@@ -173,6 +180,7 @@ class LinearEstimator:
             biases=question.biases,
             method=self.method,
             iterations=80 if question.iterations is None else question.iterations,
+            horizon=question.horizon,
             progress=question.progress,
         )
 

@@ -15,14 +15,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbances import SEPARATE, Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
+from swashplate.identification.time import innovations_ahead
 from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, unpack
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.start_states import mean_velocity, slopes
@@ -30,7 +32,13 @@ from swashplate.identification.time.start_states import mean_velocity, slopes
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
 
-_NOISE_SPREAD = {"tau_gust_moment": 0.5, "tau_gust_force": 0.5, "drift_moment": 0.5, "drift_force": 0.5}
+_NOISE_SPREAD = {
+    "tau_gust_moment": 0.5,
+    "tau_gust_force": 0.5,
+    "drift_moment": 0.5,
+    "drift_force": 0.5,
+    **{name: spread for name, (_, _, spread) in SEPARATE.items()},
+}
 """Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
 
 _WIND = ("wind", "tau_wind")
@@ -105,7 +113,7 @@ class PredictionError:
     Args:
         table: free parameters and ties.
         pieces: the records, all at one rate.
-        noise: first guesses of the noise.
+        noise: first guesses of the noise; yaw and heave get numbers of their own where the table frees them.
         estimate_noise: False keeps the noise at `noise`.
         nuisance: centre of the priors on delays, trims and lever arms (None: the usual ones).
     """
@@ -121,21 +129,22 @@ class PredictionError:
     ) -> None:
         self.table = table
         self.pieces = tuple(pieces)
-        self.noise = noise or Noise()
+        self.noise = _with_first_guesses(noise or Noise(), table.noises)
         windy = float(self.noise.wind) > 0.0
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, windy=windy)
         self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
+        nuisances = {**_NUISANCE, **{free.name: _of_record(free) for free in table.of_records}}
         for number in range(len(self.logs)):
-            for name, (usual, scale, sigma) in _NUISANCE.items():
+            for name, (usual, scale, sigma) in nuisances.items():
                 start = usual if nuisance is None else float(getattr(nuisance, name))
                 low = 0.0 if name.startswith("delay") else -np.inf
                 kinked = name.startswith("delay")
                 entries.append(
                     Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
                 )
-        noises = _estimated(self.model) if estimate_noise else ()
+        noises = _estimated(self.model, self.noise) if estimate_noise else ()
         for name in noises:
             log = float(np.log(getattr(self.noise, name)))
             entries.append(
@@ -144,7 +153,7 @@ class PredictionError:
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         first = [slopes(piece, np.array([0])) for piece in pieces]
-        self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(_NUISANCE), noises)
+        self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
         self._data = {
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
             "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
@@ -165,6 +174,29 @@ class PredictionError:
     def innovations(self, row: Array) -> tuple[Any, Any, FilterState]:
         """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
         return innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+
+    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
+        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        errors = innovations_ahead.errors_ahead(
+            self._plan, ahead.steps, self._data, jnp.asarray(row), _side_by_side(ahead)
+        )
+        return [np.asarray(errors[r])[: len(starts)] for r, starts in enumerate(ahead.starts)]
+
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        """The same, and the slopes by some entries of the row, (places, starts, horizons, outputs)."""
+        errors, slopes = innovations_ahead.errors_ahead_moved(
+            self._plan,
+            ahead.steps,
+            self._data,
+            jnp.asarray(row),
+            _side_by_side(ahead),
+            jnp.asarray(np.eye(len(self.row))[places]),
+        )
+        kept = [len(starts) for starts in ahead.starts]
+        return (
+            [np.asarray(errors[r])[:n] for r, n in enumerate(kept)],
+            [np.asarray(slopes[:, r])[:, :n] for r, n in enumerate(kept)],
+        )
 
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
@@ -274,12 +306,29 @@ class PredictionError:
         return white, sensitivities, rest
 
 
+def _side_by_side(ahead: Ahead) -> Any:
+    """Starts of records of different lengths, (records, most starts); what is missing begins at the first sample."""
+    most = max(len(starts) for starts in ahead.starts)
+    return jnp.asarray([(*starts, *[0] * (most - len(starts))) for starts in ahead.starts])
+
+
 def _by_covariance(dM: Array, n: int) -> Array:
     """Information of n innovations about entries that change their covariance, dM = L^-1 dS L^-T (p, m, m)."""
     flat = dM.reshape(len(dM), -1)
     return np.asarray(0.5 * n * flat @ flat.T)
 
 
-def _estimated(model: StochasticModel) -> tuple[str, ...]:
-    """The noise numbers that are estimated: the speed is given, and the wind's only where there is one."""
-    return tuple(name for name in Noise._fields if name != "speed" and (model.windy or name not in _WIND))
+def _estimated(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
+    """The noise numbers that are estimated: the speed is given, the wind's and the separate ones only where wanted."""
+    left = {"speed", *(() if model.windy else _WIND), *(name for name in SEPARATE if not getattr(guess, name) > 0.0)}
+    return tuple(name for name in Noise._fields if name not in left)
+
+
+def _with_first_guesses(noise: Noise, separate: Sequence[str]) -> Noise:
+    """The noise with first guesses of what yaw or heave are to have for themselves."""
+    return noise._replace(**{name: SEPARATE[name][1] for name in separate if not getattr(noise, name) > 0.0})
+
+
+def _of_record(free: Free) -> tuple[float, float, float]:
+    """First guess, scale and standard deviation of a record's own number."""
+    return free.mean or 0.0, free.scale, np.inf if free.sigma is None else free.sigma

@@ -8,7 +8,7 @@ is that of continuous time: there a constraint has to keep the gain from passing
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,8 +19,9 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.filtering.filter_loop import filtered
+from swashplate.filtering.filter_loop import Correct, Predict, filtered
 from swashplate.filtering.riccati import kalman_gain
+from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Layout, Parameterization
 from swashplate.identification.core.records import Record
@@ -153,6 +154,24 @@ class VehicleErrors(TimeErrors):
             np.concatenate([np.asarray(slopes) for _, slopes in parts], axis=1),
         )
 
+    def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
+        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
+        return [
+            np.asarray(_ahead(p, ahead.steps, given, d, jnp.asarray(starts, dtype=int), numbers))
+            for p, d, starts in zip(self._plans, self._data, ahead.starts, strict=True)
+        ]
+
+    def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
+        """The same, and the slopes by some entries of the scaled row, (places, starts, horizons, outputs)."""
+        numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
+        directions = jnp.asarray(np.diag(self.row.scale)[places])
+        parts = [
+            _ahead_moved(p, ahead.steps, given, d, jnp.asarray(starts, dtype=int), numbers, directions)
+            for p, d, starts in zip(self._plans, self._data, ahead.starts, strict=True)
+        ]
+        return [np.asarray(errors) for errors, _ in parts], [np.asarray(slopes) for _, slopes in parts]
+
 
 _NOWHERE = -1
 """Place of a number that is not estimated: the zero that stands behind the row."""
@@ -185,8 +204,19 @@ def _data(record: Record, environment: Environment) -> dict[str, Any]:
     return {"driving": jnp.asarray(driving_rows(record, environment)), "outputs": jnp.asarray(record.outputs)}
 
 
-def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
-    """Errors of one record (n, n_outputs): measured less foretold from the samples before (output error: from none)."""
+@dataclass(frozen=True)
+class _Filter:
+    """A filter with all its numbers (traced): where it starts, what holds at each sample, and its functions."""
+
+    start: Any
+    along: tuple[Any, Any]
+    correct: Correct
+    predict: Predict
+    foretold: Callable[[Any, Any], Any]
+
+
+def _filter(plan: _Plan, given: Any, data: Any, numbers: Any) -> _Filter:
+    """The filter of one record."""
     vehicle = plan.equations.vehicle
     row = jnp.append(numbers, 0.0)
 
@@ -218,7 +248,44 @@ def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
         return rk4_step(rates, x, lambda share: w + share * (after - w), plan.dt, looped=False)
 
     after = jnp.concatenate([driving[1:], driving[-1:]])
-    return filtered(start, data["outputs"], (driving, after), correct=correct, predict=predict)[0]
+    return _Filter(start, (driving, after), correct, predict, foretold)
+
+
+def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
+    """Errors of one record (n, n_outputs): measured less foretold from the samples before (output error: from none)."""
+    f = _filter(plan, given, data, numbers)
+    return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[0]
+
+
+def _traced_ahead(plan: _Plan, steps: tuple[int, ...], given: Any, data: Any, starts: Any, numbers: Any) -> Any:
+    """Measured less foretold, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
+    f = _filter(plan, given, data, numbers)
+    states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
+
+    def run(start: Any) -> Any:
+        def sample(x: Any, k: Any) -> tuple[Any, Any]:
+            following = f.predict(x, jax.tree.map(lambda rows: rows[k], f.along))
+            return following, f.foretold(following, f.along[1][k])
+
+        told = jax.lax.scan(sample, states[start], start + jnp.arange(steps[-1]))[1]
+        return data["outputs"][start + jnp.array(steps)] - told[jnp.array(steps) - 1]
+
+    return jax.vmap(run)(starts)
+
+
+_ahead = jax.jit(_traced_ahead, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+
+
+@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+def _ahead_moved(
+    plan: _Plan, steps: tuple[int, ...], given: Any, data: Any, starts: Any, numbers: Any, directions: Any
+) -> tuple[Any, Any]:
+    """The errors ahead and their slopes along directions of the row (directions, starts, horizons, outputs)."""
+
+    def errors(moved: Any) -> Any:
+        return _traced_ahead(plan, steps, given, data, starts, moved)
+
+    return jax.vmap(lambda d: jax.jvp(errors, (numbers,), (d,)), out_axes=(None, 0))(directions)
 
 
 _errors = jax.jit(_traced_errors, static_argnums=0, compiler_options=QUICK_TO_COMPILE)

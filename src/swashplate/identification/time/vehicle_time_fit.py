@@ -19,7 +19,7 @@ from swashplate.identification.core.parameters import Free, Parameterization, pa
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, sources_of
-from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
+from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
@@ -43,6 +43,7 @@ def fit_vehicle(
     shifts: bool = False,
     biases: Sequence[str] = (),
     iterations: int = 80,
+    horizon: Sequence[float] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Vehicle, TimeDetails]:
     """Fit parameters of a vehicle's equations to records in time by maximum likelihood.
@@ -61,6 +62,7 @@ def fit_vehicle(
         shifts: constants in the states' rates, per record.
         biases: outputs with a constant of their own, per record.
         iterations: at most this many.
+        horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         progress: called with the iteration and the cost.
 
     Returns:
@@ -72,6 +74,7 @@ def fit_vehicle(
     """
     began = time.perf_counter()
     check_method(method)
+    ahead = ahead_of(horizon, method)
     enable_double_precision()
     enable_compilation_cache()
     outputs = tuple(outputs)
@@ -79,6 +82,13 @@ def fit_vehicle(
     refuse_lowpassed(flights)
     check_biases(biases, outputs)
     table = parameterize(vehicle, free, ties=ties, priors=priors)
+    beside = [*(item.name for item in table.of_records), *table.noises]
+    if beside:
+        raise IdentificationError(
+            f"'{method}' has no such constants of records and no such noise.",
+            channel=", ".join(beside),
+            hint="Free it with method 'prediction-error' of a helicopter whose pose was tracked, or shifts and biases.",
+        )
     pieces = records(flights, vehicle, outputs=outputs)
     likelihood = VehicleErrors(
         table,
@@ -88,7 +98,7 @@ def fit_vehicle(
         shifts=shifts,
         biases=tuple(biases),
     )
-    solved = solve(likelihood, iterations=iterations, progress=progress)
+    solved = solve(likelihood, iterations=iterations, progress=progress, horizon=ahead)
     return vehicle_result(
         vehicle,
         table,
@@ -173,9 +183,12 @@ class VehicleEstimator:
     """`fit_vehicle` by one of its methods, as an estimator."""
 
     method: str
-    takes: frozenset[str] = frozenset(
-        {"free", "ties", "priors", "outputs", "iterations", "environment", "shifts", "biases", "progress"}
-    )
+
+    @property
+    def takes(self) -> frozenset[str]:
+        filtered = set() if self.method == "output-error" else {"horizon"}
+        usual = {"free", "ties", "priors", "outputs", "iterations", "environment", "shifts", "biases", "progress"}
+        return frozenset(usual | filtered)
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         if isinstance(data, FrequencyResponse):
@@ -202,6 +215,7 @@ class VehicleEstimator:
             shifts=bool(question.shifts),
             biases=question.biases,
             iterations=80 if question.iterations is None else question.iterations,
+            horizon=question.horizon,
             progress=question.progress,
         )
 

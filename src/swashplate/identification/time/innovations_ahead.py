@@ -1,0 +1,81 @@
+"""Predictions of a filter along records, some time ahead from its own states, and their exact derivatives.
+
+Forward mode through the filter and the predictions together: what moves is a handful of numbers, what comes out some
+thousand errors.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import FilterState, commands
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.time.innovations import FilterPlan, filter_record, unpack
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+
+
+def _traced(plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, starts: Any) -> Any:
+    """Measured less foretold after `steps` samples from each start, (records, starts, horizons, outputs)."""
+    parameters, nuisances, noise = unpack(plan, data, row)
+
+    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, starts: Any, nuisance: Nuisance) -> Any:
+        _, _, states = filter_record(
+            plan.model,
+            y,
+            u,
+            voltage,
+            value=value,
+            rate=rate,
+            velocity=velocity,
+            parameters=parameters,
+            noise=noise,
+            nuisance=nuisance,
+        )
+        reaching = commands(plan.model.vehicle, plan.model.dt, u, nuisance)
+
+        def run(start: Any) -> Any:
+            foretold = _foretold(plan, steps, (states, reaching, voltage), parameters, noise, nuisance, start)
+            return y[start + jnp.array(steps)] - foretold
+
+        return jax.vmap(run)(starts)
+
+    own = (data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], data["velocity"])
+    return jax.vmap(one)(*own, starts, nuisances)
+
+
+def _foretold(
+    plan: FilterPlan, steps: tuple[int, ...], along: Any, parameters: Any, noise: Noise, nuisance: Nuisance, start: Any
+) -> Any:
+    """What is foretold to be measured after each of `steps` samples from one start (horizons, outputs)."""
+    model, (states, reaching, voltage) = plan.model, along
+
+    def advance(x: Any, acting: Any, k: Any) -> Any:
+        return model.step(x, acting, reaching[k], parameters, voltage[k])
+
+    def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
+        following = model.predict(state, noise, advance, k)
+        return following, model.measure(following.x, nuisance)
+
+    first = jax.tree.map(lambda rows: rows[start], states)
+    return jax.lax.scan(sample, first, start + jnp.arange(steps[-1]))[1][jnp.array(steps) - 1]
+
+
+errors_ahead = jax.jit(_traced, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+"""The errors of records side by side, compiled; arguments as of `_traced`."""
+
+
+@partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
+def errors_ahead_moved(
+    plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, starts: Any, directions: Any
+) -> tuple[Any, Any]:
+    """The errors, and their slopes along directions of the row (directions, records, starts, horizons, outputs)."""
+
+    def errors(moved: Any) -> Any:
+        return _traced(plan, steps, data, moved, starts)
+
+    return jax.vmap(lambda d: jax.jvp(errors, (row,), (d,)), out_axes=(None, 0))(directions)
