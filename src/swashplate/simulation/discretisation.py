@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Num
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
@@ -25,7 +26,7 @@ def zero_order_hold(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
     return np.asarray(F), np.asarray(G)
 
 
-def first_order_hold(A: Any, B: Any, dt: float) -> tuple[Any, Any, Any]:
+def first_order_hold(A: Num[np.ndarray, "... n n"], B: Num[np.ndarray, "... n m"], dt: float) -> tuple[Any, Any, Any]:
     """Exact step for inputs that run straight between samples: x+ = F x + G0 u + G1 (u+ - u) (Van Loan 1978).
 
     SciPy's `cont2discrete` turns the state into one that is no sample of x; this does not.
@@ -60,7 +61,9 @@ def held_series(A: Any, dt: Any, one: Any, *, terms: int = 4) -> tuple[Any, Any]
     return one + (dt * A) @ H, H
 
 
-def gathered_noise(A: Any, W: Any, dt: Any) -> tuple[Any, Any]:
+def gathered_noise(
+    A: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], dt: Float[jax.Array, ""] | float
+) -> tuple[Any, Any]:
     """Transition e^(A dt) and the noise gathered meanwhile, the integral of e^(As) W e^(A's), to be differentiated.
 
     Series over a small part of the sample, then doubled (Van Loan's exponential of twice the size takes five times as
@@ -79,7 +82,7 @@ def gathered_noise(A: Any, W: Any, dt: Any) -> tuple[Any, Any]:
     return summed(transition, h * gathered, _HALVINGS)
 
 
-def summed(F: Any, W: Any, doublings: int) -> tuple[Any, Any]:
+def summed(F: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], doublings: int) -> tuple[Any, Any]:
     """F^n and the sum of F^k W F'^k over k below n = 2^doublings (Smith 1968, SIAM J. Appl. Math. 16, 198-201)."""
 
     def double(carry: tuple[Any, Any], _: None) -> tuple[tuple[Any, Any], None]:
