@@ -6,13 +6,14 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 WORKERS ?= 2
 
-.PHONY: help demo test page lint types layers unit speed proof clean
+.PHONY: help demo test page lint types layers unit speed proof site clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
 	@echo "make test   ruff, mypy, import-linter, pytest and the benchmarks in short"
 	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (half an hour)"
+	@echo "make site   the documentation as a site, build/site/index.html; offline, warnings are errors"
 	@echo "make clean  remove .venv and everything that was built"
 
 # The stamp is written last, so that an interrupted installation is done again and a finished one is not.
@@ -57,6 +58,9 @@ speed: $(STAMP)
 
 proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
+
+site: $(STAMP)
+	$(BIN)/python scripts/build_site.py
 
 clean:
 	rm -rf src/swashplate/links/live/page/vendor .venv build dist demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -25,12 +25,13 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 from own_package import EXAMPLES, installed
+from real_results import results_text, trusted_text
 
 from swashplate.atomic import write_bytes, write_text
 
@@ -354,7 +355,8 @@ def thresholds_text() -> str:
     rows.append(
         (
             "cannot be judged",
-            f"past motion explains {100 * feedback.EXPLAINED:g} % or more of the command in every record",
+            f"past motion explains {100 * feedback.EXPLAINED:g} % or more of the command in every record; or even the "
+            f"ceiling stays below {THRESHOLDS['usable']:g} % and the model is as good as it",
         )
     )
     return _table(("verdict", "condition"), rows)
@@ -380,14 +382,21 @@ def bench_procedures_text() -> str:
     return _table(("procedure", "measures", "needs the columns", "by"), rows)
 
 
-def ducted_fan_text() -> str:
-    """The example of a model of one's own, and its entry point."""
-    code, project = ((EXAMPLES / "ducted_fan" / name).read_text(encoding="utf-8") for name in _DUCTED_FAN)
+def package_text(name: str) -> str:
+    """An example package: its module, and its entry point."""
+    code, project = ((EXAMPLES / name / file).read_text(encoding="utf-8") for file in (f"{name}.py", "pyproject.toml"))
     points = project[project.index("[project.entry-points") :].split("\n\n")[0]
     return f"```python\n{code}```\n\nIts `pyproject.toml` names it:\n\n```toml\n{points}\n```"
 
 
-_DUCTED_FAN = ("ducted_fan.py", "pyproject.toml")
+def decisions_text() -> str:
+    """Every decision's page by its heading, in the order of their numbers."""
+    pages = sorted(page for page in (DOCS / "decisions").glob("*.md") if page.name != "index.md")
+    headings = [page.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ") for page in pages]
+    return "\n".join(f"* [{heading}]({page.name})" for heading, page in zip(headings, pages, strict=True))
+
+
+PACKAGES = ("ducted_fan", "rate_least_squares", "triax_log", "attitude_pd", "stability_table")
 
 
 GENERATED: Mapping[str, Callable[[], str]] = {
@@ -399,7 +408,10 @@ GENERATED: Mapping[str, Callable[[], str]] = {
     "thresholds": thresholds_text,
     "bench_columns": bench_columns_text,
     "bench_procedures": bench_procedures_text,
-    "ducted_fan": ducted_fan_text,
+    "decisions": decisions_text,
+    "results": results_text,
+    "trusted": trusted_text,
+    **{name: partial(package_text, name) for name in PACKAGES},
 }
 
 

@@ -8,9 +8,17 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+from swashplate.control.kinds import CONTROLLERS
+from swashplate.export.formats import FORMATS
+from swashplate.flights.readers.read import READERS
+from swashplate.identification.core.document_codec import PARTS
+from swashplate.identification.estimators import ESTIMATORS
 from swashplate.models.catalogue import EQUATIONS
+from swashplate.registry import Registry
 
+REGISTRIES: tuple[Registry[Any], ...] = (EQUATIONS, ESTIMATORS, READERS, CONTROLLERS, FORMATS, PARTS)
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 
@@ -27,10 +35,16 @@ def installed(name: str, site: Path) -> Iterator[None]:
     text = "\n".join(f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in points.items()) for group, points in groups)
     (about / "entry_points.txt").write_text(text, encoding="utf-8")
     sys.path.insert(0, str(site))
-    EQUATIONS.__dict__.pop("_others", None)  # what is installed is asked once
+    _ask_again()
     try:
         yield
     finally:
         sys.path.remove(str(site))
         sys.modules.pop(name, None)
-        EQUATIONS.__dict__.pop("_others", None)
+        _ask_again()
+
+
+def _ask_again() -> None:
+    """Let the registries look anew: what is installed they ask once."""
+    for registry in REGISTRIES:
+        registry.__dict__.pop("_others", None)

@@ -1,4 +1,4 @@
-"""Both real CoaX flights, each predicted by what the other one taught: README's table and docs/real-flights.md.
+"""Both real CoaX flights, each predicted by what the other one taught: docs/real-flights.md and what quotes it.
 
     python scripts/real_flights.py
 
@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from docs_pages import regenerated
+
 import swashplate as sp
 from swashplate.reporting.pictures import prediction_picture
 from swashplate.validation.validation import PREDICTORS
@@ -21,22 +23,6 @@ FLIGHTS = {"august": "coax56/flight_2011-08-01_vertical", "july": "coax56/flight
 CHANNELS = ("u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 WANTED = {0.5: ("phi", "theta", "p", "q", "u", "v"), 1.0: ("phi", "theta", "p", "q"), 2.0: ("phi", "theta", "p", "q")}
 """Where the model is to beat every rival: horizon [s] and channels."""
-BEGIN, END = "<!-- results:begin -->", "<!-- results:end -->"
-
-
-def brief(validation: sp.Validation, channels: Sequence[str], horizons: Sequence[float]) -> str:
-    """Prediction fit [%] of the model, the card, and the better one of the two predictors without a model."""
-    lines = ["| ahead | | " + " | ".join(channels) + " |", "|" + " --- |" * (2 + len(channels))]
-    for horizon in horizons:
-        fits = {p: [validation.score(name, horizon, p).fit for name in channels] for p in PREDICTORS}
-        naive = [max(pair) for pair in zip(fits["hold"], fits["constant rates"], strict=True)]
-        for label, row in (
-            ("**model**", fits["model"]),
-            ("published card", fits["published card"]),
-            ("without a model", naive),
-        ):
-            lines.append(f"| {horizon:g} s | {label} | " + " | ".join(f"{fit:.0f}" for fit in row) + " |")
-    return "\n".join(lines)
 
 
 def table(validation: sp.Validation, channels: Sequence[str], horizons: Sequence[float]) -> str:
@@ -106,31 +92,20 @@ def section(learnt: str, predicted: str, fit: sp.Result[Any, Any], validation: s
 
 def main() -> int:
     flights = {name: sp.read(where).condition(rate=100.0, cutoff=0.0) for name, where in FLIGHTS.items()}
-    sections, short, losses = [], [], []
+    sections = []
     for learnt, predicted in (("august", "july"), ("july", "august")):
         fit = sp.identify(sp.vehicle("coax"), flights[learnt])
         validation = sp.validate(fit, flights[predicted])
         sections.append(section(learnt, predicted, fit, validation))
-        short.append(
-            f"Learnt in {learnt.capitalize()}, predicting {predicted.capitalize()} "
-            f"(fit %: 100 perfect, 0 as good as holding the last value):\n\n"
-            + brief(validation, ("phi", "theta", "p", "q", "u", "v"), (0.5, 1.0, 2.0))
-        )
-        losses += [f"{learnt} to {predicted}: {text}" for text in missed(validation)]
         title = f"Learnt in {learnt.capitalize()} 2011, predicting {predicted.capitalize()}"
         prediction_picture(
             validation, path=ROOT / "docs" / "pictures" / f"{learnt}_predicts_{predicted}.png", title=title
         )
         print(validation, "\n")
-    wanted = "roll and pitch attitude and rates up to 2 s ahead, and u and v half a second ahead"
-    told = f"It is to win in {wanted}. It does not in: {'; '.join(losses)}. " if losses else f"It wins in {wanted}. "
-    told += "[All numbers](docs/real-flights.md), yaw and heave among them."
-    readme = ROOT / "README.md"
-    head, rest = readme.read_text(encoding="utf-8").split(BEGIN)
-    tail = rest.split(END)[1]
-    readme.write_text(f"{head}{BEGIN}\n" + "\n\n".join([*short, told]) + f"\n{END}{tail}", encoding="utf-8")
     page = "\n\n".join(["# The real flights", "Written by `scripts/real_flights.py`; do not edit.", *sections])
     (ROOT / "docs" / "real-flights.md").write_text(page + "\n", encoding="utf-8")
+    for quoting in (ROOT / "README.md", ROOT / "docs" / "explanation" / "what-to-trust.md"):
+        quoting.write_text(regenerated(quoting.read_text(encoding="utf-8")), encoding="utf-8")
     return 0
 
 

@@ -11,7 +11,6 @@ import pytest
 
 ARGUMENTS = [
     "--no-sandbox",
-    "--disable-gpu",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -20,14 +19,21 @@ ARGUMENTS = [
 ]
 
 
-def running_browser() -> Iterator[Any]:
+NO_CARD = ["--disable-gpu"]
+SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""WebGL without a graphics card, for pages that draw in three dimensions."""
+
+
+def running_browser(*, webgl: bool = False) -> Iterator[Any]:
     """Chromium, headless; skips where it or playwright is not installed."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
     with sync_api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        running = playwright.chromium.launch(
+            executable_path=chromium, args=[*ARGUMENTS, *(SOFTWARE if webgl else NO_CARD)]
+        )
         yield running
         running.close()
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.identification.core.comparison import Comparison
@@ -18,7 +19,8 @@ from swashplate.identification.core.sources import sources_of
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.catalogue import vehicle
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
+from swashplate.validation.floors import Floor
 from swashplate.validation.validation import (
     PREDICTORS,
     AxisVerdict,
@@ -208,6 +210,17 @@ def validation(*, name: str = "hover.mat", simulated: bool = False) -> Validatio
                 np.linspace(0.001, 0.08, 200)[:, None] * np.ones(12),
             )
         )
+    beside = tuple(
+        Floor(
+            channel=s.channel, unit="", horizon=s.horizon, fit=s.fit, low=s.fit - 8.0, high=s.fit + 8.0, rms=s.rms,
+            moved=0.05 * s.horizon, rival="constant rates", lead=5.0, lead_low=-3.0, lead_high=13.0, expected=60.0,
+            ceiling=math.nan if s.channel == "psi" else s.fit + 1.0, by="blocked cross-validation", gap_low=-4.0,
+            gap_high=6.0, leak=31.0 if s.channel == "psi" else 2.0, seen=s.fit + 1.0, past=20.0,
+            refused="its inputs answer the motion" if s.channel == "psi" else "", blocks=9.0,
+        )
+        for s in scores
+        if s.predictor == "model"
+    )  # fmt: skip
     published = vehicle("coax")
     return Validation(
         vehicle=published.with_values({"tau_f_upper": 1.21}, status="identified"),
@@ -234,6 +247,7 @@ def validation(*, name: str = "hover.mat", simulated: bool = False) -> Validatio
             "noise": {"gust_tilt": 3.0, "wind": 0.0, "tau_wind": 1.0, "speed": 0.0},
         },
         calibrated=(Nuisance(delay_servo=0.092, lever_y=0.156),),
+        floors=beside,
     )
 
 

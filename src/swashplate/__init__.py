@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.observability import observability
+    from swashplate.api.open_logs import open_logs
+    from swashplate.api.plot_logs import plot_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.stability import loop_margins, loop_modes
@@ -58,6 +60,8 @@ if TYPE_CHECKING:
     from swashplate.flights.maneuvers.planned import plan_maneuver
     from swashplate.flights.maneuvers.series import parse as maneuver
     from swashplate.flights.readers.read import read
+    from swashplate.flights.rotor_speed import rotor_speed
+    from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
     from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
@@ -93,6 +97,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
+    from swashplate.validation.compare import compare
+    from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
     from swashplate.validation.verification import verify
@@ -116,6 +122,7 @@ __all__ = [
     "__version__",
     "autopilot",
     "check_controller",
+    "compare",
     "compare_derivatives",
     "coupling",
     "datasets",
@@ -143,6 +150,7 @@ __all__ = [
     "fit_vehicle",
     "fly_maneuver",
     "handling_qualities",
+    "harmonics",
     "hover_hold",
     "hover_trim",
     "identify",
@@ -165,14 +173,18 @@ __all__ = [
     "observe",
     "observer_trial",
     "omit_derivatives",
+    "open_logs",
     "plan_bench",
     "plan_maneuver",
+    "plot_logs",
     "read",
     "read_control",
     "reconstruct",
     "replay",
     "report",
+    "residuals",
     "respond",
+    "rotor_speed",
     "show_replay",
     "simulate",
     "simulate_adaptive",
@@ -180,6 +192,8 @@ __all__ = [
     "simulate_closed_loop",
     "simulate_lpv",
     "simulate_maneuver",
+    "spectrogram",
+    "spectrum",
     "speed_schedule",
     "state_hold",
     "static_decoupling",

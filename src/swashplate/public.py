@@ -38,6 +38,7 @@ _LIGHT: Mapping[str, str] = {
     "fit_tf": "swashplate.api.fit_tf:fit_tf",
     "fit_transfer_function": "swashplate.identification.frequency.transfer_function_fit:fit_transfer_function",
     "handling_qualities": "swashplate.identification.frequency.handling_readings:handling_lines",
+    "harmonics": "swashplate.flights.spectrum:harmonics",
     "inspect": "swashplate.flights.inspect:inspect",
     "load": "swashplate.identification.core.result_file:load",
     "maneuver": "swashplate.flights.maneuvers.series:parse",
@@ -45,10 +46,15 @@ _LIGHT: Mapping[str, str] = {
     "new_card": "swashplate.models.conventional.new_card:new_card",
     "plan_maneuver": "swashplate.flights.maneuvers.planned:plan_maneuver",
     "read": "swashplate.flights.readers.read:read",
+    "open_logs": "swashplate.api.open_logs:open_logs",
+    "plot_logs": "swashplate.api.plot_logs:plot_logs",
     "read_control": "swashplate.export.control_json:read_control",
     "reconstruct": "swashplate.flights.conditioning.reconstruction:reconstruct",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
+    "spectrogram": "swashplate.flights.spectrum:spectrogram",
+    "spectrum": "swashplate.flights.spectrum:spectrum",
+    "rotor_speed": "swashplate.flights.rotor_speed:rotor_speed",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",
     "structure": "swashplate.models.catalogue:structure",
     "suggest_gains": "swashplate.api.gains:suggest_gains",
@@ -64,6 +70,7 @@ _COMPUTING: Mapping[str, str] = {
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",
     "compare_derivatives": "swashplate.simulation.published:compare_derivatives",
+    "compare": "swashplate.validation.compare:compare",
     "coupling": "swashplate.control.laws.linear_decoupling:coupling",
     "decouple": "swashplate.api.decouple:decouple",
     "decouple_axes": "swashplate.api.decouple_axes:decouple_axes",
@@ -96,6 +103,7 @@ _COMPUTING: Mapping[str, str] = {
     "observer_trial": "swashplate.control.lqg.observer_trial:trial",
     "omit_derivatives": "swashplate.simulation.reduction:omit_derivatives",
     "plan_bench": "swashplate.bench.plan:plan",
+    "residuals": "swashplate.validation.residuals:residuals",
     "replay": "swashplate.links.live.replay:replay",
     "show_replay": "swashplate.api.live:show_replay",
     "simulate": "swashplate.simulation.integrate:simulate",
@@ -120,16 +128,17 @@ _BEHIND_METHODS: Mapping[str, str] = {
     "flight_from_arrays": "swashplate.flights.tabular:from_arrays",
     "flight_from_dataframe": "swashplate.flights.tabular:from_dataframe",
     "flight_to_dataframe": "swashplate.flights.tabular:to_dataframe",
-    "html_of_derivatives": "swashplate.reporting.notebook:html_of_derivatives",
-    "html_of_flight": "swashplate.reporting.notebook:html_of_flight",
-    "html_of_responses": "swashplate.reporting.notebook:html_of_responses",
-    "html_of_trim_curve": "swashplate.reporting.notebook:html_of_trim_curve",
-    "html_of_validation": "swashplate.reporting.notebook:html_of_validation",
-    "plot_derivatives": "swashplate.reporting.paper_figures:plot_derivatives",
-    "plot_flight": "swashplate.reporting.paper_figures:plot_flight",
-    "plot_responses": "swashplate.reporting.paper_figures:plot_responses",
-    "plot_trim_curve": "swashplate.reporting.paper_figures:plot_trim_curve",
-    "plot_validation": "swashplate.reporting.paper_figures:plot_validation",
+    "explore": "swashplate.reporting.figures.views:explore",
+    "explore_derivatives": "swashplate.reporting.figures.views:explore_derivatives",
+    "explore_flight": "swashplate.reporting.figures.views:explore_flight",
+    "compose_speeds": "swashplate.reporting.speed_page:compose_speeds",
+    "explore_responses": "swashplate.reporting.figures.views:explore_responses",
+    "figure_names": "swashplate.reporting.figures.views:figure_names",
+    "html_of": "swashplate.reporting.figures.notebook:html_of",
+    "plot": "swashplate.reporting.figures.views:plot",
+    "plot_derivatives": "swashplate.reporting.figures.views:plot_derivatives",
+    "plot_flight": "swashplate.reporting.figures.views:plot_flight",
+    "plot_responses": "swashplate.reporting.figures.views:plot_responses",
     "result_from_document": "swashplate.identification.core.result_file:from_document",
     "result_to_document": "swashplate.identification.core.result_file:to_document",
     "vehicle_of_result": "swashplate.identification.frequency.transfer_function_fit:vehicle_of",
@@ -145,8 +154,17 @@ NAMES = tuple(sorted((*_LIGHT, *_COMPUTING)))
 """What `swashplate` offers by name, the version besides."""
 
 
-def _load(place: str) -> Any:
-    module, _, attribute = place.partition(":")
+def place(name: str) -> str:
+    """Where a name of the tables is defined, as "package.module:name".
+
+    Raises:
+        KeyError: where no table has the name.
+    """
+    return {**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name]
+
+
+def _load(where: str) -> Any:
+    module, _, attribute = where.partition(":")
     return getattr(import_module(module), attribute)
 
 
@@ -157,6 +175,6 @@ def resolve(name: str) -> Any:
         KeyError: where no table has the name.
     """
     if name in _COMPUTING:
-        for place in _SET_UP:
-            _load(place)()
-    return _load({**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name])
+        for step in _SET_UP:
+            _load(step)()
+    return _load(place(name))

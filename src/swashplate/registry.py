@@ -10,7 +10,7 @@ asked for, so that naming one imports nothing. Another package adds one by a Pyt
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
@@ -20,6 +20,12 @@ from typing import Any, Generic, TypeVar
 from swashplate.errors import SwashError
 
 Thing = TypeVar("Thing")
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """A question after the name that one which is none of them may stand for; "" where none is like it."""
+    near = get_close_matches(name, list(names), n=1)
+    return f"Did you mean '{near[0]}'?" if near else ""
 
 
 class Registry(Generic[Thing]):
@@ -58,7 +64,7 @@ class Registry(Generic[Thing]):
             return thing
         if name not in self._others:
             raise SwashError(
-                f"is no {self.what}; expected one of {', '.join(self)}.", channel=name, hint=self._nearest(name)
+                f"is no {self.what}; expected one of {', '.join(self)}.", channel=name, hint=nearest(name, self)
             )
         point = self._others[name]
         try:
@@ -71,7 +77,3 @@ class Registry(Generic[Thing]):
                 hint=f"It is an entry point of the group swashplate.{self.group}: mend or remove that package.",
             ) from error
         return loaded
-
-    def _nearest(self, name: str) -> str:
-        near = get_close_matches(name, list(self), n=1)
-        return f"Did you mean '{near[0]}'?" if near else ""

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import swashplate as sp
-from swashplate.links.live import server
+from swashplate.links.web.libraries import PAGE
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
@@ -41,7 +41,7 @@ def browser() -> Iterator[Any]:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
-    if not (server.PAGE / "vendor" / "three.module.min.js").is_file():
+    if not (PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py (needs npm)")
     with sync_api.sync_playwright() as playwright:
         running = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -168,6 +169,29 @@ def test_panels_zoom_in_time_together(visit: Any) -> None:
     )
     assert len(ranges) == 5
     assert all(found == [3, 5] for found in ranges)
+
+
+def test_a_reader_chooses_dark_and_the_unit_of_frequency(browser: Any, controllers: dict[str, Path]) -> None:
+    seen = Visit(browser, controllers["check"], SIZES["desk"])
+    page = seen.page
+    first = "(document.getElementById('loops-bode')._fullData[0].x[0])"
+    title = "document.getElementById('loops-bode')._fullLayout.xaxis2.title.text"
+    before = page.evaluate(first)
+    assert page.evaluate(title) == "frequency [rad/s]"
+    page.click("#unit")
+    page.wait_for_selector("html[data-drawn=all]", state="attached")
+    assert page.evaluate(title) == "frequency [Hz]"
+    assert page.evaluate(first) == pytest.approx(before / (2.0 * math.pi))
+    light = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    page.click("#look")
+    page.wait_for_selector("html[data-drawn=all]", state="attached")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != light
+    assert page.evaluate("document.getElementById('loops-bode')._fullLayout.paper_bgcolor") == "#15191e"
+    assert page.evaluate(title) == "frequency [Hz]", "the unit stays"
+    page.pdf(format="A4")
+    assert page.locator("#look").inner_text() == "Light", "paper is printed light, the screen stays dark"
+    assert seen.said == []
+    page.close()
 
 
 def test_paper_shows_folded_sections(visit: Any, tmp_path: Path) -> None:

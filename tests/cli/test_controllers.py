@@ -84,7 +84,10 @@ def test_json_says_what_the_table_says() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("decouple", "coax", "--lag", "wrong"), "lag: is 'wrong', expected hover, motor, battery or a number."),
+        (
+            ("decouple", "coax", "--lag", "wrong"),
+            "lag: is 'wrong', expected straight, hover, motor, battery or a number.",
+        ),
         (("decouple", "coax", "--lag", "44", "--mixing", "as_printed"), "no inverse at 45 deg"),
         (("decouple", "coax", "--lag", "1e9"), "--lag: is 1e9 degrees, expected at most 180 either way"),
         (("decouple", "coax", "--voltage", "nan"), "coax.toml: voltage: is not a finite number"),
@@ -244,6 +247,7 @@ def test_the_papers_figure_as_a_report(tmp_path: Path) -> None:
     text = page.read_text()
     assert "SIMULATED FLIGHT" in text
     assert f"{found['with']['drift']:+.2f} m with it" in text
+    assert abs(found["with"]["drift"]) < 0.05 < 0.4 < found["by the paper"]["drift"]
 
 
 def test_aircraft_that_differ_by_more_than_a_fit_says(tmp_path: Path) -> None:

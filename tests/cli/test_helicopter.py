@@ -34,7 +34,7 @@ def test_trim_at_one_speed_and_over_a_range(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert "root-locus" in text
     assert "trim-curves" in text
-    assert "shaft power [kW]" in text
+    assert "power [W]" in text
     table = swash("trim", "raptor50", "--speed", "0-8/8").out.splitlines()
     assert len(table) == 3
     assert "B1 [deg]" in table[0]

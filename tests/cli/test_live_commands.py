@@ -15,7 +15,7 @@ import pytest
 from commands import one_message, swash
 
 import swashplate as sp
-from swashplate.links.live import server
+from swashplate.links.web import libraries, serving
 
 
 @pytest.fixture(autouse=True)
@@ -24,9 +24,9 @@ def page_is_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "page" / "vendor").mkdir(parents=True)
     for name in ("three.module.min.js", "uPlot.esm.js"):
         (tmp_path / "page" / "vendor" / name).touch()
-    monkeypatch.setattr(server, "PAGE", tmp_path / "page")
+    monkeypatch.setattr(libraries, "PAGE", tmp_path / "page")
     empty = hashlib.sha256(b"").hexdigest()
-    monkeypatch.setattr(server, "LIBRARIES", {"three.module.min.js": empty, "uPlot.esm.js": empty})
+    monkeypatch.setattr(libraries, "LIBRARIES", {"three.module.min.js": empty, "uPlot.esm.js": empty})
 
 
 def test_a_port_in_use_is_told() -> None:
@@ -70,7 +70,7 @@ def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
         assert "linear.toml" in told
         assert "lacks equations, inputs" in told
     assert "no equation for u, v, w" in one_message(swash("live", "rotor_body", "--port", "0"))
-    monkeypatch.setattr(server, "serve", lambda *_: None)
+    monkeypatch.setattr(serving, "serve", lambda *_, **__: None)
     outcome = swash("live", "thirteen_state", "--port", "0", "--out", tmp_path / "live")
     assert outcome.code == 0, outcome.err
     assert "http://" in outcome.out
@@ -79,7 +79,7 @@ def test_a_linear_model_flies_by_hand_but_stands_under_no_autopilot(
 
 
 def test_what_is_misspelt_is_told_before_what_a_checkout_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "PAGE", tmp_path / "nothing")
+    monkeypatch.setattr(libraries, "PAGE", tmp_path / "nothing")
     for command in (["live", "nosuch"], ["replay", "nothing.nc"], ["replay", "nothing.nc", "--model", "nosuch"]):
         assert "vendor" not in one_message(swash(*command, "--port", "0"))
     told = one_message(swash("live", "coax", "--port", "0", "--controller", _broken(tmp_path)))
@@ -113,7 +113,7 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPat
 
 
 def test_serves_until_interrupted(tmp_path: Path) -> None:
-    if not (Path(server.__file__).parent / "page" / "vendor" / "three.module.min.js").is_file():
+    if not (libraries.PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py")
     command = [sys.executable, "-m", "swashplate", "live", "coax", "--port", "0"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

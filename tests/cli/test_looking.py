@@ -39,6 +39,21 @@ def test_a_file_whose_name_looks_like_a_window(simulated: Path, tmp_path: Path) 
     assert json.loads(swash("inspect", odd, "--json").out)["duration"] > 9.0
 
 
+def test_rotor_speed_is_measured_from_vibration_and_saved(tmp_path: Path) -> None:
+    time, rng = np.arange(900) / 150.0, np.random.default_rng(1)
+    turning = np.exp(-2j * np.pi * 35.0 * time) + 0.5 * rng.standard_normal(900) + 0.5j * rng.standard_normal(900)
+    log, out = tmp_path / "log.nc", tmp_path / "out.nc"
+    Flight.from_arrays(time, {"phi": 1e-3 * turning.real, "theta": 1e-3 * turning.imag}).save(log)
+    outcome = swash("rotor-speed", log, "--line", "omega_upper=-40..-30", "--out", out)
+    assert outcome.code == 0
+    assert "omega_upper: 219." in outcome.out
+    assert np.mean(Flight.load(out).values("omega_upper")) == pytest.approx(2 * np.pi * 35.0, abs=0.4)
+    refused = swash("rotor-speed", log, "--line", "omega_lower=30..40")
+    assert refused.code != 0
+    assert "no line stands out" in refused.err
+    assert "is no line" in swash("rotor-speed", log, "--line", "omega_lower").err
+
+
 def test_vehicles_are_listed_with_what_they_are() -> None:
     for arguments in (("vehicles",), ("vehicles", "list")):
         outcome = swash(*arguments)

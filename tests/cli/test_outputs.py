@@ -15,8 +15,9 @@ from commands import one_message, swash
 
 import swashplate as sp
 from swashplate.cli.console import as_json
-from swashplate.cli.outputs import folder_when_complete
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.cli.outputs import folder_when_complete, place_of
+from swashplate.errors import SwashError
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import sources_of
@@ -231,3 +232,41 @@ def test_a_folder_is_replaced_file_by_file(tmp_path: Path) -> None:
         "mine": "before",
         "new": "after",
     }
+
+
+def test_an_output_is_a_file_or_a_folder_by_its_ending(tmp_path: Path) -> None:
+    ours = ("report.html", "fit.json")
+    with folder_when_complete(tmp_path / "deep" / "mine.json", ours=ours) as folder:
+        assert folder is not None
+        for name in ours:
+            (folder / name).write_text(name)
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["mine.json"]
+    assert (tmp_path / "deep" / "mine.json").read_text() == "fit.json"
+    (tmp_path / "run.json").mkdir()
+    assert place_of(tmp_path / "run.json", "fit.json", ours) == tmp_path / "run.json" / "fit.json"
+    assert place_of(tmp_path / "v1.2", "fit.json", ours) == tmp_path / "v1.2" / "fit.json"
+    with (
+        pytest.raises(SwashError, match=r"ends in '\.pdf', expected one of \.html, \.json, or a folder for all"),
+        folder_when_complete(tmp_path / "a.pdf", ours=ours),
+    ):
+        pass
+
+
+def test_a_vehicle_is_an_argument_or_an_option_in_every_verb() -> None:
+    one, other = swash("trim", "coax", "--json"), swash("trim", "--json", "--vehicle", "coax")
+    assert one.code == 0
+    assert json.loads(one.out) == json.loads(other.out)
+    assert "Did you mean 'rmax'?" in one_message(swash("trim", "--vehicle=rmaxx"))
+    assert "Did you mean 'rmax'?" in one_message(
+        swash("simulate", "rmaxx", "--maneuver", "doublet:roll,0.5s,0.2", "-o", "a.nc")
+    )
+    assert "Did you mean 'rotor_body'?" in one_message(swash("fit-ss", "rotor_bodi", "responses.nc"))
+
+
+def test_what_was_meant_comes_before_a_long_list(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time [s],phi [deg],servo_roll\n" + "".join(f"{k / 100},{k},0.1\n" for k in range(20)))
+    told = one_message(swash("plot", log, "--channels", "servo_rol", "-o", tmp_path / "a.png"))
+    assert told.index("Did you mean 'servo_roll'?") < told.index("It has phi, servo_roll.")
+    done = swash("plot", log, "-o", tmp_path / "a.png")
+    assert (done.code, (tmp_path / "a.png").is_file()) == (0, True)

@@ -75,6 +75,8 @@ def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[f"{name}: {c.line[:60]}" for name, c in COMMANDS])
 def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -> None:
     words = command.words
+    if words == ["pip", "install", "."]:
+        return
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)
         return
@@ -126,11 +128,15 @@ def test_links_lead_somewhere(name: str) -> None:
 
 
 def test_every_page_can_be_reached_from_the_index() -> None:
-    index = PAGES["docs/index.md"]
-    missing = [
-        n for n in PAGES if n.startswith("docs/") and n != "docs/index.md" and n.removeprefix("docs/") not in index
-    ]
-    assert not missing
+    seen, waiting = set(), [ROOT / "docs" / "index.md"]
+    while waiting:
+        page = waiting.pop()
+        if page in seen or not page.is_file():
+            continue
+        seen.add(page)
+        targets = re.findall(r"\]\(([^)\s#]+\.md)", page.read_text(encoding="utf-8"))
+        waiting += [(page.parent / target).resolve() for target in targets if not target.startswith("http")]
+    assert [name for name in PAGES if ROOT / name not in seen] == []
 
 
 def test_the_guide_to_the_report_names_its_sections() -> None:

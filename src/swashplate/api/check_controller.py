@@ -17,6 +17,7 @@ from swashplate.control.lateness import lateness
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import trim
 from swashplate.simulation.wind import INDOOR, Gusts
@@ -24,7 +25,7 @@ from swashplate.text_table import text_table
 
 
 @dataclass(frozen=True, repr=False)
-class ControllerCheck:
+class ControllerCheck(Shown):
     """A controller on a model: what was found.
 
     Attributes:

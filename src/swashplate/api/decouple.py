@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,7 +19,7 @@ from swashplate.control.draws.robustness import draw_models
 from swashplate.control.lateness import lateness
 from swashplate.control.laws.autopilot import Autopilot, Mode, autopilot
 from swashplate.control.laws.decoupling import Lag, estimated_lag
-from swashplate.control.laws.learning import corrected_by_step, drift_sources
+from swashplate.control.laws.learning import corrected_by_step, drift_sources, straightened
 from swashplate.control.laws.observed_autopilot import ObservedAutopilot
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
@@ -29,6 +29,7 @@ from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.straightness import compose_straightness
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
 
@@ -46,7 +47,7 @@ class FlownStep:
 
     Attributes:
         command: the step.
-        runs: "without" and "with".
+        runs: "without" and "with"; "by the paper" between them where the lag was chosen by flying.
         draws: how many models were drawn.
         sources: of the drift's variance over them: numbers and their shares.
         explained: share of it that a line explains.
@@ -74,7 +75,11 @@ class FlownStep:
     def __repr__(self) -> str:
         head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
         cells = [
-            (name, *(f"{entry[key]:+.2f}" for key in ("drift", "leftmost", "rightmost", "speed")), entry["models"])
+            (
+                name,
+                *(f"{round(entry[key], 2) + 0.0:+.2f}" for key in ("drift", "leftmost", "rightmost", "speed")),
+                entry["models"],
+            )
             for name, entry in self.figures().items()
         ]
         lines = [f"step of the pitch command: {self.command:.3f}", text_table(head, cells)]
@@ -87,7 +92,7 @@ class FlownStep:
 
 
 @dataclass(frozen=True, repr=False)
-class DecouplingDesign:
+class DecouplingDesign(Shown):
     """The controller of a coaxial helicopter: height and yaw held, roll and pitch decoupled.
 
     Attributes:
@@ -188,7 +193,7 @@ def decouple(
     vehicle: Vehicle,
     *,
     mode: Mode = "manual",
-    lag: Lag | float = "battery",
+    lag: Lag | Literal["straight"] | float | None = None,
     mixing: Literal["rotation", "as_printed"] | None = None,
     speed_terms: bool = True,
     voltage: float | None = None,
@@ -206,7 +211,10 @@ def decouple(
     Args:
         vehicle: with the CoaX's equations, published or identified.
         mode: what the servos hold besides a pilot's commands.
-        lag, mixing, speed_terms: of the decoupling; see `swashplate.control.laws.autopilot.autopilot`.
+        lag: "straight" chooses the lag with which the model, its delays included, ends the step straight ahead; the
+            others are the rotor's own lag by the paper (eqs 21, 22) or a constant [rad]. Where not given: "straight"
+            in mode "manual", "battery" in the others, which correct a drift themselves.
+        mixing, speed_terms: of the decoupling; see `swashplate.control.laws.autopilot.autopilot`.
         voltage: battery of the hover [V]; the card's nominal one where not given.
         rate: of the controller [Hz].
         sensors: fly on estimates from these, "imu@100,mocap@50+20ms", not on measurements.
@@ -223,9 +231,21 @@ def decouple(
     _check(step, to_speed, drift, fit)
     nominal = vehicle.card.values().get("voltage_nominal")
     hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
-    made = autopilot(vehicle, hover, mode=mode, rate=rate, lag=lag, speed_terms=speed_terms, mixing=mixing)
+    rule = ("straight" if mode == "manual" else "battery") if lag is None else lag
+    papers = autopilot(
+        vehicle,
+        hover,
+        mode=mode,
+        rate=rate,
+        lag="battery" if rule == "straight" else rule,
+        speed_terms=speed_terms,
+        mixing=mixing,
+    )
+    made = papers
     if to_speed is not None:
-        step = command_for_speed(vehicle, made, hover, speed=to_speed)
+        step = command_for_speed(vehicle, papers, hover, speed=to_speed)
+    if rule == "straight":
+        made = _straight(vehicle, papers, hover, step)
     if drift is not None and step is not None:
         made = corrected_by_step(vehicle, made, hover, command=step, drift=drift)
     slowest = loop_modes(vehicle, made, hover)[0]
@@ -238,7 +258,9 @@ def decouple(
         made,
         complex(slowest),
         None if made.mode == "manual" else loop_margins(vehicle, made, hover),
-        None if step is None else _flown(vehicle, made, hover, step, fit, draws, seed),
+        None
+        if step is None
+        else _flown(vehicle, made, hover, step, fit, draws, seed, papers if made is not papers else None),
         lateness(vehicle, made, given=None),
     )
 
@@ -257,6 +279,15 @@ def _check(step: float | None, to_speed: float | None, drift: float | None, fit:
         raise SwashError(f"is {drift:g} m, expected at most {_FURTHEST:g} either way.", channel="--drift")
 
 
+def _straight(vehicle: Vehicle, papers: Autopilot, hover: Trim, step: float | None) -> Autopilot:
+    """With the lag that makes the step straight; the paper's step where none was asked for."""
+    flown = papers if papers.mode == "manual" else autopilot(vehicle, hover, mode="manual", rate=papers.rate)
+    flown = replace(flown, numbers=flown.numbers._replace(law=papers.numbers.law))
+    command = command_for_speed(vehicle, flown, hover, speed=PAPERS_SPEED) if step is None else step
+    law = straightened(vehicle, flown, hover, command=command).numbers.law
+    return replace(papers, numbers=papers.numbers._replace(law=law))
+
+
 def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: float) -> ObservedAutopilot:
     return ObservedAutopilot(made, design(vehicle, sensors=suite(sensors), rate=made.rate, voltage=voltage))
 
@@ -269,12 +300,15 @@ def _flown(
     fit: Fitted | None,
     draws: int,
     seed: int,
+    papers: Autopilot | None,
 ) -> FlownStep:
     bare = autopilot(vehicle, hover, mode="manual", rate=made.rate, decoupled=False)
     drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+    flown = {"without": bare, "by the paper": papers, "with": made}
     runs = {
         name: step_run(vehicle, controller, hover, command=step, parameters=drawn)
-        for name, controller in (("without", bare), ("with", made))
+        for name, controller in flown.items()
+        if controller is not None
     }
     spread = runs["with"].drawn
     if drawn is None or spread is None:

@@ -14,6 +14,7 @@ from swashplate.json_text import as_json
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.linear_decoupling import compose_linear_decoupling
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import trim
 from swashplate.text_table import text_table
@@ -28,7 +29,7 @@ _SLOW = ("x", "y", "z", "psi", "u", "v", "w", "phi", "theta")
 
 
 @dataclass(frozen=True, repr=False)
-class AxesDecoupling:
+class AxesDecoupling(Shown):
     """A matrix and a filter that decouple axes, and what they reach on their own model.
 
     Attributes:
@@ -177,9 +178,9 @@ def _usual(system: Any) -> tuple[tuple[str, str], ...]:
 
 def _system(model: Vehicle, speed: float) -> Any:
     if model.structure is not None:
-        return model.structure.to_control()
+        return model.structure.to_control(pade=0)
     nominal = model.card.values().get("voltage_nominal")
-    return linearize(model, trim(model, speed=speed, voltage=nominal)).to_control()
+    return linearize(model, trim(model, speed=speed, voltage=nominal)).to_control(pade=0)
 
 
 def _matrices(system: Any, states: Sequence[str]) -> dict[str, Any]:

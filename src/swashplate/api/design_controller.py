@@ -22,6 +22,7 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.controller_design import compose_design
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 USUAL_SENSORS = "imu@100,mocap@100+10ms"
@@ -30,7 +31,7 @@ Gain = Literal["flying", "steady"]
 
 
 @dataclass(frozen=True, repr=False)
-class ControllerDesign:
+class ControllerDesign(Shown):
     """A designed controller, and what linear algebra promises of it.
 
     Attributes:

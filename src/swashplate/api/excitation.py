@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import records
 from swashplate.identification.time import feedback

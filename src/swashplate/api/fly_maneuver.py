@@ -19,6 +19,7 @@ from swashplate.models.doubts import doubts_along
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import compose_flight
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import Controller, simulate_maneuver
 from swashplate.simulation.sensors import QUIET, Sensors, observe
 from swashplate.simulation.trim import Trim
@@ -29,7 +30,7 @@ _WIND = ("wind_north", "wind_east", "wind_down")
 
 
 @dataclass(frozen=True, repr=False)
-class SimulatedFlight:
+class SimulatedFlight(Shown):
     """A maneuver that was flown.
 
     Attributes:

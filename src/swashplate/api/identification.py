@@ -13,15 +13,16 @@ from swashplate.api.saying import Say, silent
 from swashplate.flights.flight import Flight
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core.parameters import parameterize
-from swashplate.identification.core.records import records
+from swashplate.identification.core.records import POSE, records
 from swashplate.identification.core.result import Result
+from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
 from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.models.card import Card
 from swashplate.models.choices import Free
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.compose import compose
 from swashplate.reporting.html import write_page
+from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report
 from swashplate.reporting.summary import banners, summary
 from swashplate.validation.validation import Validation
@@ -29,6 +30,8 @@ from swashplate.validation.verb import validate
 
 FILES = ("report.html", "model.toml", "fit.json", "validation.json")
 """What `save` may write."""
+TRACKED = ("prediction-error", "output-error", "nelder-mead")
+"""Methods that are checked for a tracked pose before anything is computed."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,7 +53,7 @@ class Identification:
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""
-        return compose(self.fit, self.validation, title=title)
+        return structure_of(self.fit, self.validation, title=title)
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Write report.html, fit.json, model.toml and validation.json into a folder; a failed fit has no model."""
@@ -65,10 +68,12 @@ class Identification:
         if self.validation is not None:
             self.validation.save(folder / "validation.json")
         if not self.fit.failed:
-            self.fit.model.save(folder / "model.toml")
+            self.fit.vehicle.save(folder / "model.toml")
 
     def lines(self) -> list[str]:
         """The report's own warnings and five lines, in words."""
+        if not isinstance(self.fit.model, Vehicle):
+            return []
         told = [f"! {text}" for _, text in banners(self.fit, self.validation)]
         return told + [f"{label + ':':11} {words}" for label, words, _ in summary(self.fit, self.validation)]
 
@@ -83,6 +88,7 @@ def identify_and_validate(
     hold_out: Flight | Iterable[Flight] = (),
     free: str | Sequence[str | Free] = "full",
     method: str = "prediction-error",
+    outputs: Sequence[str] | None = None,
     ties: Sequence[str] = (),
     fixed: Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
@@ -99,7 +105,7 @@ def identify_and_validate(
         vehicle: the equations and the numbers to start from.
         flights: conditioned, with their pose tracked.
         hold_out: conditioned flights that the fit never sees.
-        free, method, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as of `identify`.
+        free, method, outputs, ties, fixed, priors, prior_card, iterations, keep_unexcited, wind: as of `identify`.
         names: what the user calls the flights and the hold-outs, for messages.
         say: told what is being done.
 
@@ -111,14 +117,18 @@ def identify_and_validate(
     unseen = (hold_out,) if isinstance(hold_out, Flight) else tuple(hold_out)
     check_disjoint([*seen, *unseen], names)
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
-    parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
-    records([*seen, *unseen], vehicle)
+    check_method(method)
+    if vehicle.structure is None or method in TRACKED:
+        parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
+    if method in TRACKED:
+        records([*seen, *unseen], vehicle, outputs=outputs or POSE)
     say("preparing the fit (compiling takes longest the first time)")
     fit = identify(
         vehicle,
         seen,
         free=free,
         method=method,
+        outputs=outputs,
         ties=ties,
         fixed=fixed,
         priors=priors,

@@ -51,6 +51,8 @@ def live(
     need_live_extra()
     from swashplate.links.live import server
     from swashplate.links.live.session import LiveSession
+    from swashplate.links.web import serving
+    from swashplate.links.web.libraries import check_page
 
     place = Path(folder)
     if place.exists() and not place.is_dir():
@@ -58,14 +60,14 @@ def live(
     enable_compilation_cache()
     dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
     chosen = None if controller is None else _for_sticks(controller)
-    server.check_page()
-    with server.listen(host, port, allow_remote=allow_remote) as listening:
+    check_page()
+    with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
         session = LiveSession(vehicle, controller=chosen, folder=place)
         session.clock.start()
         try:
-            _announce(server.address_of(listening), open_page=open_page, ready=ready, say=say)
-            server.serve(server.live_app(session, remote=allow_remote), listening)
+            announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+            serving.serve(server.live_app(session, remote=allow_remote), listening, frame=server.FRAME)
         finally:
             session.close()
 
@@ -91,15 +93,18 @@ def show_replay(
     """
     need_live_extra()
     from swashplate.links.live import server
+    from swashplate.links.web import serving
+    from swashplate.links.web.libraries import check_page
 
-    with server.listen(host, port, allow_remote=allow_remote) as listening:
+    with serving.listen(host, port, allow_remote=allow_remote) as listening:
         made = shown if isinstance(shown, Replay) else shown()
-        server.check_page()
-        _announce(server.address_of(listening), open_page=open_page, ready=ready, say=say)
-        server.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
+        check_page()
+        announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
+        serving.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
 
 
-def _announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+    """Tell where a page is, and open it where that was asked for."""
     ready(address)
     if open_page and not webbrowser.open(address):
         say(f"No browser was found; open {address} yourself.")

@@ -27,6 +27,7 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.monte_carlo import compose_monte_carlo
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.trim import trim
@@ -38,7 +39,7 @@ _KEPT = 20.0  # Hz of the samples that the summary sees
 
 
 @dataclass(frozen=True, repr=False)
-class MonteCarlo:
+class MonteCarlo(Shown):
     """Many flights of one controller.
 
     Attributes:

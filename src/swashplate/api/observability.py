@@ -12,11 +12,12 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.observability import compose_observability
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.trim import trim
 
 
 @dataclass(frozen=True, repr=False)
-class ObservabilityStudy:
+class ObservabilityStudy(Shown):
     """What a sensor suite sees of a vehicle at some speeds.
 
     Attributes:

@@ -25,8 +25,11 @@ from swashplate.cli import (
     link,
     live,
     maneuver,
+    open,
+    plot,
     replay,
     respond,
+    rotor_speed,
     simulate,
     trim,
     validate,
@@ -75,10 +78,13 @@ app.command("fit-tf", short_help="Fit transfer functions to frequency responses.
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
+app.command("open", short_help="Look at any log in the browser: one page for all of it.")(open.open_)
 app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)
 app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
+app.command("plot", short_help="Draw logs over time or frequency, several over each other.")(plot.plot)
+app.command("rotor-speed", short_help="Measure rotor speed from vibration in a log.")(rotor_speed.rotor_speed)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)

@@ -73,7 +73,7 @@ def check(
     import swashplate as sp
     from swashplate.cli.flying import end_with
     from swashplate.cli.gusts import turbulence
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, place_of
 
     with folder_when_complete(out, ours=OURS) as folder:
         found = sp.check_controller(
@@ -96,6 +96,6 @@ def check(
 
             sp.report(found, path=folder / "report.html")
             write_text(folder / "check.json", as_json(found.to_document()) + "\n")
-    written = () if out is None else tuple(out / name for name in OURS)
+    written = () if out is None else tuple(dict.fromkeys(place_of(out, name, OURS) for name in OURS))
     shared.show(found, written=written, json=json, quiet=quiet)
     end_with(found.problems)

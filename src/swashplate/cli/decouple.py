@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -15,7 +15,7 @@ from swashplate.errors import SwashError
 if TYPE_CHECKING:
     from swashplate.control.laws.decoupling import Lag
 
-_LAG = "Phase lag from the battery-compensated motor command (battery), the plain one (motor), the hover's rotor speed (hover), or a constant in degrees."  # fmt: skip # noqa: E501
+_LAG = "Phase lag that makes the model's step straight (straight; by default in mode manual), the rotor's from the battery-compensated motor command (battery), the plain one (motor) or the hover's speed (hover), or a constant in degrees."  # fmt: skip # noqa: E501
 _STEP = "Fly this step of the pitch command for 6 m, with and without the decoupling."
 _DRIFT = "Seen on the step with this law [m to the right after 6 m]: take it out."
 _SENSORS = "Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."
@@ -24,7 +24,7 @@ _SENSORS = "Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on meas
 def decouple(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="A model file, or a vehicle's name.")],
     out: shared.Out = None,
-    lag: Annotated[str, typer.Option("--lag", help=_LAG)] = "battery",
+    lag: Annotated[str | None, typer.Option("--lag", help=_LAG)] = None,
     mixing: Annotated[
         shared.Mixing | None,
         typer.Option("--mixing", help="Form of the equations to invert; the model's own by default."),
@@ -72,7 +72,7 @@ def decouple(
     made = sp.decouple(
         sp.vehicle(model),
         mode=mode.value,
-        lag=_lag(lag),
+        lag=None if lag is None else _lag(lag),
         mixing=None if mixing is None else mixing.value,
         speed_terms=speed_terms,
         voltage=voltage,
@@ -92,15 +92,17 @@ def decouple(
     shared.show(made, code=told, written=(out, c_code, report), json=json, quiet=quiet)
 
 
-def _lag(text: str) -> Lag | float:
+def _lag(text: str) -> Lag | Literal["straight"] | float:
     """A rule's name, or degrees as radians."""
     from swashplate.control.laws.decoupling import LAGS
 
+    if text == "straight":
+        return "straight"
     for name in LAGS:
         if text == name:
             return name
     if text.isalpha():
-        raise SwashError(f"is '{text}', expected {', '.join(LAGS)} or a number.", channel="lag")
+        raise SwashError(f"is '{text}', expected straight, {', '.join(LAGS)} or a number.", channel="lag")
     degrees = options.numbers(text, option="--lag", count=1)[0]
     if not abs(degrees) <= 180.0:
         raise SwashError(f"is {text} degrees, expected at most 180 either way.", channel="--lag")

@@ -17,14 +17,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.trim import Trim
 
 
-class Format(StrEnum):
-    C = "c"
-    FMU = "fmu"
-    ARDUPILOT = "ardupilot-statespace"
-    CONTROL = "control"
-    MATLAB = "matlab"
-    SIMULINK = "simulink"
-    MCAP = "mcap"
+MCAP = "mcap"
+"""The format of flights; those of models are in `FORMATS`, other packages' too."""
 
 
 class CodePrecision(StrEnum):
@@ -42,12 +36,12 @@ def export(
         ),
     ],
     form: Annotated[
-        Format,
+        str,
         typer.Option(
             "--format",
             help="c: C99 step, rates, Jacobians. fmu: FMI 2.0 co-simulation. simulink: S-function. control: JSON for "
             "python-control. matlab: .mat. ardupilot-statespace: JSON for SITL. mcap: a flight for Foxglove, "
-            "Lichtblick, PlotJuggler and Rerun.",
+            "Lichtblick, PlotJuggler and Rerun. Or another package's.",
         ),
     ],
     out: Annotated[
@@ -93,23 +87,26 @@ def export(
     import swashplate as sp
     from swashplate.cli.console import as_json
     from swashplate.documents import kind_of
+    from swashplate.export.formats import FORMATS
 
+    if form != MCAP and form not in FORMATS:
+        raise SwashError(
+            f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join((*FORMATS, MCAP))}."
+        )
     only_vehicles = {"--speed": speed, "--mass": mass, "--set": changed, "--option": switched, "--delays": delays}
     refused = [option for option, value in only_vehicles.items() if value is not None]
-    if form is Format.MCAP:
+    if form == MCAP:
         made = _flight(model, name, refused)
     elif kind_of(model) == "controller":
-        if form is not Format.C:
-            raise SwashError(
-                "is a controller: --format c writes its step.", where=model, channel=f"--format {form.value}"
-            )
+        if form != "c":
+            raise SwashError("is a controller: --format c writes its step.", where=model, channel=f"--format {form}")
         if refused:
             raise SwashError("is for vehicles, and this is a controller.", where=model, channel=", ".join(refused))
         made = sp.export_controller(model, name=name, precision=precision.value)
     else:
         exported, trim = _model(model, speed, mass, changed, switched)
         made = sp.export_model(
-            exported, form.value, name=name or Path(model).stem, trim=trim, precision=precision.value, delays=delays
+            exported, form, name=name or Path(model).stem, trim=trim, precision=precision.value, delays=delays
         )
     made.save(out)
     written = [str(out / file) for file in made.files]

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from swashplate.cli.spelling import spelled
 from swashplate.errors import SwashError
 
 _LONGEST = 200  # characters of a foreign error that are shown
@@ -54,6 +55,10 @@ def _file_trouble(error: OSError) -> str:
 
 class Guarded(TyperGroup):
     """A group of verbs that ends in words: `SwashError` and trouble with files give 2, anything unforeseen 1."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command, rest if command is None else spelled(command, rest)
 
     def invoke(self, ctx: Any) -> Any:
         debug = bool(ctx.params.get("debug")) or os.environ.get("SWASHPLATE_DEBUG", "") not in ("", "0")

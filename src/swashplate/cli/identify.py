@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,12 +16,6 @@ if TYPE_CHECKING:
     from swashplate.api.identification import Identification
 
 
-class FitMethod(StrEnum):
-    PREDICTION_ERROR = "prediction-error"
-    OUTPUT_ERROR = "output-error"
-    NELDER_MEAD = "nelder-mead"
-
-
 def identify(
     vehicle: options.VehicleName,
     flight: options.Flights,
@@ -31,7 +24,18 @@ def identify(
     free: Annotated[
         str, typer.Option("--free", help="Ready choice (full, flight) or parameter names separated by commas.")
     ] = "full",
-    method: Annotated[FitMethod, typer.Option("--method", help="How to estimate.")] = FitMethod.PREDICTION_ERROR,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            help="prediction-error, output-error, nelder-mead, collocation (any equations, unstable ones and start "
+            "values of zero too), or another package's.",
+        ),
+    ] = "prediction-error",
+    outputs: Annotated[
+        str | None,
+        typer.Option("--outputs", help="Channels to fit, separated by commas; the method's own choice by default."),
+    ] = None,
     fix: flying.Fix = None,
     tie: Annotated[
         list[str] | None, typer.Option("--tie", metavar="'A = B'", help="Tie a parameter to an expression.")
@@ -81,7 +85,8 @@ def identify(
             read[: len(flight)],
             hold_out=read[len(flight) :],
             free=names[0] if len(names) == 1 else names,
-            method=method.value,
+            method=method,
+            outputs=None if outputs is None else [name.strip() for name in outputs.split(",") if name.strip()],
             ties=tuple(tie or ()),
             fixed=held or None,
             priors=priors or None,
@@ -124,6 +129,9 @@ def show(made: Identification, *, out: Path | None, json: bool, quiet: bool) -> 
     if json:
         typer.echo(as_json(made.to_document()))
     elif not quiet:
-        console().print(fit_table(made.fit))
-        place = out / "report.html" if out else "not written (give --out DIR)"
+        from swashplate.api.identification import FILES
+        from swashplate.cli.outputs import place_of
+
+        console().print(fit_table(made.fit) if hasattr(made.fit.model, "card") else repr(made.fit))
+        place = place_of(out, "report.html", FILES) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))

@@ -34,6 +34,9 @@ def respond(
     windows: Annotated[
         str | None, typer.Option("--windows", help="Window lengths in s, separated by commas; by the book's rules.")
     ] = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="The direct estimate: sweeps found in the inputs are no references.")
+    ] = False,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -67,7 +70,13 @@ def respond(
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
             found = sp.respond(
-                flights, inputs=list(ins), outputs=list(outs), references=refs, band=limits, windows=lengths
+                flights,
+                inputs=list(ins),
+                outputs=list(outs),
+                references=refs,
+                band=limits,
+                windows=lengths,
+                direct=direct,
             )
             document = {**found.as_dict(), "handling": [one.as_dict() for one in sp.handling_qualities(found)]}
             if folder is not None:

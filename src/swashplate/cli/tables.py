@@ -74,6 +74,15 @@ def validation_table(validation: Validation, *, width: int) -> RenderableType:
     return table(head, rows, left=2)
 
 
+def floors_table(validation: Validation) -> RenderableType:
+    """What the model's scores stand beside, by channel and horizon."""
+    from swashplate.validation.floors import ROWS
+
+    head = ("channel", "ahead [s]", "fit %", *(words for words, _ in ROWS))
+    rows = [(f.channel, f"{f.horizon:g}", f"{f.fit:.0f}", *(cell(f) for _, cell in ROWS)) for f in validation.floors]
+    return table(head, rows)
+
+
 def parameter_table(vehicle: Vehicle) -> RenderableType:
     """Every number of a card with its unit, status and source."""
     rows = [

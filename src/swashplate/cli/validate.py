@@ -48,7 +48,7 @@ def validate(
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.cli.reading import asked, conditioned, read_all
-    from swashplate.cli.tables import validation_table
+    from swashplate.cli.tables import floors_table, validation_table
     from swashplate.flights.overlap import check_disjoint
     from swashplate.identification.core.records import records
 
@@ -104,6 +104,9 @@ def validate(
     elif not quiet:
         screen = console()
         screen.print(validation_table(validation, width=screen.width))
+        if validation.floors:
+            typer.echo("\nWhat the model's scores stand beside")
+            screen.print(floors_table(validation))
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

@@ -75,13 +75,13 @@ def read_linear(path: str | Path) -> Linear:
     )
 
 
-def read_control(path: str | Path) -> Any:
-    """The same as `control.StateSpace` with named signals (without the delays).
+def read_control(path: str | Path, *, pade: int | None = None) -> Any:
+    """The same as `control.StateSpace` with named signals; `pade` says what becomes of delays (`Linear.to_control`).
 
     Raises:
         ExportError: as `read_linear`.
     """
-    return read_linear(path).to_control()
+    return read_linear(path).to_control(pade=pade)
 
 
 def _names(document: Mapping[str, Any], key: str, path: str | Path) -> tuple[str, ...]:

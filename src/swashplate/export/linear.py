@@ -9,6 +9,7 @@ from typing import Any
 from swashplate.arrays import Array
 from swashplate.errors import ExportError
 from swashplate.models.delays import input_delays
+from swashplate.models.linear import python_control
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.linearize import linearize
@@ -46,18 +47,23 @@ class Linear:
         """Delay of one response [s]."""
         return self.delays.get(f"{output}/{input}", self.delays.get(input, 0.0))
 
-    def to_control(self) -> Any:
-        """As `control.StateSpace` of python-control with named signals, without the delays."""
-        import control
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """As `control.StateSpace` of python-control with named signals.
 
-        return control.ss(
-            self.A,
-            self.B,
-            self.C,
-            self.D,
-            states=list(self.states),
-            inputs=list(self.inputs),
-            outputs=list(self.outputs),
+        Args:
+            pade: order of the polynomials that stand for the delays; 0 leaves the delays out, None does so with a
+                warning where there are any.
+
+        Raises:
+            SwashError: an order outside 0 to 12.
+        """
+        return python_control.state_space(
+            (self.A, self.B, self.C, self.D),
+            states=self.states,
+            inputs=self.inputs,
+            outputs=self.outputs,
+            delays=self.delays,
+            pade=pade,
             name=self.name,
         )
 

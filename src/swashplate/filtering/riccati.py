@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from swashplate.simulation.discretisation import summed
+from swashplate.simulation.gathered_noise import summed
 
 Map = tuple[Any, Any, Any]
 """A, G and H of some samples."""

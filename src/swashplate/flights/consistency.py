@@ -264,7 +264,8 @@ def _agreements(
         for part in smooth[: smooth.shape[0] // n * n].reshape(-1, n, smooth.shape[1]):
             spreads.append(part.std(axis=0))
             centred = part - part.mean(axis=0)
-            length = np.sqrt(np.sum(centred**2, axis=0)) + np.finfo(np.float64).tiny
+            least = np.sqrt(np.finfo(np.float64).tiny)  # so that two still channels give 0, not 0 / 0
+            length = np.sqrt(np.sum(centred**2, axis=0)) + least
             correlations.append((centred.T @ centred)[:k, k:] / np.outer(length[:k], length[k:]))
     made: dict[int, dict[int, _Agreement]] = {}
     if not spreads:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -102,11 +102,12 @@ class Flight:
         for stream_name, data in self.streams.items():
             if name in data.data_vars:
                 return stream_name
+        asked = did_you_mean(name, self.channels)
         raise FlightError(
-            f"the flight has no such channel; it has {', '.join(self.channels) or 'none'}.",
+            f"the flight has no such channel.{f' {asked}' if asked else ''}",
             where=self.provenance.source or None,
             channel=name,
-            hint=did_you_mean(name, self.channels),
+            hint=f"It has {', '.join(self.channels) or 'none'}.",
         )
 
     def time(self, name: str) -> Array:
@@ -225,13 +226,21 @@ class Flight:
         frame: pd.DataFrame = resolve("flight_to_dataframe")(self, stream=stream)
         return frame
 
-    def plot(self, *, channels: Sequence[str] | None = None) -> Figure:
+    def plot(
+        self, *, channels: Sequence[str] | None = None, theme: Literal["paper", "light", "dark"] = "paper"
+    ) -> Figure:
         """Channels over time as a matplotlib figure: one panel each, or the usual groups where none are named."""
-        figure: Figure = resolve("plot_flight")(self, channels=channels)
+        figure: Figure = resolve("plot_flight")(self, channels=channels, theme=theme)
         return figure
 
+    def explore(
+        self, *, channels: Sequence[str] | None = None, theme: Literal["paper", "light", "dark"] = "light"
+    ) -> Any:
+        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
+        return resolve("explore_flight")(self, channels=channels, theme=theme)
+
     def _repr_html_(self) -> str:
-        page: str = resolve("html_of_flight")(self)
+        page: str = resolve("html_of")(self)
         return page
 
     # ---- files -------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from swashplate.flights.epoch import note
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.schema import QUATERNION, channel, is_known
+from swashplate.shown import Shown
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -88,7 +89,7 @@ class ChannelSummary:
 
 
 @dataclass(frozen=True)
-class Inspection:
+class Inspection(Shown):
     """What `inspect` found; prints as tables in a terminal (rich) and as text.
 
     Attributes:

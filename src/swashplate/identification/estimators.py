@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
+from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
@@ -93,8 +94,20 @@ ESTIMATORS: Registry[Estimator] = Registry(
         "output-error/linear": "swashplate.identification.time.linear_time_fit:OUTPUT_ERROR",
         "filter-error/linear": "swashplate.identification.time.linear_time_fit:FILTER_ERROR",
         "prediction-error/linear": "swashplate.identification.time.linear_time_fit:PREDICTION_ERROR",
+        "collocation": "swashplate.identification.time.collocation:COLLOCATION",
         "frequency-lines": "swashplate.identification.time.linear_frequency_fit:FREQUENCY_LINES",
         "frequency-responses": "swashplate.identification.frequency.state_space_fit:FREQUENCY_RESPONSES",
     },
 )
 """By "METHOD", or "METHOD/KIND" where a method has forms for several kinds of model: the first that suits is taken."""
+
+
+def check_method(method: str | None) -> None:
+    """That some estimator is of that method.
+
+    Raises:
+        IdentificationError: with the methods that there are.
+    """
+    methods = list(dict.fromkeys(name.split("/")[0] for name in ESTIMATORS))
+    if method is not None and method not in methods:
+        raise IdentificationError(f"method is '{method}', expected one of {', '.join(methods)}.")

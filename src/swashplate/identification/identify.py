@@ -8,7 +8,7 @@ from typing import Any
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
-from swashplate.identification.estimators import ESTIMATORS, Data, Estimator, Question
+from swashplate.identification.estimators import ESTIMATORS, Data, Estimator, Question, check_method
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.card import Card
 from swashplate.models.choices import Free
@@ -48,7 +48,8 @@ def identify(
         method: one of `ESTIMATORS`; None takes the first that suits model and data. For helicopters with their pose
             tracked "prediction-error" (flights in disturbed air or under feedback), "output-error" (undisturbed
             open-loop flights and simulations) or "nelder-mead" (the paper's own way, for comparison); for any other
-            equations and for state-space models "filter-error", "prediction-error" or "output-error".
+            equations and for state-space models "filter-error", "prediction-error" or "output-error"; for any of them
+            "collocation", which needs no stable model and no good start values.
         ties: "name = expression" each.
         fixed: values of parameters that are not to move.
         priors: mean and standard deviation by name.
@@ -108,9 +109,7 @@ def identify(
 
 def _suited(model: Vehicle | StateSpaceModel, data: Data, method: str | None) -> tuple[str, Estimator]:
     """The first estimator of that method (None: of any) that suits."""
-    methods = list(dict.fromkeys(name.split("/")[0] for name in ESTIMATORS))
-    if method is not None and method not in methods:
-        raise IdentificationError(f"method is '{method}', expected one of {', '.join(methods)}.")
+    check_method(method)
     refused = {}
     for name in ESTIMATORS:
         if method in (None, name.split("/")[0]):

@@ -6,7 +6,6 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from swashplate.models.card import Card, packaged_cards, read_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.vehicle import Vehicle
-from swashplate.registry import Registry
+from swashplate.registry import Registry, nearest
 
 EQUATIONS: Registry[Callable[[Card], Vehicle]] = Registry(
     "models",
@@ -42,7 +41,7 @@ def from_card(card: Card) -> Vehicle:
             f"vehicle is '{card.vehicle}', expected one of {', '.join(sorted(EQUATIONS))}.",
             where=card.path,
             channel="vehicle",
-            hint=_nearest(card.vehicle, EQUATIONS)
+            hint=nearest(card.vehicle, EQUATIONS)
             or "Equations of your own are found by an entry point of the group swashplate.models (docs/extending.md).",
         )
     return EQUATIONS[card.vehicle](card)
@@ -75,7 +74,7 @@ def vehicle(name_or_file: str | Path, **options: Any) -> Vehicle:
         card = _card_beside(text)
     else:
         names = (*packaged, *state_space_file.structure_names(), *(n for n in EQUATIONS if n not in _SEVERAL))
-        near = _nearest(text, names)
+        near = nearest(text, names)
         raise CardError(
             "is neither a vehicle's name nor a file.",
             where=text,
@@ -148,8 +147,3 @@ def _card_beside(name: str) -> Card:
             hint=f"Give a card's file with vehicle = \"{name}\", or put {name}.toml beside the module '{module}'.",
         )
     return replace(read_card(file), path=file.name)
-
-
-def _nearest(name: str, names: Any) -> str:
-    near = get_close_matches(name, list(names), n=1)
-    return f"Did you mean '{near[0]}'?" if near else ""

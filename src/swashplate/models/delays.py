@@ -39,6 +39,12 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
     return {name: max(0.0, float(value)) for name, value in found.items()}
 
 
+def known_delays(vehicle: Vehicle) -> dict[str, float]:
+    """The same [s], by "output/input" where an input reaches outputs after different times; empty: none is known."""
+    apart = vehicle.card.observer.get(BY_OUTPUT)
+    return {name: max(0.0, float(value)) for name, value in apart.items()} if apart else input_delays(vehicle)
+
+
 def complete_delays(vehicle: Vehicle, delays: Mapping[str, float] | float) -> dict[str, float]:
     """A delay for every input [s], of one number for all or of some by name; inputs that are not named act at once.
 

@@ -16,7 +16,8 @@ from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.summary import banners, summary
 from swashplate.reporting.versions import date, versions
-from swashplate.simulation.linearize import Mode, linearize
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 

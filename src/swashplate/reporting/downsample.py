@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 
-MAX_POINTS = 2000
-"""Points that one line of a page may have: more than a screen has columns."""
+MAX_POINTS = 1500
+"""Points that one line of a page may have: a least and a greatest for each column of a screen's plot, or nearly."""
 
 
 def kept(values: Array, *, limit: int = MAX_POINTS) -> NDArray[np.int64]:

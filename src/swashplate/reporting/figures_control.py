@@ -24,27 +24,18 @@ from swashplate.reporting.theme import (
     base_layout,
     grid,
     line,
+    over_frequency,
     packed,
-    stacked,
 )
 
 _COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
 _DASHES = ("solid", "dash", "dot", "dashdot")
-_PANEL = 170
 ATTITUDE_WORDS = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
 
 
 def style(i: int) -> tuple[str, str]:
     """Colour and line style number i."""
     return _COLORS[i % len(_COLORS)], _DASHES[i % len(_DASHES)]
-
-
-def over_frequency(titles: list[str], *, height: int = _PANEL) -> dict[str, Any]:
-    """Layout of panels over one logarithmic frequency axis [rad/s]."""
-    layout = stacked(titles, height=height, x_title="frequency [rad/s]")
-    for k in range(len(titles)):
-        layout[f"xaxis{'' if k == 0 else k + 1}"]["type"] = "log"
-    return layout
 
 
 def loops_figure(check: ControlCheck) -> Figure:
@@ -151,7 +142,9 @@ def bandwidth_chart(check: ControlCheck) -> Figure:
     """Phase delay over bandwidth, one panel an axis, with the scaled level boundaries."""
     found = [a for a in check.attitudes if a.handling and np.isfinite(a.handling.bandwidth.value)]
     titles = [ATTITUDE_WORDS[a.state] for a in found]
-    layout = grid(titles, columns=min(3, len(titles)), height=240, x_title="bandwidth [rad/s]")
+    layout = grid(
+        titles, columns=min(3, len(titles)), height=240, x_title="bandwidth [rad/s]", y_title="phase delay [s]"
+    )
     delays = [a.handling.phase_delay.value for a in found if a.handling]
     highest = 1.4 * max([d for d in delays if np.isfinite(d)] or [0.1])
     traces: list[dict[str, Any]] = []
@@ -180,8 +173,6 @@ def bandwidth_chart(check: ControlCheck) -> Figure:
         )  # fmt: skip
         layout[f"xaxis{number}"]["range"] = [0.0, right]
         layout[f"yaxis{number}"]["range"] = [0.0, highest]
-    layout["yaxis"]["title"] = {"text": "phase delay [s]", "standoff": 4, "font": {"size": 12}}
-    layout["margin"]["l"] = 58
     return Figure(
         identifier="bandwidth-chart",
         spec={"data": traces, "layout": layout},

@@ -26,7 +26,7 @@ from swashplate.reporting.theme import (
     stacked,
     unit_words,
 )
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 
 LAGS = 50
 """Samples of autocorrelation that are drawn."""
@@ -103,7 +103,7 @@ def residual_time(pieces: Mapping[str, Sequence[tuple[Array, Array]]], sigma: Ma
 def residual_correlation(pieces: Mapping[str, Sequence[Array]], dt: float) -> Figure:
     """Autocorrelation of the residuals with the bound of white noise."""
     names = list(pieces)
-    layout = grid(names, columns=2, height=140, x_title="lag [s]")
+    layout = grid(names, columns=2, height=140, x_title="lag [s]", y_title="autocorrelation [-]")
     traces: list[dict[str, Any]] = []
     outside = {}
     for i, name in enumerate(names):
@@ -153,7 +153,13 @@ def residual_histogram(pieces: Mapping[str, Sequence[Array]], sigma: Mapping[str
     """Distribution of the residuals beside the normal distribution that the model promises."""
     names = list(pieces)
     finely = {name: _finely(name, sigma[name]) for name in names}
-    layout = grid([f"{name} [{finely[name][1]}]" for name in names], columns=2, height=140, x_title="")
+    layout = grid(
+        [f"{name} [{finely[name][1]}]" for name in names],
+        columns=2,
+        height=140,
+        x_title="residual",
+        y_title="density [per unit]",
+    )
     traces: list[dict[str, Any]] = []
     for i, name in enumerate(names):
         number = "" if i == 0 else str(i + 1)
@@ -202,7 +208,7 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
     """Correlation of the estimates as a picture."""
     n = len(names)
     size = 140 + max(160, 34 * n)
-    layout = base_layout(size, left=140, bottom=130, top=10, right=60)
+    layout = base_layout(size, left=140, bottom=130, top=10, right=84)
     layout["xaxis"] = axis("", tickangle=-60, ticks="", tickfont={"size": 11}, showgrid=False)
     layout["yaxis"] = axis("", autorange="reversed", ticks="", tickfont={"size": 11}, showgrid=False)
     shares = np.asarray(correlation, dtype=np.float64)
@@ -224,7 +230,11 @@ def correlation_matrix(names: Sequence[str], correlation: Array) -> Figure:
         "textfont": {"size": 10},
         "xgap": 1,
         "ygap": 1,
-        "colorbar": {"thickness": 10, "len": 1.0, "tickvals": [-1, -0.5, 0, 0.5, 1]},
+        "colorbar": {
+            "title": {"text": "correlation [-]"},
+            "thickness": 10,
+            "tickvals": [-1, -0.5, 0, 0.5, 1],
+        },
         "hovertemplate": "%{y} with %{x}: %{z:.2f}<extra></extra>",
     }
     return Figure(
@@ -251,8 +261,8 @@ def cost_history(history: Sequence[float]) -> Figure:
     """The cost after each iteration, above the least."""
     rows = np.asarray(history, dtype=np.float64)
     layout = base_layout(220, left=84)
-    layout["xaxis"] = axis("iteration", rangemode="tozero", tick0=0, dtick=max(1, rows.size // 10))
-    layout["yaxis"] = axis("cost", nticks=5)
+    layout["xaxis"] = axis("iteration [-]", rangemode="tozero", tick0=0, dtick=max(1, rows.size // 10))
+    layout["yaxis"] = axis("cost [-]", nticks=5)
     trace = {
         **line(np.arange(rows.size), rows, name="cost", color=MODEL, hover="iteration %{x}: %{y:.6g}"),
         "mode": "lines+markers",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,9 @@ from swashplate.reporting.theme import (
     SKY,
     VERMILION,
     axis_title,
+    inputs_title,
     line,
+    over_frequency,
     phase_ticks,
     shown,
     stacked,
@@ -40,15 +42,6 @@ _ERROR = "rgba(0,0,0,0.15)"
 _BOUND = "rgba(0,114,178,0.18)"
 _DB = 20.0 / np.log(10.0)
 _COLORS = (MODEL, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
-
-
-def _log_x(layout: dict[str, Any], panels: int, title: str = "frequency [Hz]") -> dict[str, Any]:
-    for k in range(panels):
-        axis = layout[f"xaxis{'' if k == 0 else k + 1}"]
-        axis["type"] = "log"
-        if k == panels - 1:
-            axis["title"] = {"text": title, "standoff": 4, "font": {"size": 12}}
-    return layout
 
 
 def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answers | None = None) -> Figure:
@@ -63,7 +56,7 @@ def bode(responses: FrequencyResponse, output: str, input: str, *, model: Answer
     hertz = responses.omega / TWO_PI
     gain, phase = np.asarray(decibel(h)), unwrapped_degrees(h)
     spread = np.minimum(error, 3.0)
-    layout = _log_x(stacked([f"{output}/{input} [dB]", "phase [deg]", "coherence"], height=140), 3)
+    layout = over_frequency([f"{output}/{input} [dB]", "phase [deg]", "coherence [-]"], height=140, unit="Hz")
     layout["yaxis2"] |= phase_ticks(phase)
     layout["yaxis3"]["range"] = [0, 1.02]
     known = np.isfinite(gain)
@@ -142,7 +135,7 @@ def excitation(responses: FrequencyResponse) -> Figure:
     """Spectra of the inputs, and how far they moved together."""
     hertz = responses.omega / TWO_PI
     several = len(responses.inputs) > 1
-    layout = _log_x(stacked(["input power [dB]", "coherence"][: 2 if several else 1], height=150), 2 if several else 1)
+    layout = over_frequency(["input power [dB]", "coherence [-]"][: 2 if several else 1], height=150, unit="Hz")
     if several:
         layout["yaxis2"]["range"] = [0, 1.02]
     traces, keys = [], []
@@ -184,7 +177,7 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
     high = max(m.target.omega[-1] for m in found)
     omega = np.geomspace(low, high, 80)
     bound = envelopes(omega)
-    layout = _log_x(stacked(["model/flight [dB]", "model/flight [deg]"], height=170), 2)
+    layout = over_frequency(["model/flight [dB]", "model/flight [deg]"], height=170, unit="Hz")
     layout["yaxis"]["range"], layout["yaxis2"]["range"] = [-15, 15], [-120, 120]
     layout["yaxis2"] |= phase_ticks([-90.0, 90.0])
     both = np.concatenate([omega, omega[::-1]]) / TWO_PI
@@ -219,16 +212,17 @@ def verification_figure(
     inputs: Sequence[str],
     *,
     number: int,
+    units: Mapping[str, str] | None = None,
     rival: tuple[str, Trace, Sequence[str]] | None = None,
 ) -> Figure:
     """Inputs, then flight and model of every output over time, as in Figs 6 to 9 of Bhandari et al. (2005).
 
     Args:
         trace: flight and model. outputs, inputs: their columns.
-        number: of the figure.
+        number: of the figure. units: of the inputs, by name.
         rival: another model's name, its trace of the same stretch and its outputs.
     """
-    titles = ["inputs", *(axis_title(name) for name in outputs)]
+    titles = [inputs_title(inputs, units), *(axis_title(name) for name in outputs)]
     layout = stacked(titles, height=104)
     places = kept(trace.flight[:, 0])
     time = trace.time[places]

@@ -18,6 +18,7 @@ from swashplate.reporting.theme import (
     INPUT_COLORS,
     MODEL,
     axis_title,
+    inputs_title,
     line,
     numbers,
     packed,
@@ -103,7 +104,9 @@ def time_figures(
         for i, name in enumerate(present):
             traces += _channel_traces(channels[name], name, axis=str(i + 2))
             traces += _prediction_traces((predictions or {}).get(name, ()), name, axis=str(i + 2))
-        layout = stacked(["input", *(axis_title(name) for name in present)], height=PANEL)
+        layout = stacked(
+            [inputs_title([input_names[row] for row in rows]), *(axis_title(name) for name in present)], height=PANEL
+        )
         figures.append(
             Figure(
                 identifier=f"{identifier}-{group}",

@@ -109,7 +109,7 @@ def _sources(validation: Validation) -> str:
 def fit_over_horizon(validation: Validation) -> Figure:
     """Fit % against the horizon, one small panel per channel."""
     names = _channels(validation)
-    layout = grid(names, columns=3, height=118, x_title="s ahead")
+    layout = grid(names, columns=3, height=118, x_title="ahead [s]", y_title="fit [%]")
     traces: list[dict[str, Any]] = []
     for i, name in enumerate(names):
         number = "" if i == 0 else str(i + 1)

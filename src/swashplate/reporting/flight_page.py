@@ -14,7 +14,7 @@ from swashplate.physics.rigid_body import RigidBody
 from swashplate.reporting.downsample import kept
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Figure, Points, Report, Section
-from swashplate.reporting.theme import BLUE, line, stacked, unit_words
+from swashplate.reporting.theme import BLUE, line, quantity, stacked
 from swashplate.reporting.versions import date, versions
 
 _PANEL = 118
@@ -69,8 +69,7 @@ def compose_flight(
 def flight_panels(flight: Flight, names: Sequence[str], *, identifier: str, caption: str) -> Figure:
     """One panel for each channel; all zoom in time together."""
     scales = [_shown(name, str(flight[name].attrs["units"])) for name in names]
-    layout = stacked([f"{name} [{unit}]" if unit else name for name, (_, unit) in zip(names, scales, strict=True)],
-                     height=_PANEL)  # fmt: skip
+    layout = stacked([quantity(name, unit) for name, (_, unit) in zip(names, scales, strict=True)], height=_PANEL)
     traces = []
     for i, (name, (factor, unit)) in enumerate(zip(names, scales, strict=True)):
         values = factor * flight.values(name)
@@ -93,4 +92,4 @@ def _shown(name: str, unit: str) -> tuple[float, str]:
         return math.degrees(1.0), "deg"
     if name in _RATES:
         return math.degrees(1.0), "deg/s"
-    return 1.0, unit_words(unit)
+    return 1.0, unit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -13,7 +14,9 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from swashplate.atomic import make_folder, write_text
-from swashplate.reporting.structure import Figure, Report
+from swashplate.reporting.figures.themes import DARK
+from swashplate.reporting.packing import figures_text, plotly_script
+from swashplate.reporting.structure import Report
 
 
 def render(report: Report) -> str:
@@ -21,10 +24,12 @@ def render(report: Report) -> str:
     template = _environment().from_string(_read("template.html.j2"))
     return template.render(
         report=report,
-        figures=[(figure.identifier, _safe_json(figure)) for figure in report.figures],
+        figures=Markup(figures_text([replace(figure, spec=_without_tags(figure.spec)) for figure in report.figures])),
         style=Markup(_read("page.css")),
         script=Markup(_read("page.js")),
-        plotly=Markup(_plotly()),
+        plotly=Markup(plotly_script()),
+        dark=Markup(json.dumps(dict(DARK))),
+        over_frequency=any("frequency" in figure.spec["layout"].get("meta", {}) for figure in report.figures),
     )
 
 
@@ -47,26 +52,8 @@ def _read(name: str) -> str:
     return (resources.files("swashplate.reporting") / name).read_text(encoding="utf-8")
 
 
-@cache
-def _plotly() -> str:
-    """plotly.js, with what could end a script element taken out of it."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
-
-
-def _safe_json(figure: Figure) -> Markup:
-    """A figure as JSON that can stand in a script element: no "<", ">" or "&" is left in it.
-
-    plotly reads a few tags in its texts (<b>, <br>, <a>), so text from files is made harmless there as well.
-    """
-    text = json.dumps(_without_tags(figure.spec), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
-    for sign, code in (("<", "\\u003c"), (">", "\\u003e"), ("&", "\\u0026")):
-        text = text.replace(sign, code)
-    return Markup(text)
-
-
 _OURS = ("<br>", "<b>", "</b>", "<extra></extra>")
+"""plotly reads a few tags in its texts, so text from files is made harmless there as well."""
 
 
 def _without_tags(value: Any) -> Any:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from swashplate.control.laws.linear_decoupling import Decoupling, coupling
-from swashplate.reporting.figures_control import over_frequency, style
+from swashplate.reporting.figures_control import style
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Report, Section, Table, Text
-from swashplate.reporting.theme import line, stacked
+from swashplate.reporting.theme import line, over_frequency, stacked
 from swashplate.reporting.versions import date, versions
 
 _WORDS = {"bare": "bare inputs", "matrix": "constant matrix", "filter": "filter"}
@@ -98,7 +98,7 @@ def _steps(model: Any, made: Mapping[str, Decoupling | None], axes: Mapping[str,
     outputs = axes["outputs"]
     plant = model[list(outputs), list(axes["inputs"])]
     time = np.linspace(0.0, _STEP, 201)
-    titles = [f"{o} on {axis}'s axis" for axis in outputs for o in outputs]
+    titles = [f"{o} on {axis}'s axis [-]" for axis in outputs for o in outputs]
     layout, traces = stacked(titles, height=95), []
     for number, by in enumerate(made.values()):
         color, dash = style(number)

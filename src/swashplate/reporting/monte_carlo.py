@@ -108,7 +108,13 @@ def _table(spread: Spread) -> Table:
 def _figure(spread: Spread) -> Figure:
     """How many flights went how far, by limit; the limit dashed."""
     limits = asdict(spread.limits)
-    layout: dict[str, Any] = grid([f"{n} [{u}]" for n, (u, _) in SHOWN.items()], columns=2, height=190, x_title="")
+    layout: dict[str, Any] = grid(
+        [f"{n} [{u}]" for n, (u, _) in SHOWN.items()],
+        columns=2,
+        height=190,
+        x_title="largest of a flight",
+        y_title="flights [-]",
+    )
     traces: list[dict[str, Any]] = []
     for i, (name, (_, factor)) in enumerate(SHOWN.items()):
         axis = "" if i == 0 else str(i + 1)

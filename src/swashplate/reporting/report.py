@@ -18,15 +18,12 @@ from swashplate.reporting.compose import compose
 from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.reporting.speed_page import compose_speeds
 from swashplate.reporting.structure import Report
-from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import Mode
-from swashplate.simulation.trim_curve import TrimCurve
+from swashplate.simulation.modes import Mode
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse | TrimCurve | Derivatives
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
 
 
 @runtime_checkable
@@ -63,22 +60,27 @@ def report(
     Raises:
         SwashError: nothing to report, results that share no page, or a place that cannot be written to.
     """
+    return write_page(path, structure_of(*results, title=title, modes=modes))
+
+
+def structure_of(
+    *results: Reportable | HasPage | None, title: str | None = None, modes: Mapping[str, Sequence[Mode]] | None = None
+) -> Report:
+    """What `report` writes, before it is a page; arguments and errors as there."""
     asked = [one for one in results if one is not None]
     if not asked:
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []
     for one in asked:
-        if not isinstance(one, HasPage | TrimCurve | Derivatives):
+        if not isinstance(one, HasPage):
             given.append(one)
         elif len(asked) > 1 or modes is not None:
             raise SwashError("has a page of its own.", channel=type(one).__name__, hint="Write a report of each.")
-        elif isinstance(one, HasPage):
-            return write_page(path, one.page(title=title))
         else:
-            return write_page(path, compose_speeds(one, title=title))
+            return one.page(title=title)
     of_vehicles = [one for one in given if isinstance(one, Validation) or _is_of(one, Vehicle)]
     if not of_vehicles:
-        return write_page(path, _of_linear_models(given, title))
+        return _of_linear_models(given, title)
     checks = [one for one in given if isinstance(one, Verification) and isinstance(one.model, Vehicle)]
     if len(of_vehicles) + len(checks) < len(given):
         raise SwashError("a vehicle's fit and a linear model share no page.", hint="Write a report of each.")
@@ -86,10 +88,10 @@ def report(
     if fit is not None and isinstance(fit.details, BenchDetails):
         if len(given) > 1:
             raise SwashError("the bench has a page of its own.", hint="Write a report of each.")
-        return write_page(path, compose_bench(fit))
+        return compose_bench(fit)
     validation = _only([one for one in given if isinstance(one, Validation)], "validation")
     verification = _only(checks, "verification")
-    return write_page(path, compose(fit, validation, verification, title=title, modes=modes))
+    return compose(fit, validation, verification, title=title, modes=modes)
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.time.kinematics import PREDICTED, measured_states

@@ -22,13 +22,14 @@ from swashplate.identification.frequency.transfer_function_fit import TransferFu
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
 from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
 from swashplate.reporting.words import value_words
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 from swashplate.validation.verification import Verification
 
 
@@ -212,7 +213,7 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     pairs = [(fit.model.outputs.index(t.output), fit.model.inputs.index(t.input), t.omega) for t in fit.targets]
     answers = [fit.model.response(omega)[:, o, i] for o, i, omega in pairs]
     found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
-    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), mismatch_figure(found)]
+    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(found)]
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "Responses, flight against model", tuple(blocks))
@@ -221,12 +222,13 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
 def transfer_functions_section(m: ResponseMaterial) -> Section:
     """Transfer functions with their costs and parameters, and what the usual structures would cost."""
     blocks: list[Block] = []
-    for fit in m.transfer_functions:
+    for k, fit in enumerate(m.transfer_functions):
         blocks += [Text(f"{model!r}") for model in fit.model]
         blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
         found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.model, fit.targets, strict=True)]
-        blocks.append(mismatch_figure(found))
+        own = "" if k == 0 else f"-{k + 1}"
+        blocks += [replace(one, identifier=f"{one.identifier}{own}") for one in (of_fit(fit), mismatch_figure(found))]
     if m.trials:
         chosen = m.transfer_functions[0].details.form if m.transfer_functions else None
         blocks.append(
@@ -285,7 +287,8 @@ def bodes_section(m: ResponseMaterial) -> Section:
     blocks.append(
         Table("Where the responses may be used", ("response", "coherent band", "coherence", "error [dB]"), tuple(rows))
     )
-    return Section("responses", "Frequency responses", (*blocks, *figures))
+    matrix = (of_responses(r, fits=fits),) if len(figures) > 1 else ()
+    return Section("responses", "Frequency responses", (*blocks, *matrix, *figures))
 
 
 def excitation_section(r: FrequencyResponse) -> Section:

@@ -11,7 +11,7 @@ from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.reporting.figures_fit import correlation_matrix, eigenvalues
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.words import value_words
-from swashplate.simulation.linearize import Mode
+from swashplate.simulation.modes import Mode
 
 _SLOW = 1e-6
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.schema import channel
 from swashplate.identification.time.estimates import RECORD_UNITS
 from swashplate.identification.time.kinematics import PREDICTED
@@ -61,7 +61,9 @@ def prediction(validation: Validation) -> Section:
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
     blocks += _told(validation)
     blocks.append(fit_over_horizon(validation))
-    blocks += [_table(validation, horizon) for horizon in horizons(validation)]
+    for horizon in horizons(validation):
+        blocks.append(_table(validation, horizon))
+        blocks += _beside(validation, horizon)
     return Section("prediction", "Prediction", tuple(blocks))
 
 
@@ -166,6 +168,58 @@ def _table(validation: Validation, horizon: float) -> Table:
         note="Model: the identified one. Card: the published one. Hold: the last value stays. Rates: constant rates. "
         "Bold: the best of the row by each measure. Fit: 100 (1 − rms error / rms change since the start). "
         "Theil: 0 perfect, 1 no better than the opposite; holding the last value always has 1.",
+    )
+
+
+def _beside(validation: Validation, horizon: float) -> tuple[Block, ...]:
+    """Whether the model or the flight is poor: scatter, movement, what the filter expects, what a black box reaches."""
+    rows = {f.channel: f for f in validation.floors if f.horizon == horizon}
+    if not rows:
+        return ()
+    table = []
+    for name in [n for n in JUDGED if n in rows]:
+        f, unit = rows[name], channel(name)
+        scatter = f"{percent(f.low)} to {percent(f.high)}" if math.isfinite(f.low) else "–"
+        ahead = f"{percent(f.lead)} ({percent(f.lead_low)} to {percent(f.lead_high)})" if math.isfinite(f.low) else "–"
+        told = math.isfinite(f.ceiling)
+        table.append(
+            (
+                Cell(name),
+                _cell(percent(f.fit), False),
+                _cell(scatter, False),
+                _cell(ahead, False),
+                _cell(value_words(f.rms * unit.shown_factor, 0.01 * f.rms * unit.shown_factor), False),
+                _cell(value_words(f.moved * unit.shown_factor, 0.01 * f.moved * unit.shown_factor), False),
+                Cell(unit_words(unit.shown_unit)),
+                _cell(percent(f.expected), False),
+                _cell(percent(f.past), False),
+                Cell(percent(f.ceiling) if told else "refused", number=True, tone="plain" if told else "caution"),
+                Cell(f"{f.words[0].upper()}{f.words[1:]}"),
+            )
+        )
+    return (
+        Table(
+            f"What the model's scores {horizon:g} s ahead stand beside",
+            (
+                "channel",
+                "fit [%]",
+                "95 %",
+                "points ahead of the best rival",
+                "RMS error",
+                "RMS movement",
+                "unit",
+                "filter expects [%]",
+                "past alone [%]",
+                "ceiling [%]",
+                "so",
+            ),
+            tuple(table),
+            note="95 %: block bootstrap over 4 s of flight, the same blocks for all. Movement: of the flight since the "
+            "start. Filter expects: what its own covariance promises. Ceiling: ridge regression on past motion, past "
+            f"inputs and the inputs up to the target ({' or '.join(sorted({f.by for f in rows.values() if f.by}))}); "
+            "refused where inputs after the target help too, as a controller's answers do. Past alone: the same "
+            "without any input after the start.",
+        ),
     )
 
 

@@ -3,19 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-import numpy as np
+from typing import Any
 
 from swashplate.errors import SwashError
-from swashplate.models.conventional.derivative_table import (
-    COLUMNS,
-    ROWS,
-    DerivativeTable,
-    factor_to_feet,
-    split_name,
-    unit,
-)
-from swashplate.models.doubts import shaft_power
+from swashplate.models.conventional.derivative_table import COLUMNS, ROWS, split_name
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Figure, Key, Points, Report, Section
 from swashplate.reporting.theme import (
@@ -34,7 +25,8 @@ from swashplate.reporting.theme import (
 )
 from swashplate.reporting.versions import date, versions
 from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import Mode, linearize
+from swashplate.simulation.linearize import linearize
+from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim_curve import TrimCurve
 
@@ -51,6 +43,9 @@ _PITCHES = (
 )
 _SLOW = 6.0
 """rad/s: modes within this are drawn once more by themselves."""
+_FEW = 15
+_STILL, _NOTHING = 1e-3, 1e-6
+"""Of a value, and of its unit: a quantity that moves less over speed does not fill its panel."""
 _WIDE = 860
 """px: below this width the derivatives' small panels scroll."""
 
@@ -67,11 +62,13 @@ def compose_speeds(found: TrimCurve | Derivatives, *, title: str | None = None) 
     if len(trims) < 2:
         raise SwashError("a plot over speed needs a range of speeds.", channel="--speed", hint='Give one, e.g. "0-15".')
     sections = [
-        Section("speed", "Trim over speed", (_controls(vehicle, trims),)),
+        Section("speed", "Trim over speed", (controls(TrimCurve(vehicle, tuple(trims))),)),
         Section("modes", "Modes over speed", _loci(vehicle, trims)),
     ]
     if tables:
-        figures: tuple[Block, ...] = tuple(_derivatives(trims, tables, row, imperial=imperial) for row in ROWS)
+        figures: tuple[Block, ...] = tuple(
+            by_contributor(Derivatives(vehicle, tuple(trims), tuple(tables), imperial), row) for row in ROWS
+        )
         sections.append(Section("derivatives", "Derivatives by contributor", figures))
     if remarks:
         sections.append(Section("doubts", "Where the equations do not hold", (Points(tuple(remarks)),)))
@@ -89,32 +86,33 @@ def compose_speeds(found: TrimCurve | Derivatives, *, title: str | None = None) 
     )
 
 
-def _controls(vehicle: Vehicle, trims: Sequence[Trim]) -> Figure:
-    speeds = [at.speed for at in trims]
-    angular = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
-    angular |= dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
-    flapping = [name for name in ("a1", "b1") if name in vehicle.state_names]
-    panels = {}
-    for name in (*vehicle.input_names, "phi", "theta", *flapping):
-        values = np.array([{**at.states(), **at.commands()}[name] for at in trims])
-        in_degrees = angular[name] == "rad"
-        panels[f"{name} [deg]" if in_degrees else name] = np.degrees(values) if in_degrees else values
-    power = [shaft_power(vehicle, at.state, at.inputs, at.environment) for at in trims]
-    if all(value is not None for value in power):
-        panels["shaft power [kW]"] = np.array(power, dtype=np.float64) / 1000.0
-    layout = grid(list(panels), columns=3, height=170, x_title="speed [m/s]")
+def controls(curve: TrimCurve) -> Figure:
+    """Inputs, attitude, flapping and power that hold each speed."""
+    columns = {head.replace("[1]", "[-]"): values for head, values in curve.columns().items()}
+    speeds = columns.pop("speed [m/s]")
+    flapping = any(head.startswith(("a1 ", "b1 ")) for head in columns)
+    layout = grid(list(columns), columns=3, height=170, x_title="speed [m/s]")
     traces = []
-    for i, (title, values) in enumerate(panels.items()):
+    for i, (title, values) in enumerate(columns.items()):
         number = "" if i == 0 else str(i + 1)
         hover = f"{title}<br>%{{x:.1f}} m/s, %{{y:.3f}}"
-        traces.append(line(speeds, values, name=title, color=BLUE, axis=number, hover=hover))
+        middle = 0.5 * (min(values) + max(values))
+        least = max(_STILL * abs(middle), _NOTHING)
+        if max(values) - min(values) < least:  # rounding is no trend
+            layout[f"yaxis{number}"]["range"] = [middle - least, middle + least]
+        traces.append(line(speeds, values, name=title, color=BLUE, axis=number, hover=hover) | _marked(speeds))
     return Figure(
         "trim-curves",
         {"data": traces, "layout": layout},
         int(layout["height"]),
         f"Controls, attitude and power that hold each speed.{_PITCHES if flapping else ''}",
-        f"Trim curves of {', '.join(panels)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
+        f"Trim curves of {', '.join(columns)} from {speeds[0]:g} to {speeds[-1]:g} m/s.",
     )
+
+
+def _marked(speeds: Sequence[float]) -> dict[str, Any]:
+    """Few speeds are marked, so that one speed is seen at all."""
+    return {"mode": "lines+markers", "marker": {"size": 5}} if len(speeds) < _FEW else {}
 
 
 def _loci(vehicle: Vehicle, trims: Sequence[Trim]) -> tuple[Figure, ...]:
@@ -148,7 +146,7 @@ def _locus(found: Sequence[tuple[float, Mode]], identifier: str, caption: str, o
             "color": numbers([speed for speed, _, _ in points]),
             "colorscale": "Viridis",
             "size": 7,
-            "colorbar": {"title": {"text": "m/s"}, "thickness": 12},
+            "colorbar": {"title": {"text": "speed [m/s]"}, "thickness": 12},
         },
         "hovertemplate": "%{x:.3f} %{y:+.3f}j at %{marker.color:.1f} m/s<br>%{text}<extra></extra>",
     }
@@ -163,20 +161,30 @@ def _mode_words(mode: Mode) -> str:
     return f"{damping}states {states}"
 
 
-def _derivatives(trims: Sequence[Trim], tables: Sequence[DerivativeTable], row: str, *, imperial: bool) -> Figure:
-    speeds = [at.speed for at in trims]
+def by_contributor(found: Derivatives, row: str) -> Figure:
+    """The derivatives of one force or moment over speed: the total, and what contributes to it.
+
+    Raises:
+        SwashError: where `row` is none of X, Y, Z, L, M, N.
+    """
+    if row not in ROWS:
+        raise SwashError(f"is '{row}', expected one of {', '.join(ROWS)}.", channel="row")
+    speeds, tables = [at.speed for at in found.trims], found.tables
     names = [row + column for column in COLUMNS]
-    titles = [f"{name} [{unit_words(unit(name, imperial=imperial))}]" for name in names]
+    titles = [f"{name} [{unit_words(found.unit(name))}]" for name in names]
     layout = grid(titles, columns=5, height=150, x_title="speed [m/s]", gap=0.06)
     traces = []
     parts = [part for part in tables[0].parts if part in _PART_COLORS]
     for i, name in enumerate(names):
         place = split_name(name)
-        factor = factor_to_feet(*place) if imperial else 1.0
+        factor = found.factor(name)
         number = "" if i == 0 else str(i + 1)
         total = [factor * table[name] for table in tables]
         hover = f"{name}<br>%{{x:.1f}} m/s, %{{y:.4g}}"
-        traces.append(line(speeds, total, name=f"{name} total", color=BLACK, width=2.0, axis=number, hover=hover))
+        traces.append(
+            line(speeds, total, name=f"{name} total", color=BLACK, width=2.0, axis=number, hover=hover)
+            | _marked(speeds)
+        )
         for part in parts:
             values = [factor * float(table.parts[part][place]) for table in tables]
             if max(map(abs, values)) > _SEEN * max(map(abs, total)) + 1e-12:

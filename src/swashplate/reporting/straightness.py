@@ -12,11 +12,16 @@ from swashplate.control.analysis.straightness import StepRun
 from swashplate.flights.schema import channel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
-from swashplate.reporting.theme import GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
+from swashplate.reporting.theme import CONSTANT, GREY, MODEL, PUBLISHED, axis, axis_title, base_layout, line, stacked
 from swashplate.reporting.versions import card_hash, date, versions
 
-_STYLES = ((PUBLISHED, "dash"), (MODEL, "solid"))
-_FAINT = ("rgba(213,94,0,0.22)", "rgba(0,114,178,0.22)")
+_STYLES = {"without": (PUBLISHED, "dash"), "by the paper": (CONSTANT, "dot"), "with": (MODEL, "solid")}
+_FAINT = {"without": "rgba(213,94,0,0.22)", "by the paper": "rgba(0,0,0,0.12)", "with": "rgba(0,114,178,0.22)"}
+_WORDS = {
+    "without": "without the decoupling",
+    "by the paper": "decoupled with the rotor's own lag, as in the paper",
+    "with": "with the decoupling",
+}
 _SHOWN = ("u", "v", "psi", "z", "phi", "theta", "servo_roll", "servo_pitch", "motor_lower", "motor_upper")
 _PERCENTILES = (5.0, 50.0, 95.0)
 _STRAIGHT = 0.15
@@ -36,7 +41,7 @@ def compose_straightness(
 
     Args:
         vehicle: what flew.
-        runs: "without" and "with" the decoupling, from `step_run`.
+        runs: "without" and "with" the decoupling, from `step_run`; "by the paper" where the lag was chosen by flying.
         command: the step of the pitch command.
         lag: that the law takes out at hover [deg].
         sources: of the drawn models' drift, from `drift_sources`.
@@ -93,14 +98,15 @@ def _path_figure(runs: Mapping[str, StepRun]) -> Figure:
     traces: list[dict[str, Any]] = []
     keys = []
     hover = "%{x:.2f} m ahead, %{y:+.2f} m right"
-    for (_, run), faint in zip(runs.items(), _FAINT, strict=False):
+    for name, run in runs.items():
         for x, y in run.tracks:
             every = max(1, x.size // 60)
-            thin = line(x[::every], y[::every], name="drawn", color=faint, width=0.8)
+            thin = line(x[::every], y[::every], name="drawn", color=_FAINT[name], width=0.8)
             traces.append({**thin, "hoverinfo": "skip", "hovertemplate": None})
-    for (name, run), (color, dash) in zip(runs.items(), _STYLES, strict=False):
+    for name, run in runs.items():
+        color, dash = _STYLES[name]
         x, y = run.flight.values("x"), run.flight.values("y")
-        words = f"{name} the decoupling"
+        words = _WORDS[name]
         traces.append(line(x, y, name=words, color=color, dash=dash, width=2.4, hover=f"{words}<br>{hover}"))
         keys.append(Key(words, color, dash))
     if any(run.tracks for run in runs.values()):
@@ -149,9 +155,9 @@ def _numbers(
     blocks: list[Block] = [
         Table("The path", columns, tuple(rows), note="Offsets to the right of the first heading."),
         Text(
-            f"The law turns the commands back by the lower rotor's lag, {lag:.1f}° at hover, and cancels what speed "
-            "does to its disc. The stabilizer bar is out of its sight: the upper rotor's misalignment stays in it, "
-            "unless a constant lag is chosen that absorbs it."
+            f"The law turns the commands back by a lag of {lag:.1f}° at hover and cancels what speed does to the lower "
+            "rotor's disc. The stabilizer bar and the delays are out of its equations: with the rotor's own lag they "
+            "bend the path; a lag that was chosen by flying the model takes them in."
         ),
     ]
     if sources:
@@ -168,8 +174,9 @@ def _time(runs: Mapping[str, StepRun]) -> Section:
     present = [name for name in _SHOWN if all(name in run.flight for run in runs.values())]
     layout = stacked(["z [cm]" if name == "z" else axis_title(name) for name in present], height=105)
     traces, keys = [], []
-    for (words, run), (color, dash) in zip(runs.items(), _STYLES, strict=False):
-        keys.append(Key(f"{words} the decoupling", color, dash))
+    for kind, run in runs.items():
+        color, dash = _STYLES[kind]
+        keys.append(Key(_WORDS[kind], color, dash))
         for i, name in enumerate(present):
             number = "" if i == 0 else str(i + 1)
             values = run.flight.values(name) * (100.0 if name == "z" else channel(name).shown_factor)

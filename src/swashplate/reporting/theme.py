@@ -7,7 +7,7 @@ marker says the same a second time.
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,10 +74,21 @@ def shown(name: str, values: Array) -> Array:
     return np.asarray(values, dtype=np.float64) * channel(name).shown_factor
 
 
+def quantity(name: str, unit: str) -> str:
+    """Name and unit for an axis: a pure number ("1") says [-], and a unit that nobody knows is called unknown."""
+    return f"{name} [{unit_words(unit) or '-'}]" if unit else f"{name} [unit unknown]"
+
+
+def inputs_title(names: Sequence[str], units: Mapping[str, str] | None = None) -> str:
+    """Title of the axis that several inputs share; inputs of several units keep their own."""
+    found = {(units or {}).get(name) or channel(name).unit for name in names}
+    unit = found.pop() if len(found) == 1 else ""
+    return quantity("input", unit) if unit else "input [own units]"
+
+
 def axis_title(name: str) -> str:
     """Name and unit of a channel for an axis."""
-    unit = unit_words(channel(name).shown_unit)
-    return f"{name} [{unit}]" if unit else name
+    return quantity(name, channel(name).shown_unit)
 
 
 def line(
@@ -145,11 +156,11 @@ def axis(title: str = "", **more: Any) -> dict[str, Any]:
 
 
 def phase_ticks(values: Any) -> dict[str, Any]:
-    """What a phase axis [deg] has beside its title: marks at multiples of 45 degrees, few enough to be read."""
+    """What a phase axis [deg] has beside its title: marks at multiples of 15 degrees or more, few enough to be read."""
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
-    span = float(np.ptp(finite)) if finite.size else 0.0
-    return {"tick0": 0, "dtick": next((step for step in (45, 90, 180) if span <= 5 * step), 360)}
+    span = float(np.ptp(finite)) if finite.size else 200.0
+    return {"tick0": 0, "dtick": next((step for step in (15, 30, 45, 90, 180) if span <= 5 * step), 360)}
 
 
 def bands(count: int, *, gap: float) -> list[tuple[float, float]]:
@@ -171,10 +182,26 @@ def stacked(titles: Sequence[str], *, height: int, x_title: str = "time [s]") ->
     return layout
 
 
-def grid(titles: Sequence[str], *, columns: int, height: int, x_title: str, gap: float = 0.12) -> dict[str, Any]:
-    """A layout of small panels in rows, each under its own heading; `gap` is the share of the width between two."""
+def over_frequency(titles: Sequence[str], *, height: int = 170, unit: str = "rad/s") -> dict[str, Any]:
+    """A layout of panels over one logarithmic frequency axis, whose unit ("Hz" or "rad/s") a reader may change."""
+    layout = stacked(titles, height=height, x_title=f"frequency [{unit}]")
+    for k in range(len(titles)):
+        layout[f"xaxis{'' if k == 0 else k + 1}"]["type"] = "log"
+    return {**layout, "meta": {"frequency": unit}}
+
+
+def grid(
+    titles: Sequence[str], *, columns: int, height: int, x_title: str, y_title: str = "", gap: float = 0.12
+) -> dict[str, Any]:
+    """A layout of small panels in rows, each under its own heading.
+
+    Args:
+        titles: headings, with the unit of what the panel shows. columns: in a row. height: of a panel [px].
+        x_title, y_title: of the lowest panels and of those on the left; no `y_title` where the headings say it.
+        gap: share of the width between two panels.
+    """
     rows = -(-len(titles) // columns)
-    layout = base_layout(height * rows + 56, left=44, top=24)
+    layout = base_layout(height * rows + 56, left=58 if y_title else 44, top=24)
     down = bands(rows, gap=0.4 / rows)
     width = (1.0 - gap * (columns - 1)) / columns
     layout["annotations"] = []
@@ -186,7 +213,8 @@ def grid(titles: Sequence[str], *, columns: int, height: int, x_title: str, gap:
         layout[f"xaxis{number}"] = axis(
             x_title if lowest else "", domain=[left, min(1.0, left + width)], anchor=f"y{number}", nticks=4, tickangle=0
         )
-        layout[f"yaxis{number}"] = axis("", domain=list(down[row]), anchor=f"x{number}", nticks=5)
+        left_title = y_title if column == 0 else ""
+        layout[f"yaxis{number}"] = axis(left_title, domain=list(down[row]), anchor=f"x{number}", nticks=5)
         layout["annotations"].append(
             {
                 "text": f"<b>{title}</b>",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import DerivativeTable, factor_to_feet, split_name, unit
@@ -37,6 +37,10 @@ class Derivatives:
     tables: tuple[DerivativeTable, ...]
     imperial: bool = False
     bounds: CardSpread | None = None
+
+    def page(self, *, title: str | None = None) -> Any:
+        """The page of `sp.report`, under a heading, its own where None."""
+        return resolve("compose_speeds")(self, title=title)
 
     def factor(self, name: str) -> float:
         """From SI to the unit that a derivative is shown in."""
@@ -97,13 +101,17 @@ class Derivatives:
             lines += ["".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=True)) for row in (head, *rows)]
         return "\n".join(lines)
 
-    def plot(self, *, row: str = "M") -> Figure:
+    def plot(self, *, row: str = "M", theme: Literal["paper", "light", "dark"] = "paper") -> Figure:
         """The derivatives of one force or moment (X, Y, Z, L, M or N) over speed, as a matplotlib figure."""
-        figure: Figure = resolve("plot_derivatives")(self, row=row)
+        figure: Figure = resolve("plot_derivatives")(self, row=row, theme=theme)
         return figure
 
+    def explore(self, *, row: str = "M", theme: Literal["paper", "light", "dark"] = "light") -> Any:
+        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
+        return resolve("explore_derivatives")(self, row=row, theme=theme)
+
     def _repr_html_(self) -> str:
-        page: str = resolve("html_of_derivatives")(self)
+        page: str = resolve("html_of")(self)
         return page
 
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Num
+from jaxtyping import Num
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
 from swashplate.arrays import Array
 
-_HALVINGS, _TERMS = 8, 5
 _SAMPLE = 1e-6
 """Share of a sample that counts as none."""
 
@@ -59,37 +56,6 @@ def held_series(A: Any, dt: Any, one: Any, *, terms: int = 4) -> tuple[Any, Any]
     for order in range(terms - 1, 1, -1):
         H = one + (((1.0 / order) * dt) * A) @ H
     return one + (dt * A) @ H, H
-
-
-def gathered_noise(
-    A: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], dt: Float[jax.Array, ""] | float
-) -> tuple[Any, Any]:
-    """Transition e^(A dt) and the noise gathered meanwhile, the integral of e^(As) W e^(A's), to be differentiated.
-
-    Series over a small part of the sample, then doubled (Van Loan's exponential of twice the size takes five times as
-    long to compile).
-
-    Args:
-        A: shape (n, n), real or complex.
-        W: intensity of white noise on the rates, shape (n, n).
-        dt: sample time [s].
-    """
-    h = dt / 2**_HALVINGS
-    transition, _ = held_series(A, h, jnp.eye(A.shape[0]), terms=_TERMS)
-    gathered = jnp.zeros_like(W)
-    for order in range(_TERMS, 0, -1):
-        gathered = W + h / (order + 1) * (A @ gathered + gathered @ A.T)
-    return summed(transition, h * gathered, _HALVINGS)
-
-
-def summed(F: Num[jax.Array, "n n"], W: Num[jax.Array, "n n"], doublings: int) -> tuple[Any, Any]:
-    """F^n and the sum of F^k W F'^k over k below n = 2^doublings (Smith 1968, SIAM J. Appl. Math. 16, 198-201)."""
-
-    def double(carry: tuple[Any, Any], _: None) -> tuple[tuple[Any, Any], None]:
-        F, total = carry
-        return (F @ F, total + F @ total @ F.T), None
-
-    return jax.lax.scan(double, (F, W), None, length=doublings)[0]
 
 
 def held_late(A: Array, B: Array, dt: float, delays: Sequence[float]) -> tuple[Array, Array, Array, tuple[int, ...]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,10 @@ import jax
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.models.delays import known_delays
+from swashplate.models.linear import python_control
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -20,6 +24,7 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
 
@@ -28,26 +33,7 @@ _ORIGIN = 1e-6
 
 
 @dataclass(frozen=True)
-class Mode:
-    """One real eigenvalue or one conjugate pair.
-
-    Attributes:
-        eigenvalue: with the positive imaginary part [1/s].
-        frequency: its modulus, the natural frequency [rad/s].
-        damping: damping ratio; 1 for a stable real mode, -1 for an unstable one, 0 at the origin.
-        time_constant: -1 / real part [s]; negative where the mode grows, infinite where it does neither.
-        states: the states that take part most, largest first, with their share (participation factors).
-    """
-
-    eigenvalue: complex
-    frequency: float
-    damping: float
-    time_constant: float
-    states: tuple[tuple[str, float], ...]
-
-
-@dataclass(frozen=True)
-class LinearModel:
+class LinearModel(Shown):
     """dx/dt = A x + B u, y = C x + D u, for deviations from a trim.
 
     Attributes:
@@ -55,6 +41,7 @@ class LinearModel:
         G: effect of wind (north, east, down) and voltage, columns in that order.
         states, inputs, disturbances: names of the columns.
         trim: what the deviations are counted from.
+        delays: identified ones of the inputs [s], which the matrices have not; empty where none is known.
     """
 
     A: Array
@@ -66,6 +53,7 @@ class LinearModel:
     inputs: tuple[str, ...]
     disturbances: tuple[str, ...]
     trim: Trim
+    delays: Mapping[str, float] = field(default_factory=dict)
 
     def modes(self) -> tuple[Mode, ...]:
         """Eigenvalues with damping and frequency, fastest first."""
@@ -92,18 +80,24 @@ class LinearModel:
             )
         return tuple(found)
 
-    def to_control(self) -> Any:
-        """The model as a `control.StateSpace` of python-control with named signals."""
-        import control
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """The model as a `control.StateSpace` of python-control with named signals.
 
-        return control.ss(
-            self.A,
-            self.B,
-            self.C,
-            self.D,
-            states=list(self.states),
-            inputs=list(self.inputs),
-            outputs=list(self.states),
+        Args:
+            pade: order of the polynomials that stand for the inputs' identified delays; 0 leaves the delays out, None
+                does so with a warning where there are any.
+
+        Raises:
+            SwashError: an order outside 0 to 12.
+        """
+        return python_control.state_space(
+            (self.A, self.B, self.C, self.D),
+            states=self.states,
+            inputs=self.inputs,
+            outputs=self.states,
+            delays=self.delays,
+            pade=pade,
+            name="the linear model",
         )
 
     def __repr__(self) -> str:
@@ -138,6 +132,7 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
         inputs=vehicle.input_names,
         disturbances=SURROUNDINGS,
         trim=about,
+        delays=known_delays(vehicle),
     )
 
 

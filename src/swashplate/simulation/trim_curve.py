@@ -5,22 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swashplate.errors import SwashError
 from swashplate.models.doubts import doubts, shaft_power
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.public import resolve
+from swashplate.shown import Shown
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 @dataclass(frozen=True, repr=False)
-class TrimCurve:
+class TrimCurve(Shown):
     """The trims of a vehicle at ascending speeds.
 
     Attributes:
@@ -30,6 +28,10 @@ class TrimCurve:
 
     vehicle: Vehicle
     trims: tuple[Trim, ...]
+
+    def page(self, *, title: str | None = None) -> Any:
+        """The page of `sp.report`, under a heading, its own where None."""
+        return resolve("compose_speeds")(self, title=title)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -96,15 +98,6 @@ class TrimCurve:
         lines = ["".join(f"{head:>{width}}" for head in columns)]
         lines += ["".join(f"{value:>{width}.3f}" for value in row) for row in zip(*columns.values(), strict=True)]
         return "\n".join([f"Trims of {self.vehicle.card.title}", *lines, *(f"! {words}" for words in self.remarks)])
-
-    def plot(self) -> Figure:
-        """Inputs, attitude and power over speed, as a matplotlib figure."""
-        figure: Figure = resolve("plot_trim_curve")(self)
-        return figure
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of_trim_curve")(self)
-        return page
 
 
 def trim_curve(

@@ -7,18 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.models.vehicle import Vehicle
-
-CALIBRATION = 5.0
-"""Seconds at the start of a record that may be used; no prediction starts before they are over."""
-
-SHORTEST_CALIBRATION = 1.0
-"""Seconds: the filter has settled and a delay of a tenth of a second has left its trace."""
+from swashplate.validation.spans import CALIBRATION
 
 
 def first_part(record: Record, seconds: float) -> Record:

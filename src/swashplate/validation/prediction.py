@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, stochastic_model
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, predicted_covariance
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.innovations import filter_record
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.start_states import mean_velocity, slopes, steady_flight
 from swashplate.models.vehicle import Vehicle
-
-HORIZONS = (0.5, 1.0, 2.0, 5.0)
-"""Seconds ahead at which predictions are judged."""
+from swashplate.validation.spans import HORIZONS
 
 SETTLING = 2.0
 """Seconds before the first start point, for the observer to forget its first guess."""

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
@@ -24,15 +25,20 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
-from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
+from swashplate.validation.black_box import FilteredMotion
+from swashplate.validation.calibration import calibrate
+from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
-from swashplate.validation.prediction import HORIZONS, Predictions, naive, predict, prediction_sigma
+from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
+from swashplate.validation.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.validation.validation import Example, Score, Validation
 from swashplate.validation.verdict import THRESHOLDS, verdict
 
 _JUDGED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 _T = TypeVar("_T", Noise, Nuisance)
 _EXAMPLES = 6
+_EXAMPLE = 2.0
+"""Longest example [s]."""
 _STARTS = 1.0
 """Seconds over which starts are spread at least."""
 _EDGE = 0.1
@@ -100,6 +106,7 @@ def validate(
             hint="Use a longer flight, or a shorter calibration.",
         )
     parts: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
+    scored: dict[float, list[ScoredRecord]] = {}
     judged: list[AxisExcitation] = []
     measured: list[Array] = []
     examples: list[Example] = []
@@ -125,11 +132,15 @@ def validate(
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
+        sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=ahead)
         for horizon in horizons:
             if horizon <= ahead:
-                for name, part in _at_horizon(piece, rivals, horizon).items():
+                starts, made = _at_horizon(piece, rivals, horizon)
+                for name, part in made.items():
                     parts.setdefault((name, horizon), []).append(part)
-        examples.extend(_examples(piece, own, noise, min(2.0, ahead)))
+                promised = sigma[round(horizon / piece.dt) - 1]
+                scored.setdefault(horizon, []).append(ScoredRecord(motion_of(piece, truth, starts), promised))
+        examples.extend(_examples(piece, own, sigma[: round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
         checks.append((own.predictions.innovations[settled:], own.predictions.covariance))
         likelihoods.append(
@@ -141,6 +152,11 @@ def validate(
         if progress is not None:
             progress(number + 1, float(len(pieces)))
     scores = _scores(parts)
+    beside = flight_floors(
+        scored,
+        {k: v for k, v in parts.items() if not (alone and k[0] == "published card")},
+        training=_learnt(model, prior),
+    )
     return Validation(
         vehicle=vehicle,
         published=published,
@@ -151,7 +167,7 @@ def validate(
         log_likelihood={
             name: float(np.mean([item[name] for item in likelihoods])) for name in ("model", "published card")
         },
-        verdict=verdict([s for s in scores if not (alone and s.predictor == "published card")], judged),
+        verdict=verdict([s for s in scores if not (alone and s.predictor == "published card")], judged, beside),
         thresholds=THRESHOLDS,
         examples=tuple(examples),
         records=tuple(pieces),
@@ -165,7 +181,16 @@ def validate(
             "noise": {k: float(v) for k, v in noise._asdict().items()},
         },
         calibrated=tuple(calibrated),
+        floors=beside,
     )
+
+
+def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[FilteredMotion]:
+    """The records of the fit, where it brings them."""
+    if not isinstance(model, Result):
+        return []
+    nowhere = np.zeros(0, dtype=np.intp)
+    return [motion_of(c.record, measured_states(c.record, nuisance), nowhere) for c in model.in_time]
 
 
 def started_from(vehicle: Vehicle) -> Vehicle:
@@ -201,8 +226,10 @@ def _filled(usual: _T, given: Mapping[str, float]) -> _T:
     return usual._replace(**known)
 
 
-def _at_horizon(piece: Record, rivals: Mapping[str, _Rival], horizon: float) -> dict[str, tuple[Array, Array, Array]]:
-    """Predicted, true and starting states of every predictor at one horizon.
+def _at_horizon(
+    piece: Record, rivals: Mapping[str, _Rival], horizon: float
+) -> tuple[NDArray[np.intp], dict[str, tuple[Array, Array, Array]]]:
+    """The starts, and the predicted, true and starting states of every predictor at one horizon.
 
     What was measured is carried to the centre of gravity by each vehicle's own lever arm; without a vehicle, by the
     model's.
@@ -219,7 +246,7 @@ def _at_horizon(piece: Record, rivals: Mapping[str, _Rival], horizon: float) -> 
     truth = truths["model"]
     for name, kind in (("hold", "hold"), ("constant rates", "rates")):
         made[name] = (naive(truth, first, ahead, piece.dt, kind=kind), truth[first + ahead], truth[first])
-    return made
+    return first, made
 
 
 def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array]]]) -> tuple[Score, ...]:
@@ -239,9 +266,8 @@ def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array
     return tuple(made)
 
 
-def _examples(piece: Record, own: _Rival, noise: Noise, horizon: float) -> list[Example]:
-    """A few predictions spread over the record."""
-    sigma = prediction_sigma(own.vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=horizon)
+def _examples(piece: Record, own: _Rival, sigma: Array) -> list[Example]:
+    """A few predictions spread over the record, as long as their standard deviations (n, 12)."""
     ahead = sigma.shape[0]
     usable = np.flatnonzero(own.predictions.starts + ahead < piece.time.size)
     chosen = usable[np.linspace(0, usable.size - 1, min(_EXAMPLES, usable.size)).astype(int)] if usable.size else usable

@@ -6,18 +6,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_json
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
-from swashplate.public import resolve
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from swashplate.shown import Shown
+from swashplate.validation.floors import ROWS, Floor
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
 
@@ -93,7 +91,7 @@ class Example:
 
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Shown):
     """Predictions of unseen flights, judged.
 
     Attributes:
@@ -107,6 +105,7 @@ class Validation:
         flights: the conditioned flights.
         settings: observer, horizons.
         calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
+        floors: what the model's scores stand beside, per channel and horizon.
     """
 
     vehicle: Vehicle
@@ -122,6 +121,7 @@ class Validation:
     flights: tuple[Flight, ...]
     settings: Mapping[str, Any]
     calibrated: tuple[Nuisance, ...] = ()
+    floors: tuple[Floor, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -131,12 +131,17 @@ class Validation:
             if s.channel == channel and abs(s.horizon - horizon) < 1e-9 and s.predictor == predictor
         )
 
+    def floor(self, channel: str, horizon: float) -> Floor:
+        """What the model's score on one channel at one horizon stands beside."""
+        return next(f for f in self.floors if f.channel == channel and abs(f.horizon - horizon) < 1e-9)
+
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
             "kind": "validation",
             "vehicle": self.vehicle.name,
             "scores": [vars(score) for score in self.scores],
+            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -153,15 +158,6 @@ class Validation:
         """Write the document as a JSON file."""
         return write_json(path, self.as_dict())
 
-    def plot(self) -> Figure:
-        """Fit of every predictor on every channel, as a matplotlib figure."""
-        figure: Figure = resolve("plot_validation")(self)
-        return figure
-
-    def _repr_html_(self) -> str:
-        page: str = resolve("html_of_validation")(self)
-        return page
-
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}
         channels = [
@@ -173,4 +169,8 @@ class Validation:
             for predictor in PREDICTORS:
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
+            beside = {f.channel: f for f in self.floors if f.horizon == horizon}
+            for words, cell in ROWS if beside else ():
+                row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
+                lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
         return "\n".join([*lines, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

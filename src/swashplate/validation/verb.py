@@ -13,11 +13,8 @@ from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
-from swashplate.validation.calibration import CALIBRATION
-from swashplate.validation.prediction import HORIZONS
-from swashplate.validation.validate import validate as predict_flights
+from swashplate.validation.spans import CALIBRATION, HORIZONS
 from swashplate.validation.validation import Validation
-from swashplate.validation.vehicle_verification import verify_vehicle
 from swashplate.validation.verification import Verification, verify
 
 
@@ -88,7 +85,10 @@ def validate(
     flown = (flights,) if isinstance(flights, Flight) else tuple(flights)
     held = model.model if isinstance(model, Result) else model
     rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
+    # What flies nonlinear vehicles compiles; linear models need none of it, and it takes a second to import.
     if rigid and outputs is None:
+        from swashplate.validation.validate import validate as predict_flights
+
         return predict_flights(
             model,  # type: ignore[arg-type]
             flown,
@@ -102,8 +102,28 @@ def validate(
         raise SwashError(
             "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"
         )
-    if isinstance(held, Vehicle):
-        return verify_vehicle(held, flown, outputs=outputs)
+    return along_inputs(model, flown, outputs=outputs)
+
+
+def along_inputs(
+    model: Result[Any, Any] | Vehicle | StateSpaceModel,
+    flights: Flight | Sequence[Flight],
+    *,
+    outputs: Sequence[str] | None = None,
+) -> Verification:
+    """Any model flown along recorded inputs: start states, shifts and biases are solved for.
+
+    Args:
+        model: what an identification returned, or a model. flights: conditioned. outputs: see `validate`.
+
+    Raises:
+        FlightError: an input that the flights lack, or no output that both have.
+    """
+    held = model.model if isinstance(model, Result) else model
+    if isinstance(held, Vehicle) and held.structure is None:
+        from swashplate.validation.vehicle_verification import verify_vehicle
+
+        return verify_vehicle(held, flights, outputs=outputs)
     if isinstance(held, tuple) and isinstance(model, Result) and isinstance(model.details, TransferFunctionDetails):
         held = as_state_space(model)
-    return verify(held, flown, outputs=outputs)
+    return verify(held, flights, outputs=outputs)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.validation.floors import Floor
 from swashplate.validation.validation import AxisVerdict, Score
 
 THRESHOLDS = {"good": 50.0, "usable": 20.0}
 """Prediction fit [%] of every channel of an axis at its horizon; both must also beat every rival."""
+
+LEVELS = ("good", "usable", "poor", "cannot be judged")
+"""Every level, from the best to the one that says nothing about the model."""
 
 _AXES = {
     # axis: channels, horizon [s]
@@ -20,12 +25,15 @@ _AXES = {
 }
 
 
-def verdict(scores: Sequence[Score], excitation: Sequence[AxisExcitation]) -> tuple[AxisVerdict, ...]:
+def verdict(
+    scores: Sequence[Score], excitation: Sequence[AxisExcitation], floors: Sequence[Floor] = ()
+) -> tuple[AxisVerdict, ...]:
     """Judge every axis whose channels were scored.
 
     Args:
         scores: of all predictors.
         excitation: of the flights that were predicted.
+        floors: what the model's scores stand beside; the words say whether the model or the flight is poor.
     """
     made = []
     for axis, (channels, horizon) in _AXES.items():
@@ -33,24 +41,44 @@ def verdict(scores: Sequence[Score], excitation: Sequence[AxisExcitation]) -> tu
         if not rows:
             continue
         judged = [item for item in excitation if item.axis == axis]
-        made.append(_one(axis, channels, horizon, rows, judged))
+        beside = [f for f in floors if f.channel in channels and abs(f.horizon - horizon) < 1e-9]
+        made.append(_one(axis, channels, horizon, rows, judged, beside))
     return tuple(made)
 
 
+def in_brief(verdicts: Iterable[AxisVerdict]) -> str:
+    """The axes by level in one line, as "good: roll, horizontal; cannot be judged: pitch"."""
+    judged = list(verdicts)
+    by_level = {level: [v.axis for v in judged if v.level == level] for level in LEVELS}
+    return "; ".join(f"{level}: {', '.join(axes)}" for level, axes in by_level.items() if axes)
+
+
 def _one(
-    axis: str, channels: tuple[str, ...], horizon: float, rows: Sequence[Score], judged: Sequence[AxisExcitation]
+    axis: str,
+    channels: tuple[str, ...],
+    horizon: float,
+    rows: Sequence[Score],
+    judged: Sequence[AxisExcitation],
+    floors: Sequence[Floor],
 ) -> AxisVerdict:
     model = {s.channel: s.fit for s in rows if s.predictor == "model"}
     rivals = {c: max(s.fit for s in rows if s.predictor != "model" and s.channel == c) for c in model}
-    numbers = ", ".join(f"{c} {model[c]:.0f} % (best rival {rivals[c]:.0f} %)" for c in channels if c in model)
+    scatter = {f.channel: f" [{f.low:.0f} to {f.high:.0f}]" for f in floors if math.isfinite(f.low)}
+    numbers = ", ".join(
+        f"{c} {model[c]:.0f} %{scatter.get(c, '')} (best rival {rivals[c]:.0f} %)" for c in channels if c in model
+    )
     said = f"{numbers} at {horizon:g} s."
+    beside = "".join(f" {f.channel}: {f.words}" for f in floors)
+    hopeless = [f.channel for f in floors if f.reached and f.ceiling < THRESHOLDS["usable"]]
     beaten = [c for c in model if model[c] <= rivals[c]]
     worst = min(model.values())
     if judged and not any(item.identifiable for item in judged):
         return AxisVerdict(axis, "cannot be judged", f"{said} {judged[0].words}")
     if worst >= THRESHOLDS["good"] and not beaten:
-        return AxisVerdict(axis, "good", said)
+        return AxisVerdict(axis, "good", said + beside)
     if worst >= THRESHOLDS["usable"] and not beaten:
-        return AxisVerdict(axis, "usable", said)
+        return AxisVerdict(axis, "usable", said + beside)
     why = f" Beaten in {', '.join(beaten)}." if beaten else ""
-    return AxisVerdict(axis, "poor", said + why)
+    if hopeless and min(model, key=lambda c: model[c]) in hopeless:
+        return AxisVerdict(axis, "cannot be judged", said + why + beside)
+    return AxisVerdict(axis, "poor", said + why + beside)

@@ -28,6 +28,10 @@ from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
+from swashplate.validation.black_box import CROSSED, Ceiling
+from swashplate.validation.ceiling_along import ceiling_along
+from swashplate.validation.floors import Floor, floors
 from swashplate.validation.noise_filter import Piece
 from swashplate.validation.refutation import REFUTED, STANDS, Judgement, judge
 
@@ -77,7 +81,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class Verification:
+class Verification(Shown):
     """How an identified model follows unseen records.
 
     Attributes:
@@ -86,6 +90,7 @@ class Verification:
         inside: the same within the fitted band alone, where one was asked for.
         judgement: whether the records refute the model, and why. rivals: J_rms of the naive predictors.
         constants, samples: numbers solved for, and numbers compared.
+        floors: what the fits stand beside, by output.
     """
 
     model: StateSpaceModel | Vehicle
@@ -100,6 +105,7 @@ class Verification:
     rivals: Mapping[str, float] = field(default_factory=dict)
     constants: int = 0
     samples: int = 0
+    floors: tuple[Floor, ...] = ()
 
     @property
     def good(self) -> bool:
@@ -158,6 +164,7 @@ class Verification:
             "samples": self.samples,
             "stretch_s": self.settings.get("stretch_s"),
             "outputs": [vars(o) for o in self.outputs],
+            "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "records": [{"source": t.source, "biases": dict(t.biases), "shifts": dict(t.shifts)} for t in self.traces],
             "warnings": list(self.warnings),
             "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
@@ -176,6 +183,7 @@ class Verification:
         lines.append(f"  {'output':<10}{'rms error':>12}  {'unit':<8}{'Theil':>7}{'fit %':>8}")
         for o in self.outputs:
             lines.append(f"  {o.output:<10}{o.rms:>12.4g}  {o.unit:<8}{o.theil:>7.2f}{o.fit:>8.1f}")
+        lines += [f"  {floor.channel}: {floor.scatter}{floor.words}" for floor in self.floors]
         lines += [f"! {text}" for text in self.warnings]
         return "\n".join(lines if self.inside is None else [*lines, repr(self.inside)])
 
@@ -321,6 +329,28 @@ def verified(
         rivals=dict(rivals or {}),
         constants=constants,
         samples=sum(t.flight.size for t in traces),
+        floors=_beside(outputs, traces, banded=bool(settings.get("band_hz"))),
+    )
+
+
+def _beside(outputs: tuple[str, ...], traces: Sequence[Trace], *, banded: bool) -> tuple[Floor, ...]:
+    """What the fits stand beside; "hold" is the mean of each stretch, and what moves is the flight about it."""
+    times = [t.time for t in traces]
+    moved = [(t.flight - t.flight.mean(axis=0)) ** 2 for t in traces]
+    box = (
+        Ceiling(CROSSED, refused="a band's filters, which have no phase, look ahead")
+        if banded
+        else ceiling_along(times, [t.inputs for t in traces], [t.flight for t in traces])
+    )
+    squares = {"model": [(t.flight - t.model) ** 2 for t in traces], HOLD: moved}
+    return floors(
+        outputs,
+        float("inf"),
+        times,
+        squares,
+        dict.fromkeys(squares, moved),
+        expected=np.full(len(outputs), np.nan),
+        ceilings=[box],
     )
 
 

@@ -12,7 +12,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from swashplate.filtering.disturbances import DISTURBED, Noise
-from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, stochastic_model
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import POSE
 from swashplate.identification.time.start_states import steady_flight
 from swashplate.models.catalogue import vehicle

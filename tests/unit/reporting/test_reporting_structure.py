@@ -24,6 +24,7 @@ from swashplate.reporting.structure import Cell, Report, Section, Table
 from swashplate.reporting.theme import packed, phase_ticks
 from swashplate.reporting.versions import card_hash, date, result_hash
 from swashplate.reporting.words import noise_told, plain_words, sigma_words, span_words, step_words, value_words
+from swashplate.validation.prediction import HORIZONS
 
 
 @given(
@@ -223,6 +224,18 @@ def test_examples_that_overlap_are_not_drawn_over_each_other() -> None:
     assert [example.start for example in chosen] == [2.0, 6.0, 9.0, 13.0]
 
 
+def test_every_horizon_says_what_its_scores_stand_beside() -> None:
+    (section,) = (s for s in compose(None, validation(), modes=modes()).sections if s.identifier == "prediction")
+    beside = [b for b in section.blocks if isinstance(b, Table) and "stand beside" in b.caption]
+    assert len(beside) == len(HORIZONS)
+    cells = {row[0].words: [cell.words for cell in row] for row in beside[0].rows}
+    assert cells["psi"][9] == "refused"
+    assert cells["phi"][9] != "refused"
+    assert "No ceiling" in cells["psi"][-1]
+    without = compose(None, replace(validation(), floors=()), modes=modes())
+    assert not any("stand beside" in getattr(b, "caption", "") for s in without.sections for b in s.blocks)
+
+
 def test_tables_refuse_ragged_rows() -> None:
     with pytest.raises(ValueError, match="different lengths"):
         Table("t", ("a", "b"), ((Cell("1"),),))
@@ -284,5 +297,12 @@ def test_theils_best_is_bold_by_itself_and_residuals_are_in_units_that_can_be_re
 
 
 def test_phase_axes_have_marks_at_multiples_of_45_degrees() -> None:
-    assert [phase_ticks([0.0, -span])["dtick"] for span in (90.0, 400.0, 700.0, 3000.0)] == [45, 90, 180, 360]
+    assert [phase_ticks([0.0, -span])["dtick"] for span in (60.0, 90.0, 200.0, 400.0, 700.0, 3000.0)] == [
+        15,
+        30,
+        45,
+        90,
+        180,
+        360,
+    ]
     assert phase_ticks([np.nan])["dtick"] == 45

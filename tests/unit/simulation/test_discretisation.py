@@ -8,12 +8,12 @@ from scipy.linalg import expm
 
 from swashplate.simulation.discretisation import (
     first_order_hold,
-    gathered_noise,
     held_series,
     with_late_inputs,
     zero_order_hold,
 )
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.gathered_noise import gathered_noise
 
 A = np.array([[0.0, 1.0, 0.0], [-40.0, -1.2, 3.0], [0.0, 0.0, -8.0]])
 B = np.array([[0.0, 0.1], [2.0, 0.0], [0.0, 8.0]])

@@ -12,11 +12,12 @@ import swashplate as sp
 from simulated_flights import ten_seconds
 from swashplate.errors import FlightError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
-from swashplate.validation.calibration import CALIBRATION, calibrate, first_part
+from swashplate.validation.calibration import calibrate, first_part
 from swashplate.validation.prediction import Predictions, predict
+from swashplate.validation.spans import CALIBRATION
 from swashplate.validation.validate import observer_of, validate
 from swashplate.validation.validation import PREDICTORS, Validation
 
@@ -145,6 +146,21 @@ def test_the_result_is_plain_json_and_prints() -> None:
     assert len(document["scores"]) == len(PREDICTED) * len(HORIZONS) * len(PREDICTORS)
     for part in ("constant rates", "0.5 s", "roll: good"):
         assert part in repr(found)
+
+
+def test_every_score_of_the_model_stands_beside_its_floor() -> None:
+    found = _validation()
+    assert {(f.channel, f.horizon) for f in found.floors} == {(c, h) for c in PREDICTED for h in HORIZONS}
+    for floor in found.floors:
+        score = found.score(floor.channel, floor.horizon)
+        assert (floor.fit, floor.rms) == (pytest.approx(score.fit), pytest.approx(score.rms))
+        assert floor.moved == pytest.approx(found.score(floor.channel, floor.horizon, "hold").rms)
+        assert floor.rival != "published card"  # a card is no rival of itself
+    phi = found.floor("phi", 0.5)
+    assert 0.0 < phi.expected < phi.fit  # the usual gusts are promised, and this flight had none
+    assert np.isnan(phi.low)  # five seconds of starts are too few blocks
+    assert "filter expects" in repr(found)
+    assert found.as_dict()["floors"][0]["words"] == found.floors[0].words
 
 
 def test_a_flight_that_is_over_before_it_is_calibrated_is_refused() -> None:

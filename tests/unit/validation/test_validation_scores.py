@@ -12,8 +12,8 @@ from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation.innovations import check, log_likelihood
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import naive
-from swashplate.validation.validation import Score
-from swashplate.validation.verdict import THRESHOLDS, verdict
+from swashplate.validation.validation import AxisVerdict, Score
+from swashplate.validation.verdict import THRESHOLDS, in_brief, verdict
 
 RNG = np.random.default_rng(1)
 START = RNG.standard_normal((500, 3)) + 7.0
@@ -130,3 +130,10 @@ def test_an_axis_that_no_record_moves_cannot_be_judged_and_one_that_any_moves_ca
     (found,) = verdict(scores, [_excited("yaw", identifiable=False), _excited("yaw", identifiable=True)])
     assert found.level == "good"
     assert verdict([], []) == ()
+
+
+def test_the_verdict_in_brief_names_every_axis_under_its_level() -> None:
+    levels = (("roll", "good"), ("pitch", "cannot be judged"), ("horizontal", "good"), ("yaw", "poor"))
+    judged = [AxisVerdict(axis, level, "") for axis, level in levels]
+    assert in_brief(judged) == "good: roll, horizontal; poor: yaw; cannot be judged: pitch"
+    assert in_brief(judged[:1]) == "good: roll"

@@ -18,6 +18,7 @@ from scipy.signal import detrend
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.sweep_tracking import Ridge
 from swashplate.flights.provenance import Event
 from swashplate.flights.schema import is_known
 
@@ -109,10 +110,12 @@ def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
         time, values = flight.time(name), flight.values(name)
         for start, stop in _unbroken(time):
             inside = (time >= start) & (time <= stop)
-            for ridge in _all_rising(time[inside], values[inside]):
+            for ridge in all_rising(time[inside], values[inside]):
                 axis = _AXES.get(name.rpartition("_")[2], name)
-                amplitude = ridge[4] / (1e-3 if name.startswith("rcin_") else 1.0)  # pulses move by 0.5 ms
-                found.append((amplitude, Sweep(ridge[0], ridge[1], axis, ridge[2], ridge[3], name, "signal")))
+                low, high = float(ridge.frequency[0]), float(ridge.frequency[-1])
+                amplitude = float(np.median(ridge.amplitude))
+                amplitude /= 1e-3 if name.startswith("rcin_") else 1.0  # pulses move by 0.5 ms
+                found.append((amplitude, Sweep(ridge.start, ridge.stop, axis, low, high, name, "signal")))
     kept: list[Sweep] = []
     for _, sweep in sorted(found, key=lambda item: -item[0]):
         others = (*told, *((other.start, other.stop) for other in kept))
@@ -130,27 +133,27 @@ def _unbroken(time: Array) -> list[tuple[float, float]]:
     return [(float(time[a]), float(time[b - 1])) for a, b in pairwise(edges) if b - a > 1]
 
 
-def _all_rising(time: Array, values: Array) -> list[tuple[float, float, float, float, float]]:
-    """The strongest sweep in a signal, and those before and after it."""
+def all_rising(time: Array, values: Array) -> list[Ridge]:
+    """The strongest sweep in a signal, and those before and after it; arguments as of `rising`."""
     ridge = rising(time, values)
     if ridge is None:
         return []
-    before, after = time < ridge[0], time > ridge[1]
+    before, after = time < ridge.start, time > ridge.stop
     return [
-        *_all_rising(time[before], values[before]),
+        *all_rising(time[before], values[before]),
         ridge,
-        *_all_rising(time[after], values[after]),
+        *all_rising(time[after], values[after]),
     ]
 
 
-def rising(time: Array, values: Array) -> tuple[float, float, float, float, float] | None:
+def rising(time: Array, values: Array) -> Ridge | None:
     """The strongest ridge of steadily rising frequency in a signal.
 
     Args:
         time: strictly increasing stamps [s], shape (n,); values: shape (n,).
 
     Returns:
-        Start and stop [s], lowest and highest frequency [Hz], amplitude; None where there is no sweep.
+        Its course; None where there is no sweep.
     """
     length = float(time[-1] - time[0]) if time.size > 1 else 0.0
     if length < _LEAST_SECONDS or not np.ptp(values) > 0.0:
@@ -186,8 +189,8 @@ def rising(time: Array, values: Array) -> tuple[float, float, float, float, floa
     # A sudden jump between two tones is no sweep: it must spend time on the way.
     if np.unique(rows).size < 0.6 * (rows[-1] - rows[0]):
         return None
-    start, stop = (float(time[0] + grid[min(i * hop, grid.size - 1)]) for i in (frames[0], frames[-1]))
-    return start, stop, float(band[0]), float(band[-1]), float(np.median(strength))
+    at = time[0] + grid[np.minimum(frames * hop, grid.size - 1)]
+    return Ridge(at, band, strength, float(np.mean(share[rows, frames])))
 
 
 def _thinned(time: Array, values: Array, rate: float) -> Array:

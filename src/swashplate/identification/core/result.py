@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,11 +14,12 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.sources import DataSource
 from swashplate.public import resolve
+from swashplate.shown import Shown
 
 APART = 3.0
 """Sigmas beyond which a prior and a flight disagree."""
@@ -123,7 +123,7 @@ class Drawable(Protocol):
 
 
 @dataclass(frozen=True, repr=False)
-class Result(Generic[Model, Details]):
+class Result(Shown, Generic[Model, Details]):
     """What an identification found.
 
     Attributes:
@@ -301,7 +301,7 @@ class Result(Generic[Model, Details]):
         lines = [f"{self.name} by {self.method}: {self.state}{responses}"]
         told = getattr(self.details, "lines", None)
         lines += told(self) if told is not None else []
-        columns = [(head, cells) for head, cells in self._columns() if any(cells)]
+        columns = [(head, cells) for head, cells in self.columns() if any(cells)]
         widths = [max(len(cell) for cell in (head, *cells)) for head, cells in columns]
         for row in range(-1, len(self.estimates)):
             cells = []
@@ -311,7 +311,8 @@ class Result(Generic[Model, Details]):
             lines.append(("  " + "  ".join(cells)).rstrip())
         return "\n".join([*lines, *(f"! {text}" for text in (*self.problems, *self.warnings))])
 
-    def _columns(self) -> list[tuple[str, list[str]]]:
+    def columns(self) -> list[tuple[str, list[str]]]:
+        """Headings and cells of the table of estimates."""
         every = self.estimates
         # The targets for fits to responses (20 %, 10 %) are set for the plain bound.
         sigma = {e.name: e.sigma if self.costs else e.best_sigma for e in every}
@@ -325,14 +326,6 @@ class Result(Generic[Model, Details]):
             ("unit", [e.unit for e in every]),
             ("remarks", [remark(e) for e in every]),
         ]
-
-    def _repr_html_(self) -> str:
-        heads, columns = zip(*((head, cells) for head, cells in self._columns() if any(cells)), strict=True)
-        rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in zip(*columns, strict=True)]
-        told = "".join(f"<p>{html.escape(text)}</p>" for text in (*self.problems, *self.warnings))
-        title = html.escape(f"{self.name} by {self.method}: {self.state}")
-        head = "".join(f"<th>{h}</th>" for h in heads)
-        return f"<p>{title}</p><table><tr>{head}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>{told}"
 
 
 def remark(e: Estimate) -> str:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy
+from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Result, correlation_of
-from swashplate.identification.core.scoring import Optimum, Progress, minimise
+from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
 from swashplate.identification.core.sources import DataSource
-from swashplate.identification.core.time_likelihood import TimeErrors
 
 METHODS = ("output-error", "filter-error", "prediction-error")
 
@@ -41,6 +41,26 @@ class TimeDetails:
     covariance: Array
 
 
+class RecordLikelihood(Likelihood, Protocol):
+    """A likelihood of records in time: what the search needs, and what is said of its optimum."""
+
+    @property
+    def records(self) -> tuple[Record, ...]: ...
+
+    @property
+    def covariance(self) -> Array:
+        """Of the output errors, or of the innovations (n_outputs, n_outputs)."""
+        ...
+
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per record whitened errors (n, outputs) and sensitivities (p, n, outputs); and all other information."""
+        ...
+
+    def comparisons(self, row: Array) -> tuple[Comparison, ...]:
+        """Every record beside what the model foretells."""
+        ...
+
+
 @dataclass(frozen=True)
 class Solved:
     """Where a likelihood has its optimum.
@@ -52,26 +72,32 @@ class Solved:
     """
 
     numbers: Mapping[str, float]
-    likelihood: TimeErrors
+    likelihood: RecordLikelihood
     optimum: Optimum
     plain: Array
     corrected: Array
 
 
-def solve(likelihood: TimeErrors, *, iterations: int, progress: Progress | None) -> Solved:
+def solve(
+    likelihood: RecordLikelihood, *, iterations: int, progress: Progress | None, start: Array | None = None
+) -> Solved:
     """The optimum of a likelihood whose first entries are the model's parameters.
 
     Args:
         likelihood: of errors or innovations.
         iterations: at most this many.
         progress: told about every iteration.
+        start: scaled row to begin with (None: the entries' starts).
     """
     row = likelihood.row
-    optimum = minimise(likelihood, iterations=iterations, tolerance=0.02, progress=progress)
-    plain = np.asarray(np.linalg.pinv(optimum.information, hermitian=True), dtype=np.float64)
+    optimum = minimise(likelihood, start=start, iterations=iterations, tolerance=0.02, progress=progress)
+    known = np.zeros_like(optimum.information)  # beforehand, of the model's parameters
+    of_model = np.ix_(row.places("parameter"), row.places("parameter"))
+    known[of_model] = row.prior_information[of_model]
+    plain = np.asarray(np.linalg.pinv(optimum.information + known, hermitian=True), dtype=np.float64)
     lags = round(LAGS / likelihood.records[0].dt)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
-    corrected = accuracy.corrected_covariance(plain, rest, white, sensitivities, lags=lags)
+    corrected = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
     units = np.outer(row.scale, row.scale)
     named = dict(zip(row.names, map(float, _numbers(row, optimum.row)), strict=True))
     return Solved(named, likelihood, optimum, plain * units, corrected * units)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from swashplate.identification.frequency.response_cost import Target, target
 from swashplate.identification.frequency.state_space_fit import fit_targets
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.simulation.linearize import LinearModel
+
+if TYPE_CHECKING:
+    from swashplate.simulation.linearize import LinearModel
 
 _FAST = 1e-9
 

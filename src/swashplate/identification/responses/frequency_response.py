@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -38,11 +38,13 @@ class FrequencyResponse:
         error: random error: relative standard deviation of the magnitude, and of the phase [rad], shape as `response`.
         input_power: spectra of the inputs [unit^2/Hz], shape (n_f, n_inputs). output_power: shape (n_f, n_outputs).
         input_coherence: coherence between inputs, what the pilot mixed, shape (n_f, n_inputs, n_inputs).
-        method: "direct" or "joint".
+        method: "direct", "joint" (with recorded references) or "along sweeps" (sweeps as their own references).
         windows: lengths used [s].
         sources: records used, with their intervals.
         warnings: what a reader must know. problems: what could not be computed, and why.
         settings: what was asked.
+        direct, direct_error: beside a joint estimate or one along sweeps, the direct one and its random error, both as
+            the windows blur them, shape as `response`; None with the direct estimate itself.
     """
 
     omega: Array
@@ -63,6 +65,8 @@ class FrequencyResponse:
     warnings: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
+    direct: Complex | None = None
+    direct_error: Array | None = None
 
     @property
     def data(self) -> tuple[DataSource, ...]:
@@ -119,6 +123,8 @@ class FrequencyResponse:
             input_coherence=self.input_coherence[np.ix_(range(self.omega.size), i, i)],
             input_units=tuple(self.input_units[j] for j in i) if self.input_units else (),
             output_units=tuple(self.output_units[j] for j in o) if self.output_units else (),
+            direct=None if self.direct is None else self.direct[pairs],
+            direct_error=None if self.direct_error is None else self.direct_error[pairs],
         )
 
     # ---- other programs ----------------------------------------------------------------------------------------
@@ -127,7 +133,8 @@ class FrequencyResponse:
         import control
 
         data = np.moveaxis(self.response, 0, -1)
-        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs))
+        name = ", ".join(self.sources) or "responses"  # python-control's plots fail without one
+        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name=name)
 
     @staticmethod
     def from_control(frd: Any) -> FrequencyResponse:
@@ -168,15 +175,17 @@ class FrequencyResponse:
             for name in self.inputs:
                 h, coherence, error = self.pair(output, name)
                 band = self.band(output, name)
+                o, i = self.place(output, name)
+                beside = {} if self.direct is None else _polar(self.direct[:, o, i], "direct_")
                 pairs.append(
                     {
                         "output": output,
                         "input": name,
                         "band_hz": None if band is None else [band[0] / TWO_PI, band[1] / TWO_PI],
-                        "magnitude_db": np.asarray(decibel(h)).tolist(),
-                        "phase_deg": unwrapped_degrees(h).tolist(),
+                        **_polar(h),
                         "coherence": coherence.tolist(),
                         "error": error.tolist(),
+                        **beside,
                     }
                 )
         return {
@@ -191,13 +200,33 @@ class FrequencyResponse:
             "settings": dict(self.settings),
         }
 
-    def plot(self, *, pairs: Sequence[tuple[str, str]] | None = None) -> Figure:
-        """Bode plots with coherence as a matplotlib figure: of (output, input) pairs, or of those that are coherent."""
-        figure: Figure = resolve("plot_responses")(self, pairs=pairs)
+    def plot(
+        self,
+        *,
+        pairs: Sequence[tuple[str, str]] | None = None,
+        theme: Literal["paper", "light", "dark"] = "paper",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Figure:
+        """Bode diagrams with coherence as a matplotlib figure: (output, input) pairs side by side.
+
+        Where no pairs are given, the matrix of all outputs and inputs that answer coherently: outputs down, inputs
+        across.
+        """
+        figure: Figure = resolve("plot_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
         return figure
 
+    def explore(
+        self,
+        *,
+        pairs: Sequence[tuple[str, str]] | None = None,
+        theme: Literal["paper", "light", "dark"] = "light",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Any:
+        """The same as a `plotly.graph_objects.Figure`, to zoom and point at."""
+        return resolve("explore_responses")(self, pairs=pairs, theme=theme, frequency=frequency)
+
     def _repr_html_(self) -> str:
-        page: str = resolve("html_of_responses")(self)
+        page: str = resolve("html_of")(self)
         return page
 
     # ---- looking -----------------------------------------------------------------------------------------------
@@ -262,6 +291,11 @@ def unwrapped_degrees(h: Complex) -> Array:
         degrees = np.degrees(np.unwrap(np.angle(h[known])))
         phase[known] = degrees - (360.0 if degrees[0] > 90.0 + 1e-9 else 0.0)
     return phase
+
+
+def _polar(h: Complex, before: str = "") -> dict[str, Any]:
+    gain: Array = decibel(h)
+    return {f"{before}magnitude_db": gain.tolist(), f"{before}phase_deg": unwrapped_degrees(h).tolist()}
 
 
 def _counted(names: tuple[str, ...], what: str) -> str:

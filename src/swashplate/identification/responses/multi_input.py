@@ -40,6 +40,10 @@ class Conditioned:
     error: Array
 
 
+WEAK = 0.2
+"""Random error of what references tell of an input, from which on they tell too little: a quotient of two noises."""
+
+
 def condition_spectra(
     spectra: Complex,
     inputs: int,
@@ -48,6 +52,7 @@ def condition_spectra(
     removed: Complex | None = None,
     whole: Array | None = None,
     share: Array | None = None,
+    references: int = 0,
 ) -> Conditioned:
     """H = Gxx^-1 Gxy with partial and multiple coherence (Tischler and Remple 2012, ch. 9; Bendat and Piersol 2010).
 
@@ -61,18 +66,32 @@ def condition_spectra(
         removed: responses that were taken out of the outputs beforehand and are added here, shape
             (n_f, n_outputs, n_inputs). whole: spectra of the whole outputs then, shape (n_f, n_outputs).
         share: of each input's power that is its own, where it is known better than by these spectra (`own_shares`).
+        references: channels behind inputs and outputs that no loop feeds back: the joint estimate is made. Its noise is
+            what the responses leave of the measured outputs with the measured inputs, which is the aircraft's own; what
+            the references leave of the outputs is that noise as the loop answers it (Ljung 1999, eq. 13.44). Where they
+            tell too little of an input (random error of `WEAK`), it has no response.
     """
+    measured, n = spectra, spectra.shape[1] - references
+    if references:
+        spectra = project_on_references(measured, inputs, references)[:, :n, :n]
     gxx, gxy = spectra[:, :inputs, :inputs], spectra[:, :inputs, inputs:]
     gyy = np.diagonal(spectra[:, inputs:, inputs:], axis1=1, axis2=2).real
     auto = np.diagonal(gxx, axis1=1, axis2=2).real
     scale = np.sqrt(np.where(auto > 0.0, auto, 1.0))
     normal = gxx / (scale[:, :, None] * scale[:, None, :])
     own, inverse = _inverse(normal)
-    own = own if share is None else share
+    if share is not None:
+        own = np.fmin(own, share) if references else share
     inverse = inverse / (scale[:, :, None] * scale[:, None, :])
     h = inverse @ gxy  # (n_f, n_inputs, n_outputs)
     explained = np.einsum("fio,fio->fo", gxy.conj(), h).real
     noise = np.maximum(gyy - explained, 0.0)
+    if references:
+        noise = _unexplained(measured[:, :n, :n], h) * _freedom(averages, inputs)
+        untold = np.maximum(np.diagonal(measured[:, :inputs, :inputs], axis1=1, axis2=2).real - auto, 0.0)
+        a = np.diagonal(inverse, axis1=1, axis2=2).real
+        strong = random_error(1.0 / (1.0 + untold * a), averages - (inputs - 1)) < WEAK
+        own = np.where(strong | ~np.isfinite(own), own, 0.0)
     found = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
     response = np.where(own[:, None, :] > SINGULAR, found, np.nan)
     a = np.diagonal(inverse, axis1=1, axis2=2).real
@@ -92,6 +111,25 @@ def condition_spectra(
         own_share=own,
         error=random_error(coherence, averages - (inputs - 1)),
     )
+
+
+def _unexplained(spectra: Complex, h: Complex) -> Array:
+    """Spectra of what responses leave of the outputs with the inputs as they are, shape (n_f, n_outputs).
+
+    Args:
+        spectra: channels in the order inputs, outputs. h: shape (n_f, n_inputs, n_outputs).
+    """
+    n = h.shape[1]
+    gyy = np.diagonal(spectra[:, n:, n:], axis1=1, axis2=2).real
+    across = np.einsum("fio,fio->fo", spectra[:, :n, n:].conj(), h).real
+    made = np.einsum("fio,fij,fjo->fo", h.conj(), spectra[:, :n, :n], h).real
+    return np.asarray(np.maximum(gyy - 2.0 * across + made, 0.0))
+
+
+def _freedom(averages: float, inputs: int) -> float:
+    """By how much fitted responses make noise look smaller: n / (n - inputs), with n as `random_error` counts."""
+    n = averages / C_EPSILON**2
+    return n / (n - inputs) if n > inputs + 1.0 else n
 
 
 def _inverse(normal: Complex) -> tuple[Array, Complex]:

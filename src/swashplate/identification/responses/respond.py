@@ -30,9 +30,9 @@ from swashplate.identification.responses.input_shares import own_shares
 from swashplate.identification.responses.multi_input import (
     Conditioned,
     condition_spectra,
-    project_on_references,
     random_error,
 )
+from swashplate.identification.responses.own_references import own_references
 from swashplate.identification.responses.references import reference_columns, sweeps_of
 from swashplate.identification.responses.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, signals, spectral_matrix
@@ -94,8 +94,13 @@ def respond(
     overlap: float = OVERLAP,
     bystanders: Sequence[str] | None = None,
     lines: int = LINES_PER_DECADE,
+    direct: bool = False,
 ) -> FrequencyResponse:
     """Frequency responses of outputs to inputs, all inputs conditioned on each other, composite over windows.
+
+    A sweep is its own reference: without a recorded one, every sweep that the logs tell of or that is seen in the
+    inputs is followed along its own frequency, and what follows it serves as the reference (`own_references`). The
+    direct estimate is kept beside it, and where the two differ by more than their errors, a warning says so.
 
     Args:
         flights: conditioned to one rate; each unbroken piece is a record.
@@ -110,6 +115,7 @@ def respond(
         bystanders: commands left out of `inputs` that may have moved along; by default every other command (unit "1")
             in the flights. They only warn.
         lines: frequencies per decade.
+        direct: the direct estimate alone, as one needs it where the sweeps are none of a pilot or program.
 
     Raises:
         FlightError: no channel or no record to work on; messages name them.
@@ -135,11 +141,16 @@ def respond(
     longest = max(piece.duration for piece in pieces)
     kept = [k for k, piece in enumerate(pieces) if piece.duration >= SHORTEST * longest]
     scraps = [piece.name for k, piece in enumerate(pieces) if k not in kept]
+    tracked = None if references or direct else own_references(flights, pieces, inputs)
     pieces, sweep = [pieces[k] for k in kept], [sweep[k] for k in kept]
     n = len(inputs) + len(outputs)
     own = [replace(piece, values=piece.values[:, :n]) for piece in pieces]
-    if references:
-        columns = reference_columns(sweep, pieces, n, len(references), inputs)
+    if references or tracked:
+        columns = (
+            [tracked.columns[k] for k in kept]
+            if tracked
+            else reference_columns(sweep, pieces, n, len(references), inputs)
+        )
         own = [
             replace(piece, values=np.concatenate([piece.values, c], axis=1))
             for piece, c in zip(own, columns, strict=True)
@@ -157,7 +168,7 @@ def respond(
     chosen = choose_windows([piece.duration for piece in pieces], highest)
     if windows is not None:
         chosen = Windows(tuple(sorted((float(w) for w in windows), reverse=True)), ())
-    question = _Question(inputs, outputs, own[0].values.shape[1] - n, lines)
+    question = _Question(inputs, outputs, own[0].values.shape[1] - n, lines, tracked is not None)
     limits = (band[0] if band else None, highest)
     estimate = _estimate(own, chosen.lengths, overlap, limits, question)
     half, words = min(piece.duration for piece in pieces) / 2.0, blur(estimate.blurred, estimate.made)
@@ -184,18 +195,25 @@ def respond(
         for name in response_warnings.still(flights, references)
     ]
     told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
-    if not references and not told and not any(map(sweeps, flights)):
+    if not question.references and not told and not any(map(sweeps, flights)):
         problems += answer_words(pieces, inputs, outputs)
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
-        direct = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
-        warnings += response_warnings.bias_words(blurred, direct)
+        beside = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))
+        biased = response_warnings.biased_by_feedback(blurred, beside)
+        warnings += response_warnings.bias_words(blurred, beside, biased)
+        made = replace(made, direct=beside.response, direct_error=beside.error)
+        if tracked:
+            made, words_of_unswept = response_warnings.without_unswept(made, tracked.swept, biased)
+            warnings += words_of_unswept
     # The window that was added counts only where its own error says so.
     warnings += response_warnings.few_averages(matrices[len(blur_words) if windows is None else 0 :])
     warnings += blur_words
     warnings += response_warnings.mixing_words(made)
     warnings += response_warnings.lead_words(made)
-    problems += response_warnings.correlated(made, dead=response_warnings.still(flights, (*inputs, *outputs)))
+    unmoved = response_warnings.still(flights, (*inputs, *outputs))
+    problems += response_warnings.correlated(made, dead=unmoved)
+    warnings += response_warnings.untold(made, dead=unmoved)
     problems += response_warnings.incoherent(made)
     if not references:
         axes = len({int(k) for labels in sweep for k in np.unique(labels) if k >= 0})
@@ -215,6 +233,7 @@ def respond(
             "band_hz": [float(omega[0] / TWO_PI), float(highest)],
             "overlap": overlap,
             "references": list(references),
+            **({"sweeps": list(tracked.sweeps)} if tracked else {}),
             "averages": [m.averages for m in matrices],
             **({"channels": called} if (called := renamed_channels(flights, (*inputs, *outputs))) else {}),
             **autopilot_gains(flights),
@@ -224,12 +243,16 @@ def respond(
     )
 
 
+_METHODS = ("direct", "joint")
+
+
 @dataclass(frozen=True)
 class _Question:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     references: int
     lines: int
+    tracked: bool = False
 
 
 class _Estimate(NamedTuple):
@@ -261,7 +284,7 @@ def _estimate(
     omega = TWO_PI * np.geomspace(lowest, highest, max(8, round(question.lines * np.log10(highest / lowest))))
     matrices, notes = _matrices(pieces, omega, lengths, overlap)
     shares: list[Array | None] = [None] * len(matrices)
-    if not question.references:
+    if not question.references or question.tracked:
         shares = own_shares(pieces, matrices, omega, inputs=len(question.inputs), overlap=overlap)
     blurred = _composed(matrices, omega, question, shares)
     guess = first_guess(blurred)
@@ -308,13 +331,16 @@ def _composed(
     n_in, n = len(question.inputs), len(question.inputs) + len(question.outputs)
     parts = []
     for matrix, left, share in zip(matrices, matrices if rest is None else rest, shares, strict=True):
-        values = left.values
-        if question.references:
-            values = project_on_references(values, n_in, question.references)
         whole = None if rest is None else np.diagonal(matrix.values, axis1=1, axis2=2).real[:, n_in:n]
         parts.append(
             condition_spectra(
-                values[:, :n, :n], n_in, averages=matrix.averages, removed=guess, whole=whole, share=share
+                left.values[:, : n + question.references, : n + question.references],
+                n_in,
+                averages=matrix.averages,
+                removed=guess,
+                whole=whole,
+                share=share,
+                references=question.references,
             )
         )
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
@@ -335,7 +361,7 @@ def _composed(
         input_power=auto[:, :n_in],
         output_power=auto[:, n_in:n],
         input_coherence=between.real,
-        method="joint" if question.references else "direct",
+        method="along sweeps" if question.tracked and question.references else _METHODS[bool(question.references)],
         windows=tuple(m.window for m in matrices),
     )
 

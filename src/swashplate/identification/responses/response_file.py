@@ -57,6 +57,10 @@ def save(fields: Mapping[str, Any], path: Path) -> Path:
         "response_imag": (_PAIR, fields["response"].imag, {"long_name": "imaginary part of the response"}),
     }
     variables |= {name: (dims, fields[name]) for name, dims in _ARRAYS.items()}
+    if fields["direct"] is not None:
+        direct = {"direct_real": fields["direct"].real, "direct_imag": fields["direct"].imag}
+        variables |= {name: (_PAIR, values) for name, values in direct.items()}
+        variables["direct_error"] = (_PAIR, fields["direct_error"])
     coordinates = {
         "frequency": ("frequency", fields["omega"], {"units": "rad/s"}),
         "output": list(fields["outputs"]),
@@ -88,6 +92,10 @@ def load(path: Path) -> dict[str, Any]:
         words = documents.parse_logged(data.attrs["words"], _Words, where=path, at="words", error=FlightError)
         arrays: dict[str, Any] = {name: np.asarray(data[name].values, dtype=np.float64) for name in _ARRAYS}
         response = data["response_real"].values + 1j * data["response_imag"].values
+        beside: dict[str, Any] = {}
+        if "direct_real" in data:
+            beside["direct"] = data["direct_real"].values + 1j * data["direct_imag"].values
+            beside["direct_error"] = np.asarray(data["direct_error"].values, dtype=np.float64)
         inputs, outputs = (tuple(map(str, data[name].values)) for name in ("input", "output"))
         omega = np.asarray(data["frequency"].values, dtype=np.float64)
     except FlightError:
@@ -101,11 +109,11 @@ def load(path: Path) -> dict[str, Any]:
     if schema > SCHEMA:
         raise FlightError(f"has schema {schema}; this swashplate knows up to {SCHEMA}.", where=path, hint="Update it.")
     sizes = {"frequency": omega.size, "output": len(outputs), "input": len(inputs), "input_2": len(inputs)}
-    for name, values in {"response_real": response, **arrays}.items():
+    for name, values in {"response_real": response, **arrays, **beside}.items():
         expected = tuple(sizes[dimension] for dimension in _ARRAYS.get(name, _PAIR))
         if values.shape != expected:
             raise FlightError(f"has shape {values.shape}, expected {expected}.", where=path, channel=name)
     if not np.all(np.isfinite(omega)) or not np.all(np.diff(omega, prepend=0.0) > 0.0):
         raise FlightError("does not rise from above zero.", where=path, channel="frequency")
     channels = {"omega": omega, "inputs": inputs, "outputs": outputs}
-    return {**channels, "response": response, **arrays, **msgspec.structs.asdict(words)}
+    return {**channels, "response": response, **arrays, **beside, **msgspec.structs.asdict(words)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,8 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
             continue
         mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
         mean[i] = -1.0
+        if found.method != "direct" and mean.max() < MIXED:
+            continue  # it is not that inputs move together: references tell too little (`untold`)
         pair = tuple(sorted((name, found.inputs[int(np.argmax(mean))])))
         together.setdefault(pair, []).append(_hertz(found.omega, lost))
     return [
@@ -79,6 +82,22 @@ def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         "best in a sweep of each."
         for (one, other), bands in together.items()
     ]
+
+
+def untold(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
+    """Inputs of which references tell too little somewhere inside the band that they tell."""
+    words = []
+    for i, name in enumerate(found.inputs):
+        known = np.isfinite(found.response[:, :, i]).any(axis=1)
+        lost = ~known & np.isfinite(found.input_power[:, i])
+        if found.method == "direct" or name in dead or not lost.any():
+            continue
+        teller = "the references tell" if found.method == "joint" else "its sweep tells"
+        words.append(
+            f"{teller} too little of '{name}' at {_bands(found.omega, lost)}, where a loop's answer to gusts rules it: "
+            "no number is given there. Sweep slower or larger."
+        )
+    return words
 
 
 def incoherent(found: FrequencyResponse) -> list[str]:
@@ -127,24 +146,66 @@ def mixing_words(found: FrequencyResponse) -> list[str]:
     return words
 
 
-def bias_words(joint: FrequencyResponse, direct: FrequencyResponse) -> list[str]:
-    """Where the loop makes the direct estimate another one than the joint."""
+def biased_by_feedback(free: FrequencyResponse, direct: FrequencyResponse) -> NDArray[np.bool_]:
+    """Where the loop makes the direct estimate another one than one that no loop biases, shape of the responses.
+
+    Beyond three times the errors of both and 1 dB, and at three lines in a row or more.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.abs(np.log(direct.response / free.response))
+        bound = np.maximum(3.0 * np.hypot(free.error, direct.error), np.log(10.0) / 20.0)
+        off = apart > bound
+    inner = np.zeros_like(off)
+    inner[1:-1] = off[1:-1] & off[:-2] & off[2:]
+    wide = inner.copy()
+    wide[1:] |= inner[:-1]
+    wide[:-1] |= inner[1:]
+    return np.asarray(wide)
+
+
+def bias_words(free: FrequencyResponse, direct: FrequencyResponse, biased: NDArray[np.bool_]) -> list[str]:
+    """For every response, the bands in which the loop makes the direct estimate another one."""
     words = []
-    for o, output in enumerate(joint.outputs):
-        for i, name in enumerate(joint.inputs):
-            h, d = joint.response[:, o, i], direct.response[:, o, i]
-            sure = joint.error[:, o, i] < SURE
-            with np.errstate(divide="ignore", invalid="ignore"):
-                apart = np.abs(np.log(d / h))
-            bound = np.maximum(3.0 * np.hypot(joint.error[:, o, i], direct.error[:, o, i]), np.log(10.0) / 20.0)
-            biased = sure & (apart > bound)
-            if biased.sum() > 0.1 * max(sure.sum(), 1):
+    given = {"joint": "the joint estimate"}.get(free.method, "the estimate along the sweep")
+    for o, output in enumerate(free.outputs):
+        for i, name in enumerate(free.inputs):
+            off = biased[:, o, i]
+            if off.any():
+                apart = np.abs(np.log(direct.response[off, o, i] / free.response[off, o, i]))
                 words.append(
                     f"{output} / {name}: feedback biases the direct estimate by up to "
-                    f"{20 * np.log10(np.e) * np.nanmax(apart[biased]):.1f} dB at {_hertz(joint.omega, biased)}; "
-                    "the joint estimate is given."
+                    f"{20 * np.log10(np.e) * np.nanmax(apart):.1f} dB at {_bands(free.omega, off)}; {given} is given."
                 )
     return words
+
+
+def _bands(omega: Array, where: NDArray[np.bool_]) -> str:
+    """Runs of lines, those less than a third of an octave apart taken together."""
+    hertz = omega[where] / TWO_PI
+    breaks = np.flatnonzero(hertz[1:] > hertz[:-1] * 2.0 ** (1.0 / 3.0))
+    first, last = hertz[[0, *(breaks + 1)]], hertz[[*breaks, -1]]
+    return " and ".join(f"{low:.3g}-{high:.3g} Hz" for low, high in zip(first, last, strict=True))
+
+
+def without_unswept(
+    found: FrequencyResponse, swept: Sequence[bool], biased: NDArray[np.bool_]
+) -> tuple[FrequencyResponse, list[str]]:
+    """The responses less those that feedback spoils: of inputs without a sweep, up to where it biases the others'."""
+    unswept = [i for i, known in enumerate(swept) if not known]
+    names = ", ".join(f"'{found.inputs[i]}'" for i in unswept)
+    lines = np.flatnonzero(biased.any(axis=(1, 2)))
+    if not unswept:
+        return found, []
+    if not lines.size:
+        return found, [f"no sweep of {names} was found: these responses are direct, and a loop may bias them."]
+    response = found.response.copy()
+    response[: lines[-1] + 1][:, :, unswept] = np.nan
+    low, high = found.omega[lines[[0, -1]]] / TWO_PI
+    return replace(found, response=response), [
+        f"no sweep of {names} was found, and at {low:.3g}-{high:.3g} Hz feedback biases the direct estimates of the "
+        "other inputs: no number is given for it up to there. Name its excitation with --references; --direct gives "
+        "the direct estimate."
+    ]
 
 
 def unused_references(

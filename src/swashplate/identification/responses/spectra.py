@@ -27,11 +27,13 @@ class Signals:
         name: source and interval.
         dt: sample time [s].
         values: channels side by side, without their straight line, shape (n, n_channels).
+        start: of the piece on its flight's clock [s].
     """
 
     name: str
     dt: float
     values: Array
+    start: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -50,7 +52,7 @@ def signals(flights: Sequence[Flight], names: Sequence[str]) -> list[Signals]:
             time, table = uniform_table(piece, names, who="the frequency response")
             dt = float((time[-1] - time[0]) / (time.size - 1))
             name = f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s"
-            found.append(Signals(name, dt, np.asarray(detrend(table, axis=0))))
+            found.append(Signals(name, dt, np.asarray(detrend(table, axis=0)), float(time[0])))
     if not found:
         raise FlightError("there is no flight to work on.")
     rates = sorted({round(1.0 / piece.dt, 3) for piece in found})

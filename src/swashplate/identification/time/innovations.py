@@ -18,14 +18,8 @@ import jax
 import jax.numpy as jnp
 
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import (
-    N_DISTURBANCES,
-    FilterGain,
-    FilterState,
-    Nuisance,
-    StochasticModel,
-    commands,
-)
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel, commands
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.time.start_states import start_state, steady_flight
 from swashplate.simulation.compilation import QUICK_TO_COMPILE

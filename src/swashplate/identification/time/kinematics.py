@@ -7,7 +7,7 @@ from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
 
 PREDICTED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")

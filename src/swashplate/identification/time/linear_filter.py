@@ -19,8 +19,8 @@ from swashplate.filtering.riccati import kalman_gain
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.time_likelihood import gust_entries
 from swashplate.identification.time.linear_likelihood import OutputErrors
-from swashplate.simulation.discretisation import gathered_noise
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.gathered_noise import gathered_noise
 
 
 class FilterErrors(OutputErrors):

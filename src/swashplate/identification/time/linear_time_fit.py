@@ -12,8 +12,9 @@ The covariance of the errors alternates with Fisher scoring; derivatives by comp
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import sources_of
-from swashplate.identification.core.time_fit import TimeDetails, check_method, result_of, solve
+from swashplate.identification.core.sources import DataSource, sources_of
+from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.linear_filter import FilterErrors
@@ -68,17 +69,38 @@ def fit_in_time(
     names = tuple(outputs or model.outputs)
     check_method(method)
     refuse_lowpassed(flights)
+    pieces, delays = linear_records(model, flights, names, biases=biases)
+    kind = FilterErrors if method == "filter-error" else OutputErrors
+    likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
+    return linear_result(
+        model,
+        solve(likelihood, iterations=iterations, progress=progress),
+        method=method,
+        data=sources_of(flights),
+        settings={"outputs": list(names), "shifts": shifts, "biases": list(biases)},
+        seconds=time.perf_counter() - began,
+    )
+
+
+def linear_records(
+    model: StateSpaceModel, flights: Sequence[Flight], outputs: Sequence[str], *, biases: Sequence[str]
+) -> tuple[list[Record], tuple[Expression | None, ...]]:
+    """The unbroken pieces of flights with a model's inputs and outputs, and the delays of the inputs.
+
+    Raises:
+        IdentificationError: no free parameter, names that are no outputs, delays that differ between outputs.
+    """
     if not model.free:
         raise IdentificationError("has no free parameter.", channel=model.name)
-    unknown = [o for o in (*names, *biases) if o not in model.outputs]
+    unknown = [o for o in (*outputs, *biases) if o not in model.outputs]
     if unknown:
         raise IdentificationError(f"is no output of '{model.name}'.", channel=", ".join(unknown))
-    delays = tuple(_delay_of(model, names, i) for i in model.inputs)
+    delays = tuple(_delay_of(model, outputs, i) for i in model.inputs)
     pieces = []
     for flight in flights:
         source = flight.provenance.source or "flight"
         for piece in flight.split():
-            stamps, table = uniform_table(piece, (*model.inputs, *names), who=f"'{model.name}'")
+            stamps, table = uniform_table(piece, (*model.inputs, *outputs), who=f"'{model.name}'")
             pieces.append(
                 Record(
                     name=f"{source} {stamps[0]:.2f}-{stamps[-1]:.2f} s",
@@ -86,28 +108,34 @@ def fit_in_time(
                     inputs=table[:, : len(model.inputs)],
                     outputs=table[:, len(model.inputs) :],
                     voltage=np.full(stamps.size, np.nan),
-                    output_names=names,
+                    output_names=tuple(outputs),
                     voltage_known=False,
                     log=source,
                 )
             )
-    kind = FilterErrors if method == "filter-error" else OutputErrors
-    likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
+    return pieces, delays
+
+
+def linear_result(
+    model: StateSpaceModel,
+    solved: Solved,
+    *,
+    method: str,
+    data: Sequence[DataSource],
+    settings: Mapping[str, Any],
+    seconds: float,
+) -> Result[StateSpaceModel, TimeDetails]:
+    """A solved likelihood of a model's records as a result; arguments as `vehicle_result` has them."""
     return result_of(
-        solve(likelihood, iterations=iterations, progress=progress),
+        solved,
         model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}),
         start=model,
         units=[model.parameters[n].unit for n in model.free],
         ties=[],
         method=method,
-        data=sources_of(flights),
-        settings={
-            "outputs": list(names),
-            "shifts": shifts,
-            "biases": list(biases),
-            "records": [piece.name for piece in pieces],
-        },
-        seconds=time.perf_counter() - began,
+        data=data,
+        settings={**settings, "records": [piece.name for piece in solved.likelihood.records]},
+        seconds=seconds,
     )
 
 

@@ -18,14 +18,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.filtering.disturbed_model import (
-    N_DISTURBANCES,
-    Nuisance,
-    StochasticModel,
-    commands,
-    mean_nuisance,
-    stochastic_model,
-)
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, commands, stochastic_model
+from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row

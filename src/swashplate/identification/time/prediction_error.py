@@ -16,7 +16,8 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, Nuisance, StochasticModel, mean_nuisance, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row

@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
 from swashplate.models.nesting import leaves
 from swashplate.models.vehicle import Vehicle

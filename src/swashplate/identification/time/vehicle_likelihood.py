@@ -30,7 +30,6 @@ from swashplate.models.nesting import leaves
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.simulation.discretisation import gathered_noise
 from swashplate.simulation.dynamics import (
     CONSTANTS,
     SURROUNDINGS,
@@ -39,6 +38,7 @@ from swashplate.simulation.dynamics import (
     row_force,
     row_rates,
 )
+from swashplate.simulation.gathered_noise import gathered_noise
 from swashplate.simulation.runge_kutta import rk4_step
 
 FORCES = ("ax", "ay", "az")
@@ -48,6 +48,22 @@ FORCES = ("ax", "ay", "az")
 def measurable(vehicle: Vehicle) -> tuple[str, ...]:
     """Names of the channels that a vehicle's equations foretell: its states, their rates and the specific force."""
     return (*vehicle.state_names, *(f"{name}dot" for name in vehicle.state_names), *FORCES)
+
+
+def check_foretold(vehicle: Vehicle, outputs: Sequence[str]) -> None:
+    """That a vehicle's equations foretell some channels.
+
+    Raises:
+        IdentificationError: naming those that they do not, and those that they do.
+    """
+    known = measurable(vehicle)
+    strange = [name for name in outputs if name not in known]
+    if strange:
+        raise IdentificationError(
+            f"'{vehicle.name}' does not foretell it.",
+            channel=", ".join(strange),
+            hint=f"Its outputs may be {', '.join(known)}.",
+        )
 
 
 class VehicleErrors(TimeErrors):
@@ -76,14 +92,7 @@ class VehicleErrors(TimeErrors):
         biases: Sequence[str],
     ) -> None:
         vehicle, outputs = table.vehicle, records[0].output_names
-        known = measurable(vehicle)
-        strange = [name for name in outputs if name not in known]
-        if strange:
-            raise IdentificationError(
-                f"'{vehicle.name}' does not foretell it.",
-                channel=", ".join(strange),
-                hint=f"Its outputs may be {', '.join(known)}.",
-            )
+        check_foretold(vehicle, outputs)
         self.table, self.method = table, method
         super().__init__(
             parameter_entries(table),
@@ -165,11 +174,15 @@ class _Plan:
     gain: tuple[int, ...]
 
 
+def driving_rows(record: Record, environment: Environment) -> Array:
+    """Inputs, wind and voltage of a record at every sample, (n, n_driving)."""
+    wind = [np.full(record.time.size, float(getattr(environment, name))) for name in SURROUNDINGS[:-1]]
+    return np.column_stack([record.inputs, *wind, record.voltage])
+
+
 def _data(record: Record, environment: Environment) -> dict[str, Any]:
     """What a record gives: the driving row at every sample, and what was measured."""
-    wind = [np.full(record.time.size, float(getattr(environment, name))) for name in SURROUNDINGS[:-1]]
-    driving = np.column_stack([record.inputs, *wind, record.voltage])
-    return {"driving": jnp.asarray(driving), "outputs": jnp.asarray(record.outputs)}
+    return {"driving": jnp.asarray(driving_rows(record, environment)), "outputs": jnp.asarray(record.outputs)}
 
 
 def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:

@@ -10,15 +10,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.low_passed import refuse_lowpassed
-from swashplate.identification.core.parameters import Free, parameterize
+from swashplate.identification.core.parameters import Free, Parameterization, parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.core.sources import sources_of
-from swashplate.identification.core.time_fit import TimeDetails, check_method, result_of, solve
+from swashplate.identification.core.sources import DataSource, sources_of
+from swashplate.identification.core.time_fit import Solved, TimeDetails, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
@@ -76,9 +77,7 @@ def fit_vehicle(
     outputs = tuple(outputs)
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     refuse_lowpassed(flights)
-    unknown = [name for name in biases if name not in outputs]
-    if unknown:
-        raise IdentificationError(f"is none of the outputs {', '.join(outputs)}.", channel=", ".join(unknown))
+    check_biases(biases, outputs)
     table = parameterize(vehicle, free, ties=ties, priors=priors)
     pieces = records(flights, vehicle, outputs=outputs)
     likelihood = VehicleErrors(
@@ -90,7 +89,43 @@ def fit_vehicle(
         biases=tuple(biases),
     )
     solved = solve(likelihood, iterations=iterations, progress=progress)
-    sources = tuple(piece.name for piece in pieces)
+    return vehicle_result(
+        vehicle,
+        table,
+        solved,
+        method=method,
+        data=sources_of(flights),
+        settings={"outputs": list(outputs), "shifts": shifts, "biases": list(biases)},
+        seconds=time.perf_counter() - began,
+    )
+
+
+def check_biases(biases: Sequence[str], outputs: Sequence[str]) -> None:
+    """That only outputs have biases."""
+    unknown = [name for name in biases if name not in outputs]
+    if unknown:
+        raise IdentificationError(f"is none of the outputs {', '.join(outputs)}.", channel=", ".join(unknown))
+
+
+def vehicle_result(
+    vehicle: Vehicle,
+    table: Parameterization,
+    solved: Solved,
+    *,
+    method: str,
+    data: Sequence[DataSource],
+    settings: Mapping[str, Any],
+    seconds: float,
+) -> Result[Vehicle, TimeDetails]:
+    """A solved likelihood of a vehicle's records as a result, its model the vehicle with the numbers found.
+
+    Args:
+        vehicle: before the fit.
+        table: what was free or tied.
+        solved: of `solve`, its first entries the free parameters.
+        method, data, settings, seconds: see `Result`; what was free, tied and flown is added to the settings.
+    """
+    sources = [piece.name for piece in solved.likelihood.records]
     values = table.identified([solved.numbers[n] for n in table.names])
     origin = f"identified by {method} from {', '.join(sources)}"
 
@@ -103,6 +138,7 @@ def fit_vehicle(
         return table.vehicle.with_card(replace(card, title=title, path=""))
 
     card = vehicle.card.parameters
+    asked = {"free": list(table.names), "ties": [f"{name} = {tie.text}" for name, tie in table.ties]}
     return result_of(
         solved,
         model=identified,
@@ -110,17 +146,26 @@ def fit_vehicle(
         units=[card[name].unit for name in table.names],
         ties=[Estimate(n, card[n].unit, card[n].value, values[n], tie=tie.text) for n, tie in table.ties],
         method=method,
-        data=sources_of(flights),
-        settings={
-            "free": list(table.names),
-            "ties": [f"{name} = {tie.text}" for name, tie in table.ties],
-            "outputs": list(outputs),
-            "shifts": shifts,
-            "biases": list(biases),
-            "records": list(sources),
-        },
-        seconds=time.perf_counter() - began,
+        data=data,
+        settings={**asked, **settings, "records": sources},
+        seconds=seconds,
     )
+
+
+def outputs_of(model: Vehicle, flights: Sequence[Flight], question: Question) -> tuple[str, ...]:
+    """The channels that were asked for; where none were, all that the flights have and the equations foretell.
+
+    Raises:
+        IdentificationError: where there are none.
+    """
+    shared = [n for n in measurable(model) if all(n in flight for flight in flights)]
+    outputs = shared if question.outputs is None else question.outputs
+    if not outputs:
+        raise IdentificationError(
+            f"the flights have nothing that '{model.name}' foretells: {', '.join(measurable(model))}.",
+            channel="outputs",
+        )
+    return tuple(outputs)
 
 
 @dataclass(frozen=True)
@@ -144,13 +189,7 @@ class VehicleEstimator:
                 channel="free",
                 hint=f"Name parameters, e.g. free=['{next(iter(model.card.parameters))}'].",
             )
-        shared = [n for n in measurable(model) if all(n in flight for flight in data)]
-        outputs = shared if question.outputs is None else question.outputs
-        if not outputs:
-            raise IdentificationError(
-                f"the flights have nothing that '{model.name}' foretells: {', '.join(measurable(model))}.",
-                channel="outputs",
-            )
+        outputs = outputs_of(model, data, question)
         return fit_vehicle(
             model,
             data,

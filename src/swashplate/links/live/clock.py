@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from swashplate.links.live.priority import come_first
+from swashplate.links.web.priority import come_first
 
 _GIVEN_UP = 0.25
 """Seconds behind after which lost time is not made up for."""

@@ -23,8 +23,9 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
-from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
+from swashplate.validation.calibration import calibrate
 from swashplate.validation.prediction import predict
+from swashplate.validation.spans import CALIBRATION, SHORTEST_CALIBRATION
 from swashplate.validation.validate import observer_of
 
 RATE = 50.0

@@ -18,6 +18,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
+from swashplate.models.linear import python_control
 from swashplate.models.linear.expressions import Expression
 
 MATRICES = ("M", "F", "G", "H0", "H1", "D")
@@ -213,12 +214,25 @@ class StateSpaceModel:
         lag = np.array([[self.delay(o, i) for i in self.inputs] for o in self.outputs])
         return np.asarray(h * np.exp(-s * lag), dtype=np.complex128)
 
-    def to_control(self) -> Any:
-        """As `control.StateSpace` with named signals, without the delays."""
-        import control
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """As `control.StateSpace` with named signals.
 
-        return control.ss(
-            *self.explicit(), states=list(self.states), inputs=list(self.inputs), outputs=list(self.outputs)
+        Args:
+            pade: order of the polynomials that stand for the delays; 0 leaves the delays out, None does so with a
+                warning where there are any.
+
+        Raises:
+            SwashError: an order outside 0 to 12.
+        """
+        numbers = self.numbers()
+        return python_control.state_space(
+            self.explicit(),
+            states=self.states,
+            inputs=self.inputs,
+            outputs=self.outputs,
+            delays={name: float(expression(numbers)) for name, expression in self.delays.items()},
+            pade=pade,
+            name=self.name,
         )
 
     # ---- sensitivities -----------------------------------------------------------------------------------------

@@ -53,6 +53,7 @@ from swashplate.models.linear import state_space_checks as checks
 from swashplate.models.linear.accelerometer import AXES, TRIM, specific_force
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import Element, ModelParameter, StateSpaceModel
+from swashplate.registry import nearest
 
 SCHEMA = 1
 _SECTIONS = {
@@ -111,7 +112,7 @@ def structure(name_or_file: str | Path) -> StateSpaceModel:
         raise CardError(
             f"is neither a ready structure nor a file that can be read: {error.problem}",
             where=text,
-            hint=f"Ready structures are {', '.join(structure_names())}.",
+            hint=f"{nearest(text, structure_names())} Ready structures are {', '.join(structure_names())}.".strip(),
         ) from None
     return parse(content, path=text)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.models.linear import python_control
 
 
 @dataclass(frozen=True)
@@ -169,11 +170,18 @@ class TransferFunction:
         top = self.values["K"] * np.real(np.atleast_1d(np.poly(self.zeros)))
         return np.asarray(top), np.real(np.atleast_1d(np.poly(self.poles)))
 
-    def to_control(self) -> Any:
-        """As `control.TransferFunction`, without the delay (python-control has none: see `values["tau"]`)."""
-        import control
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """As `control.TransferFunction`.
 
-        return control.tf(*(list(row) for row in self.coefficients))
+        Args:
+            pade: order of the polynomials that stand for the delay `values["tau"]`; 0 leaves it out, None does so with
+                a warning where there is one.
+
+        Raises:
+            SwashError: an order outside 0 to 12.
+        """
+        name = f"{self.output}/{self.input}"
+        return python_control.transfer_function(*self.coefficients, delay=self.values["tau"], pade=pade, name=name)
 
     def __repr__(self) -> str:
         def side(names: Sequence[str]) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import swashplate as sp
 from swashplate.control.analysis.straightness import step_paths
 from swashplate.control.laws.autopilot import autopilot
-from swashplate.control.laws.learning import corrected_by_step, drift_sources
+from swashplate.control.laws.learning import corrected_by_step, drift_sources, straightened
+from swashplate.errors import ControllerError
 
 
 def test_one_step_teaches_the_law_the_aircraft() -> None:
@@ -25,6 +28,27 @@ def test_one_step_teaches_the_law_the_aircraft() -> None:
         taught = corrected_by_step(coax, law, hover, command=0.2, drift=float(drift))
         again = step_paths(coax, taught, hover, command=0.2, parameters=own).drift[0]
         assert abs(again) < 0.25 * abs(drift)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.06])
+def test_the_lag_is_chosen_by_flying_the_model_with_its_delays(late: float) -> None:
+    card = sp.vehicle("coax").card
+    known = {"nuisance": {"delay_servo": 0.5 * late, "delay_motor": late}}
+    coax = replace(sp.vehicle("coax"), card=replace(card, observer={**card.observer, **known}))
+    hover = sp.trim(coax)
+    papers = autopilot(coax, hover, mode="manual")
+    straight = straightened(coax, papers, hover, command=0.2)
+    drift = {law: float(step_paths(coax, law, hover, command=0.2).drift[0]) for law in (papers, straight)}
+    assert abs(drift[papers]) > 0.4  # the rotor's own lag leaves the bar's misalignment
+    assert abs(drift[straight]) < 0.02
+
+
+def test_a_path_that_no_lag_makes_straight_is_refused() -> None:
+    coax = sp.vehicle("coax")
+    law = autopilot(coax, sp.trim(coax), mode="manual")
+    bent = coax.with_values({"a_alpha_u_linear": 0.12}, status="identified", source="a test")
+    with pytest.raises(ControllerError, match=r"no constant lag makes a step of 0\.2 end straight ahead"):
+        straightened(bent, law, sp.trim(bent), command=0.2)
 
 
 def test_sources_add_up_and_tied_numbers_count_once() -> None:

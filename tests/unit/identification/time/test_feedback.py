@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, chirp, lfilter
 
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import POSE, Record, records
 from swashplate.identification.time.feedback import EXPLAINED, excitation

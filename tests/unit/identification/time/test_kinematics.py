@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.start_states import mean_velocity, slopes, start_state, steady_flight

@@ -29,10 +29,12 @@ import uvicorn
 import websockets
 from websockets.sync.client import connect
 
-from swashplate.links.live import connections, identifying, server
+from swashplate.links.live import identifying, server
 from swashplate.links.live.identifying import busiest, commands
 from swashplate.links.live.messages import LONGEST, SCHEMA, MessageError, parse
 from swashplate.links.live.session import LiveSession
+from swashplate.links.web import connections, libraries, serving
+from swashplate.links.web.guard import Guard
 
 VALID: list[dict[str, Any]] = [
     {"type": "stick", "roll": 0, "pitch": 0.5, "yaw": -1, "heave": 1.0, "number": 3},
@@ -116,10 +118,10 @@ class Running:
     def __init__(self, folder: Path) -> None:
         self.session = LiveSession(sp.vehicle("coax"), controller=None, folder=folder)
         self.session.clock.start()
-        self.listening = server.listen("127.0.0.1", 0, allow_remote=False)
-        self.url = server.address_of(self.listening)
+        self.listening = serving.listen("127.0.0.1", 0, allow_remote=False)
+        self.url = serving.address_of(self.listening)
         self.host = self.url.removeprefix("http://").rstrip("/")
-        self.server = uvicorn.Server(server.configured(server.live_app(self.session)))
+        self.server = uvicorn.Server(serving.configured(server.live_app(self.session), frame=server.FRAME))
         self.thread = threading.Thread(target=lambda: asyncio.run(self.server.serve(sockets=[self.listening])))
         self.thread.start()
 
@@ -326,6 +328,8 @@ def test_other_pages_and_other_names_are_refused(running: Running) -> None:
     for host in ("evil.example", f"evil.example:{port}", "", "127.0.0.1.evil.example", "[::1", "10.0.0.7"):
         assert httpx.get(running.url, headers={"host": host}).status_code in (400, 403)
     assert httpx.get(running.url, headers={"origin": "http://evil.example"}).status_code == 403
+    assert httpx.post(running.url).status_code == 403, "what changes something names its page"
+    assert httpx.post(running.url, headers={"origin": running.url.rstrip("/")}).status_code == 405
     for origin in ("http://evil.example", "null", f"http://127.0.0.1:{int(port) + 1}", "file://"):
         with pytest.raises(websockets.InvalidStatus), running.socket(origin):
             pass
@@ -337,7 +341,7 @@ def test_only_reports_and_the_page_are_served(running: Running) -> None:
 
 
 def test_a_name_of_this_machine_serves_others_only_when_asked_to() -> None:
-    guard, open_guard = (server.Guard(None, remote=remote) for remote in (False, True))  # type: ignore[arg-type]
+    guard, open_guard = (Guard(None, remote=remote) for remote in (False, True))  # type: ignore[arg-type]
     assert not guard._ours("192.168.1.5:8017")
     assert open_guard._ours("192.168.1.5:8017")
     assert open_guard._ours(f"{socket.gethostname().lower()}:8017")
@@ -346,19 +350,19 @@ def test_a_name_of_this_machine_serves_others_only_when_asked_to() -> None:
 
 def test_listening_beyond_this_machine_must_be_meant() -> None:
     with pytest.raises(SwashError, match=r"can be reached from other machines.*--allow-remote"):
-        server.listen("0.0.0.0", 0, allow_remote=False)
-    made = server.listen("0.0.0.0", 0, allow_remote=True)
-    assert server.address_of(made).startswith("http://127.0.0.1:")
+        serving.listen("0.0.0.0", 0, allow_remote=False)
+    made = serving.listen("0.0.0.0", 0, allow_remote=True)
+    assert serving.address_of(made).startswith("http://127.0.0.1:")
     made.close()
 
 
 def test_a_port_in_use_and_an_unknown_host_are_told() -> None:
-    taken = server.listen("127.0.0.1", 0, allow_remote=False)
+    taken = serving.listen("127.0.0.1", 0, allow_remote=False)
     with pytest.raises(SwashError, match="--port 0 takes any free port"):
-        server.listen("127.0.0.1", taken.getsockname()[1], allow_remote=False)
+        serving.listen("127.0.0.1", taken.getsockname()[1], allow_remote=False)
     taken.close()
     with pytest.raises(SwashError, match="no address of this machine"):
-        server.listen("no such host", 0, allow_remote=False)
+        serving.listen("no such host", 0, allow_remote=False)
 
 
 @pytest.mark.parametrize(
@@ -433,22 +437,22 @@ def test_a_frame_that_is_no_text_is_one_line_in_the_log(running: Running, caplog
 
 
 def test_a_library_that_was_changed_is_not_served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if not (server.PAGE / "vendor" / "three.module.min.js").is_file():
+    if not (libraries.PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py")
-    server.check_page()
-    shutil.copytree(server.PAGE, tmp_path / "page")
-    monkeypatch.setattr(server, "PAGE", tmp_path / "page")
-    server.check_page()
-    for name in server.LIBRARIES:
+    libraries.check_page()
+    shutil.copytree(libraries.PAGE, tmp_path / "page")
+    monkeypatch.setattr(libraries, "PAGE", tmp_path / "page")
+    libraries.check_page()
+    for name in libraries.LIBRARIES:
         file = tmp_path / "page" / "vendor" / name
         content = file.read_bytes()
         file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
         with pytest.raises(SwashError, match=f"{name}: not the library that was pinned"):
-            server.check_page()
+            libraries.check_page()
         file.write_bytes(content)
 
 
 def test_a_checkout_without_the_libraries_says_what_to_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "PAGE", tmp_path)
+    monkeypatch.setattr(libraries, "PAGE", tmp_path)
     with pytest.raises(SwashError, match=r"python scripts/vendor_page\.py"):
-        server.check_page()
+        libraries.check_page()

@@ -21,9 +21,9 @@ from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
-from swashplate.links.live.priority import come_first
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
+from swashplate.links.web.priority import come_first
 from swashplate.models.card import packaged_cards
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
 

@@ -11,7 +11,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import FlightError, SwashError
-from swashplate.filtering.disturbed_model import Nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.links.live import film
 from swashplate.links.live.replay import Replay, as_json, floor, gaps, replay

@@ -45,7 +45,7 @@ def test_a_flight_is_drawn_in_the_units_of_pilots(flight: Flight) -> None:
     assert _labels(figure) == ["phi [deg]", "p [deg/s]"]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata().max(), np.degrees(0.1), rtol=1e-3)
     assert figure.axes[-1].get_xlabel() == "time [s]"
-    assert _labels(flight.plot(channels=["knob", "p"])) == ["knob", "p [deg/s]"]
+    assert _labels(flight.plot(channels=["knob", "p"])) == ["knob [unit unknown]", "p [deg/s]"]
     with pytest.raises(FlightError, match="no such channel"):
         flight.plot(channels=["pp"])
     with pytest.raises(FlightError, match="nothing to draw"):
@@ -66,12 +66,19 @@ def test_a_gap_stays_open_and_a_peak_stays_seen() -> None:
     assert x[opened[0] + 1] >= 30.0
 
 
-def test_responses_are_drawn_with_coherence_and_only_where_it_holds_in_colour(response: FrequencyResponse) -> None:
+def test_responses_are_black_where_they_are_coherent_and_grey_elsewhere(response: FrequencyResponse) -> None:
     figure = response.plot()
-    assert _labels(figure) == ["magnitude [dB]", "phase [deg]", "coherence"]
-    whole, good = (np.asarray(line.get_ydata()) for line in figure.axes[0].lines[:2])
-    assert np.isfinite(whole).all()
-    np.testing.assert_array_equal(np.isfinite(good), response.coherence[:, 0, 0] >= 0.6)
+    assert _labels(figure) == ["magnitude [dB]", "phase [deg]", "coherence [-]"]
+    grey, black = (np.asarray(line.get_ydata()) for line in figure.axes[0].lines[:2])
+    good = response.coherence[:, 0, 0] >= 0.6
+    np.testing.assert_array_equal(np.isfinite(black), good)
+    assert np.isfinite(grey[~good]).all()
+    assert np.sum(np.isfinite(grey) & np.isfinite(black)) == 1, (
+        "the grey line meets the black one and does not double it"
+    )
+    hertz = np.asarray(figure.axes[0].lines[1].get_xdata())
+    in_radians = np.asarray(response.plot(frequency="rad/s").axes[0].lines[1].get_xdata())
+    np.testing.assert_allclose(in_radians, 2.0 * np.pi * hertz, rtol=1e-5)
     with pytest.raises(SwashError, match="is no output"):
         response.plot(pairs=[("q", "servo_roll")])
 
@@ -84,7 +91,8 @@ def curve() -> TrimCurve:
 def test_a_trim_curve_tells_its_numbers_in_every_form(curve: TrimCurve) -> None:
     columns = curve.columns()
     np.testing.assert_allclose(columns["phi [deg]"], [np.degrees(at.states()["phi"]) for at in curve.trims])
-    assert [panel.get_title() for panel in curve.plot().axes if panel.get_visible()] == list(columns)[1:]
+    drawn = [panel.get_title(loc="left") for panel in curve.plot().axes]
+    assert drawn == [head.replace("[1]", "[-]") for head in list(columns)[1:]]
     assert "0.500" in repr(curve)
     assert [at["speed"] for at in curve.as_dict()["trims"]] == [0.0, 0.5]
     assert "theta [deg]" in curve._repr_html_()
@@ -98,11 +106,11 @@ def test_derivatives_are_drawn_in_total_and_by_contributor() -> None:
     none = np.zeros(1)
     trims = tuple(Trim(none, none, ("u",), ("theta0",), Environment(), v, 0.0, 0.0, 0.0) for v in (0.0, 5.0))
     found = Derivatives(sp.vehicle("raptor50"), trims, (table, table), imperial=True)
-    panel = found.plot(row="X").axes[6]
-    assert panel.get_title() == "Xtheta0 [ft/s²/rad]"
-    main, fin, total = (float(np.asarray(line.get_ydata())[0]) for line in panel.lines)
-    assert main + fin == pytest.approx(total)
-    assert total == pytest.approx(3.0 / 0.3048)
+    panel = next(p for p in found.plot(row="X").axes if p.get_title(loc="left").startswith("Xtheta0"))
+    assert panel.get_title(loc="left") == "Xtheta0 [ft/s²/rad]"
+    total, main, fin = (float(np.asarray(line.get_ydata())[0]) for line in panel.lines)
+    assert main + fin == pytest.approx(total, rel=1e-5)
+    assert total == pytest.approx(3.0 / 0.3048, rel=1e-5)
     assert found.as_dict()["tables"][1]["derivatives"]["Xtheta0"]["value"] == pytest.approx(total)
     with pytest.raises(SwashError, match="expected one of X, Y, Z, L, M, N"):
         found.plot(row="Q")

@@ -1,0 +1,139 @@
+"""What Sphinx does with the pages of docs/ besides reading them: navigation, the Python reference, notebooks.
+
+* A page with `<!-- navigation -->` gives its children by its own lists: every item that begins with a link to a page,
+  under its heading of the second level. So the list that a person reads and the navigation are the same.
+* A link to a file of the repository's root leads to its page (`OF_THE_ROOT`).
+* `<!-- include -->` before a link to a file of the repository's root shows that file there, with links that hold.
+* `<!-- python reference -->` becomes every public name with its signature and docstring (`site_reference`).
+* A page of docs/notebooks is offered as a Jupyter notebook too.
+"""
+
+from __future__ import annotations
+
+import json
+import posixpath
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import docs_pages
+import site_reference
+from pygments.lexers.special import TextLexer
+from sphinx.search.en import SearchEnglish
+
+NAVIGATION = "<!-- navigation -->"
+REFERENCE = "<!-- python reference -->"
+NOTEBOOKS = "notebooks/"
+OF_THE_ROOT = {
+    "README.md": "index.md",
+    "ARCHITECTURE.md": "developers/architecture.md",
+    "CONTRIBUTING.md": "developers/contributing.md",
+    "CHANGELOG.md": "developers/changes.md",
+    "SECURITY.md": "developers/security-policy.md",
+}
+"""Where files of the repository's root stand on the site."""
+
+_INCLUDE = re.compile(r"^<!-- include -->\[[^\]]+\]\((?:\.\./)+(\w+\.md)\)$", re.MULTILINE)
+_TO_THE_ROOT = re.compile(r"\]\((?:\.\./)+([A-Z]+\.md)\)")
+_LINK = re.compile(r"\[([^\[\]]*)\]\((?!https?:|#)([^)\s]+)\)")
+_HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
+_ITEM = re.compile(r"^(?:[*-]|\d+\.) +\**\[[^\]]+\]\(([^)#]+)\.md\)", re.MULTILINE)
+
+
+def navigation(text: str) -> str:
+    """Hidden tables of contents, one for every heading of a page that lists pages."""
+    parts = _HEADING.split(text)
+    groups = [("", parts[0]), *zip(parts[1::2], parts[2::2], strict=True)]
+    made = []
+    for title, body in groups:
+        items = _ITEM.findall(body)
+        if items:
+            caption = f":caption: {title}\n" if title else ""
+            made.append("```{toctree}\n:hidden:\n" + caption + "\n" + "\n".join(items) + "\n```")
+    return "\n\n".join(made)
+
+
+def included(name: str, page: str) -> str:
+    """A file of the repository's root as part of a page, with links and pictures relative to that page.
+
+    Args:
+        name: of the file.
+        page: the page's path below docs/.
+    """
+    here = posixpath.dirname(page)
+
+    def relative(match: re.Match[str]) -> str:
+        path, mark, anchor = match[2].partition("#")
+        target = path.removeprefix("docs/") if path.startswith("docs/") else OF_THE_ROOT.get(path)
+        if target is None:
+            return match[1]  # a file that is no page
+        return f"[{match[1]}]({posixpath.relpath(target, here or '.')}{mark}{anchor})"
+
+    return _LINK.sub(relative, (docs_pages.ROOT / name).read_text(encoding="utf-8"))
+
+
+def notebook(text: str) -> dict[str, Any]:
+    """A page as a Jupyter notebook: its prose and its `python` fences; what they printed is left out."""
+    cells, end = [], 0
+
+    def prose(piece: str) -> None:
+        if piece.strip():
+            cells.append({"cell_type": "markdown", "metadata": {}, "source": piece.strip()})
+
+    for fence in docs_pages.fences(text):
+        if fence.language not in ("python", "text"):
+            continue
+        opening = text.rindex("```", 0, fence.start)
+        prose(text[end:opening])
+        end = fence.stop + len("```")
+        if fence.language == "python":
+            source = fence.text.rstrip("\n")
+            cells.append(
+                {"cell_type": "code", "metadata": {}, "source": source, "outputs": [], "execution_count": None}
+            )
+    prose(text[end:])
+    for number, cell in enumerate(cells):
+        cell["id"] = f"cell-{number}"
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+
+
+def _read(app: Any, name: str, source: list[str]) -> None:
+    text = _INCLUDE.sub(lambda match: included(match[1], f"{name}.md"), source[0])
+    here = posixpath.dirname(name) or "."
+    text = _TO_THE_ROOT.sub(lambda match: f"]({posixpath.relpath(OF_THE_ROOT[match[1]], here)})", text)
+    if REFERENCE in text:
+        text = text.replace(REFERENCE, site_reference.reference())
+    if name.startswith(NOTEBOOKS):
+        link = f'<a href="{Path(name).name}.ipynb" download>Download this page as a Jupyter notebook</a>'
+        text += f"\n\n```{{raw}} html\n<p>{link}</p>\n```\n"
+    if NAVIGATION in text:
+        text += "\n\n" + navigation(text) + "\n"
+    source[0] = text
+
+
+def _finish(app: Any, exception: Exception | None) -> None:
+    if exception is not None or app.builder.format != "html":
+        return
+    for page in sorted((Path(app.srcdir) / NOTEBOOKS).glob("*.md")):
+        made = json.dumps(notebook(page.read_text(encoding="utf-8")), indent=1)
+        (Path(app.outdir) / NOTEBOOKS / f"{page.stem}.ipynb").write_text(made + "\n", encoding="utf-8")
+
+
+_stem = lru_cache(maxsize=None)(SearchEnglish({}).stemmer.stemWord)
+
+
+class _Search(SearchEnglish):
+    """Sphinx's English search, which stems each word once and not once a page."""
+
+    def stem(self, word: str) -> str:
+        return _stem(word.lower())
+
+
+def setup(app: Any) -> dict[str, Any]:
+    app.add_search_language(_Search)
+    app.add_lexer("csv", TextLexer)
+    app.connect("source-read", _read)
+    app.connect("build-finished", _finish)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

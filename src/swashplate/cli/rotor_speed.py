@@ -1,0 +1,64 @@
+"""`swash rotor-speed`: rotor speed from the vibration in a log."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import options
+from swashplate.cli.reading import Reading
+from swashplate.errors import SwashError
+
+_LINE = re.compile(r"(?P<name>[a-z]\w*)=(?P<low>[-+]?[\d.]+)\.\.(?P<high>[-+]?[\d.]+)")
+
+
+def rotor_speed(
+    flight: options.FlightName,
+    line: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--line",
+            help="CHANNEL=LOW..HIGH: where a rotor's line lies [Hz]; positive turns clockwise from above, negative "
+            "counter-clockwise. The strongest line, as omega_rotor, if not given.",
+        ),
+    ] = None,
+    per_turn: Annotated[float, typer.Option("--per-turn", help="Vibrations per turn that the line is.")] = 1.0,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the flight with the speeds (netCDF).")] = None,
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Measure rotor speed from the vibration that a rotor leaves in motion capture, gyros or accelerometers."""
+    from swashplate.cli.console import as_json
+    from swashplate.cli.reading import read
+    from swashplate.flights.rotor_speed import rotor_speed as measure
+
+    bands = {}
+    for text in line or ():
+        found = _LINE.fullmatch(text)
+        try:
+            bands[found["name"]] = (float(found["low"]), float(found["high"]))  # type: ignore[index]
+        except (TypeError, ValueError):
+            raise SwashError(
+                f"'{text}' is no line.", channel="--line", hint="For example --line omega_upper=-40..-30."
+            ) from None
+    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    measured = measure(read(flight, how=how), lines=bands or None, per_turn=per_turn)
+    if out is not None:
+        measured.save(out)
+    lines = measured.history[-1].details["lines"]
+    if json:
+        typer.echo(as_json(lines))
+    elif not quiet:
+        for name, told in lines.items():
+            folded = " or ".join(f"{hertz:+.1f}" for hertz in told["folded_from_hertz"])
+            typer.echo(
+                f"{name}: {told['mean']:.1f} ± {told['sigma_of_mean']:.2g} rad/s on average, spread "
+                f"{told['spread']:.2g}; line at {told['hertz']:+.2f} Hz in {', '.join(told['signals'])}, "
+                f"{told['decibel']:.0f} dB over its surroundings. A line at {folded} Hz would look the same."
+            )

@@ -1,0 +1,41 @@
+"""One grammar for all verbs: the vehicle is an argument or `--vehicle`, the output is `--out` or `-o`, everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+_VEHICLE, _OUT = "--vehicle", "--out"
+
+
+def spelled(command: Any, given: Sequence[str]) -> list[str]:
+    """The words after a verb in the way in which the verb declares them.
+
+    Args:
+        command: of click; of a group its own verb is looked for.
+        given: what was typed after its name.
+    """
+    words = list(given)
+    verbs = getattr(command, "commands", None)
+    if verbs is not None:
+        return [words[0], *spelled(verbs[words[0]], words[1:])] if words and words[0] in verbs else words
+    options = {name for parameter in command.params for name in parameter.opts if name.startswith("-")}
+    arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
+    if _OUT in options and "-o" not in options:
+        words = [_OUT if word == "-o" else word for word in words]
+    takes_place = bool(arguments) and arguments[0].metavar in ("VEHICLE", "MODEL")
+    if takes_place and _VEHICLE not in options:
+        return _as_argument(words)
+    if _VEHICLE in options and not arguments and words and not words[0].startswith("-"):
+        return [_VEHICLE, *words]
+    return words
+
+
+def _as_argument(words: list[str]) -> list[str]:
+    """`--vehicle NAME` in front, where the verb has its argument; the first one only."""
+    for k, word in enumerate(words):
+        if word == _VEHICLE and k + 1 < len(words):
+            return [words[k + 1], *words[:k], *words[k + 2 :]]
+        if word.startswith(f"{_VEHICLE}="):
+            return [word.partition("=")[2], *words[:k], *words[k + 1 :]]
+    return words

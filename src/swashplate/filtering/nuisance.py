@@ -1,0 +1,35 @@
+"""What belongs to one record of a vehicle and not to the vehicle."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Nuisance(NamedTuple):
+    """What belongs to one record and not to the vehicle.
+
+    `delay_*`: time by which the motion lags the logged commands [s]; `trim_*`: zeros of the commands; `lever_*`: from
+    the centre of gravity to the tracked point in body axes [m]; `level_phi`, `level_theta`: error of the tracked body's
+    level, `level_psi`: its heading against the nose [rad].
+    """
+
+    delay_servo: Any = 0.0
+    delay_motor: Any = 0.0
+    trim_motor_lower: Any = 0.0
+    trim_motor_upper: Any = 0.0
+    trim_servo_roll: Any = 0.0
+    trim_servo_pitch: Any = 0.0
+    lever_x: Any = 0.0
+    lever_y: Any = 0.0
+    lever_z: Any = 0.0
+    level_phi: Any = 0.0
+    level_theta: Any = 0.0
+    level_psi: Any = 0.0
+
+
+def mean_nuisance(nuisances: Nuisance) -> Nuisance:
+    """Delays and lever arms averaged over the records; trims belong to their flight and are left at zero."""
+    means = {name: float(np.mean(np.asarray(value))) for name, value in nuisances._asdict().items()}
+    return Nuisance(**{name: 0.0 if name.startswith("trim") else value for name, value in means.items()})

@@ -1,0 +1,105 @@
+"""The addresses of `swash open`: the page, the logs on it, pieces of dropped files, and what is drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+
+from swashplate.links.logs import requests as ask
+from swashplate.links.logs.desk import BINS, MOST_LOGS, Desk
+from swashplate.links.logs.remedies import Remedy
+from swashplate.links.logs.spectra import spectra
+from swashplate.links.logs.track import track
+from swashplate.links.logs.uploads import PIECE
+from swashplate.links.web.guard import Guard
+from swashplate.links.web.libraries import PAGE as SHARED
+from swashplate.links.web.serving import page
+
+PAGE = Path(__file__).parent / "page"
+_LOG = ask.whole(1, 10_000)
+_NAME = ask.text(200)
+_MOST_TRACES = 400
+
+
+def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
+    """The page for any log."""
+
+    async def piece(request: Request) -> Response:
+        try:
+            content = await ask.body(request, longest=PIECE)
+            path = desk.uploads.add(request.path_params["token"], request.path_params["at"], content)
+            if path is None:
+                return ask.told({})
+            opened = await run_in_threadpool(desk.open, path)
+            return ask.told({"log": opened.number})
+        except Exception as error:
+            return ask.refused(error)
+
+    def begin(name: str, size: int) -> dict[str, Any]:
+        return {"token": desk.uploads.begin(name, size)}
+
+    def close(log: int) -> dict[str, Any]:
+        desk.drop(log)
+        return {}
+
+    def apply(log: int, units: dict[str, str], drop_bad_stamps: bool) -> dict[str, Any]:
+        return desk.apply(log, Remedy(units, drop_bad_stamps)).as_dict()
+
+    def traces(wanted: list[list[Any]], bins: int) -> dict[str, Any]:
+        rows = [(int(log), str(name), float(start), float(stop)) for log, name, start, stop in wanted]
+        return {"traces": desk.traces(rows, bins=bins)}
+
+    def plot_code(wanted: list[list[Any]], span: list[list[float]]) -> dict[str, str]:
+        chosen = [(int(log), str(name)) for log, name in wanted]
+        return desk.plot_code(chosen, (span[0][0], span[0][1]) if span else None)
+
+    routes = [
+        Route("/", page(PAGE / "open.html")),
+        Mount("/page", StaticFiles(directory=SHARED)),
+        Mount("/open", StaticFiles(directory=PAGE)),
+        Route("/logs", ask.get(desk.as_dict)),
+        _post("/upload", begin, name=ask.text(1000), size=ask.whole(0, 1 << 50)),
+        Route("/upload/{token}/{at:int}", piece, methods=["POST"]),
+        _post("/close", close, log=_LOG),
+        _post("/apply", apply, log=_LOG, units=ask.names(200, 60), drop_bad_stamps=ask.switch),
+        _post(
+            "/traces",
+            traces,
+            wanted=ask.rows(_MOST_TRACES, _LOG, _NAME, ask.number, ask.number),
+            bins=ask.whole(2, BINS),
+        ),
+        _post(
+            "/plot-code",
+            plot_code,
+            wanted=ask.rows(_MOST_TRACES, _LOG, _NAME),
+            span=ask.rows(1, ask.number, ask.number),
+        ),
+        _post(
+            "/spectra",
+            lambda log, channel, start, stop: spectra(desk.log(log), channel, start, stop),
+            log=_LOG,
+            channel=_NAME,
+            start=ask.number,
+            stop=ask.number,
+        ),
+        _post("/track", lambda log: track(desk.log(log)), log=_LOG),
+        _post("/align", desk.align, first=_LOG, second=_LOG),
+        _post("/common", desk.common, numbers=_numbers),
+    ]
+    return Guard(Starlette(routes=routes), remote=remote)
+
+
+def _post(address: str, work: Any, **form: ask.Check) -> Route:
+    return Route(address, ask.post(form, work), methods=["POST"])
+
+
+def _numbers(value: Any) -> bool:
+    return isinstance(value, list) and len(value) <= MOST_LOGS and all(map(_LOG, value))

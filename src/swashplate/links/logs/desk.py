@@ -1,0 +1,159 @@
+"""The logs that lie on the page: opened, read anew with other options, aligned, and asked for what is drawn."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from swashplate.errors import SwashError
+from swashplate.flights.conditioning.synchronise import synchronise
+from swashplate.flights.flight import did_you_mean
+from swashplate.links.logs import code_lines
+from swashplate.links.logs.bins import trace
+from swashplate.links.logs.code_lines import Read
+from swashplate.links.logs.opened import READY, Opened
+from swashplate.links.logs.remedies import Remedy
+from swashplate.links.logs.uploads import LARGEST, PIECE, Uploads
+
+MOST_LOGS = 12
+"""Logs on the page at a time."""
+BINS = 4000
+"""Most bins of a trace: no screen shows more."""
+
+
+class Desk:
+    """What `swash open` holds.
+
+    Args:
+        given: the logs of the command line: where each lies, and how it is read.
+    """
+
+    def __init__(self, given: Sequence[tuple[Path, Read]] = ()) -> None:
+        self._lock = threading.Lock()
+        self._logs: dict[int, Opened] = {}
+        self.uploads = Uploads()
+        for path, read in given:
+            self._put(path, read)
+
+    def close(self) -> None:
+        """Remove what was dropped."""
+        self.uploads.close()
+
+    # ---- logs --------------------------------------------------------------------------------------------------
+    def _put(self, path: Path, read: Read) -> Opened:
+        with self._lock:
+            if len(self._logs) >= MOST_LOGS:
+                raise SwashError(
+                    f"{MOST_LOGS} logs are open, and no more fit.", where=read.file, hint="Close one of them first."
+                )
+            number = max(self._logs, default=0) + 1
+            self._logs[number] = made = Opened(number, path, read)
+        return made
+
+    def open(self, path: Path) -> Opened:
+        """A file that was dropped, read.
+
+        Raises:
+            SwashError: where too many logs are open.
+        """
+        made = self._put(path, Read(path.name))
+        made.load(made.read)
+        return made
+
+    def read_given(self) -> None:
+        """Read what the command line gave, one after the other."""
+        for opened in list(self._logs.values()):
+            if opened.version == 0:
+                opened.load(opened.read)
+
+    def log(self, number: int) -> Opened:
+        """A log by its number.
+
+        Raises:
+            SwashError: where there is none.
+        """
+        with self._lock:
+            found = self._logs.get(number)
+        if found is None:
+            raise SwashError(f"log {number} is not open.", hint="Open it again.")
+        return found
+
+    def drop(self, number: int) -> None:
+        """Take a log off the page."""
+        with self._lock:
+            self._logs.pop(number, None)
+
+    def apply(self, number: int, remedy: Remedy) -> Opened:
+        """A log read anew with more options.
+
+        Raises:
+            SwashError: where there is no such log.
+        """
+        opened = self.log(number)
+        opened.load(opened.read.with_remedy(remedy))
+        return opened
+
+    def as_dict(self) -> dict[str, Any]:
+        """Every log as the page lists it, and what may be dropped."""
+        with self._lock:
+            logs = list(self._logs.values())
+        return {"logs": [log.as_dict() for log in logs], "largest": LARGEST, "piece": PIECE}
+
+    # ---- what is drawn -----------------------------------------------------------------------------------------
+    def traces(self, wanted: Sequence[tuple[int, str, float, float]], *, bins: int) -> list[dict[str, Any]]:
+        """Channels between two times of their log [s], thinned.
+
+        Raises:
+            SwashError: naming a log that is not open, or a channel that it lacks.
+        """
+        made = []
+        for number, name, start, stop in wanted:
+            shown = self.log(number).shown(name)
+            drawn = trace(
+                shown.time, shown.values, start=start, stop=stop, bins=max(2, min(bins, BINS)), breaks=shown.breaks
+            )
+            made.append(
+                {
+                    "log": number,
+                    "channel": name,
+                    "unit": shown.unit,
+                    "time": drawn.time,
+                    "values": drawn.values,
+                    "thinned": drawn.thinned,
+                }
+            )
+        return made
+
+    def plot_code(self, wanted: Sequence[tuple[int, str]], span: tuple[float, float] | None) -> dict[str, str]:
+        """The lines that draw the same channels."""
+        numbers = list(dict.fromkeys(number for number, _ in wanted))
+        channels = [[name for number, name in wanted if number == log] for log in numbers]
+        return code_lines.plotted([self.log(number).read for number in numbers], channels, span).as_dict()
+
+    def align(self, first: int, second: int) -> dict[str, Any]:
+        """How many seconds the second log's clock is put forward to show the same motion as the first's at one time.
+
+        Raises:
+            SwashError: where the two share no motion, or what they share does not match.
+        """
+        one, other = self.log(first), self.log(second)
+        found = synchronise(one.ready, other.ready)
+        middle = 0.5 * (other.ready.start + other.ready.stop)
+        return {
+            "offset": float(found.offset + found.drift * middle),
+            "words": str(found),
+            "code": code_lines.aligned(one.read, other.read).as_dict(),
+        }
+
+    def common(self, numbers: Sequence[int]) -> dict[str, Any]:
+        """Channels that several logs share, and a sentence where they share none."""
+        ready = [log for log in (self.log(number) for number in numbers) if log.state == READY]
+        shared = [name for name in (ready[0].ready.channels if ready else ()) if all(name in x.ready for x in ready)]
+        words = ""
+        if len(ready) > 1 and not shared:
+            names = ", ".join(log.read.file for log in ready)
+            near = did_you_mean(ready[0].ready.channels[0], ready[1].ready.channels)
+            words = f"{names} share no channel: each is drawn for itself. {near or ''}".strip()
+        return {"channels": shared, "words": words}

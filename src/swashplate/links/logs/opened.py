@@ -1,0 +1,164 @@
+"""One log on the page: how it was read, what is in it, and what went wrong where it could not be read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.arrays import Array
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights.flight import Flight
+from swashplate.flights.inspect import Inspection, inspect
+from swashplate.flights.readers.read import read as read_log
+from swashplate.links.logs.bins import gaps
+from swashplate.links.logs.channel_groups import groups, shown_unit
+from swashplate.links.logs.code_lines import Read, inspected
+from swashplate.links.logs.remedies import remedy
+
+READING, READY, FAILED = "reading", "ready", "failed"
+
+
+@dataclass(frozen=True)
+class OpenedLog:
+    """A channel as it is drawn: stamps [s], values and unit of the screen, and where it has gaps."""
+
+    time: Array
+    values: Array
+    unit: str
+    breaks: NDArray[np.int64]
+
+
+@dataclass
+class Opened:
+    """A log that was given or dropped.
+
+    Attributes:
+        number: its place on the page, from 1.
+        path: where it lies here.
+        read: how it is read, under the name that the user gave it.
+        state: "reading", "ready" or "failed".
+        flight, inspection: where it is ready.
+        problem, hint: where it failed.
+        version: counts readings, so that a page sees that it was read anew.
+    """
+
+    number: int
+    path: Path
+    read: Read
+    state: str = READING
+    flight: Flight | None = None
+    inspection: Inspection | None = None
+    problem: str = ""
+    hint: str = ""
+    version: int = 0
+    _channels: dict[str, OpenedLog] = field(default_factory=dict, repr=False)
+
+    def load(self, read: Read) -> None:
+        """Read the log; what cannot be read is said in `problem`, never raised."""
+        self.read, self.state = read, READING
+        flight = inspection = None
+        problem = hint = ""
+        try:
+            flight = read_log(
+                self.path,
+                units=dict(read.options.units),
+                mapping=read.mapping or None,
+                bad_stamps="drop" if read.options.drop_bad_stamps else "error",
+                log=read.log,
+            )
+            if not flight.channels:
+                raise FlightError("holds no channel that is known.", where=read.file)
+            inspection = inspect(flight)
+        except SwashError as error:
+            place = f"{error.channel}: " if error.channel else ""
+            problem, hint = f"{place}{error.problem}", error.hint or ""
+        except (OSError, MemoryError) as error:
+            problem = f"cannot be read: {error or 'it does not fit into memory'}."
+        self.flight, self.inspection, self.problem, self.hint = flight, inspection, problem, hint
+        self._channels = {}
+        self.version += 1
+        self.state = FAILED if problem else READY
+
+    @property
+    def ready(self) -> Flight:
+        """The flight.
+
+        Raises:
+            FlightError: where there is none.
+        """
+        if self.flight is None:
+            raise FlightError(self.problem or "is still being read.", where=self.read.file, hint=self.hint or None)
+        return self.flight
+
+    def shown(self, name: str) -> OpenedLog:
+        """A channel in the unit of the screen, kept for the next zoom.
+
+        Raises:
+            FlightError: where the log is not ready or has no such channel.
+        """
+        if name not in self._channels:
+            flight = self.ready
+            unit, factor = shown_unit(flight, name)
+            time, values = flight.time(name), flight.values(name)
+            self._channels[name] = OpenedLog(time, values if factor == 1.0 else values * factor, unit, gaps(time))
+        return self._channels[name]
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the page lists of it."""
+        head = {"id": self.number, "name": Path(self.read.file).name, "state": self.state, "version": self.version}
+        code = inspected(self.read).as_dict()
+        if self.state == FAILED:
+            mend = remedy(self.hint)
+            told = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.as_dict()}
+            return {**head, **told, "code": code}
+        if self.flight is None or self.inspection is None or self.state == READING:
+            return head
+        return {**head, **self._content, "code": code}
+
+    @property
+    def _content(self) -> dict[str, Any]:
+        flight, found = self.ready, self.inspection
+        assert found is not None
+        origin = flight.provenance
+        changes = [e for e in origin.events if e.kind == "parameter"]
+        return {
+            "start": flight.start,
+            "stop": flight.stop,
+            "epoch": flight.epoch,
+            "vehicle": origin.vehicle,
+            "reader": origin.reader,
+            "simulated": origin.simulated,
+            "options": self.read.options.words,
+            "groups": groups(flight),
+            "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(found.sweeps)],
+            "problems": [_with_remedy(text) for text in found.problems],
+            "notes": list(found.notes),
+            "modes": _modes(flight),
+            "events": [
+                {"time": e.time, "kind": e.kind, "text": e.text} for e in origin.events if e.kind != "parameter"
+            ],
+            "changes": [{"time": e.time, **_change(flight, e.time, dict(e.details))} for e in changes],
+            "parameters": [[name, value] for name, value in sorted(origin.parameters.items())],
+        }
+
+
+def _with_remedy(text: str) -> dict[str, Any]:
+    mend = remedy(text)
+    return {"text": text, "remedy": mend and mend.as_dict()}
+
+
+def _change(flight: Flight, time: float, details: dict[str, Any]) -> dict[str, Any]:
+    name = str(details.get("name", ""))
+    before = flight.provenance.parameter(name, at=float(np.nextafter(time, -np.inf)))
+    return {"name": name, "value": details.get("value"), "before": before}
+
+
+def _modes(flight: Flight) -> list[dict[str, Any]]:
+    """Flight modes with start and end [s]."""
+    switched = [event for event in flight.provenance.events if event.kind == "mode"]
+    ends = [*(event.time for event in switched[1:]), flight.stop][: len(switched)]
+    return [{"start": e.time, "stop": end, "text": e.text} for e, end in zip(switched, ends, strict=True)]

@@ -1,0 +1,88 @@
+// The logs on the page: name, length, vehicle, and the seconds that each is shifted by.
+import { note } from "./code.js";
+import { $, DASHES, ink, make, sample } from "./make.js";
+import { get, post } from "./server.js";
+import { logs, offset, offsets, on, ready, say } from "./state.js";
+import { attempt, trouble } from "./trouble.js";
+
+let timer = 0;
+
+function shift(log, seconds) {
+  if (!Number.isFinite(seconds)) return;
+  offsets.set(log.id, seconds);
+  show();
+  say("offset");
+}
+
+const align = attempt(async (log) => {
+  const [first] = ready();
+  const found = await post("/align", { first: first.id, second: log.id });
+  note(found.code);
+  $("state").textContent = found.words;
+  shift(log, found.offset + offset(first));
+});
+
+function clock(log) {
+  const [first] = ready();
+  if (ready().length < 2 || log.state !== "ready" || log.id === first.id) return null;
+  const seconds = make("input", { type: "number", step: "0.01", "aria-label": `offset of ${log.name} in seconds`, value: +offset(log).toFixed(4),
+    onchange: (event) => shift(log, event.target.valueAsNumber) });
+  return make("div", { class: "offset" }, make("label", {}, "shifted by ", seconds, " s"),
+    make("button", { onclick: () => align(log), title: "match the motion that both have seen" }, "Align by motion"));
+}
+
+function facts(log) {
+  if (log.state === "reading") return make("small", {}, "reading …");
+  if (log.state === "failed") return make("small", { class: "failed" }, log.problem);
+  const words = [`${(log.stop - log.start).toFixed(1)} s`, log.vehicle, log.reader, log.simulated ? "simulated" : "", log.options];
+  return make("small", {}, words.filter(Boolean).join(" · "));
+}
+
+function show() {
+  const order = ready().map((log) => log.id);
+  $("logs").replaceChildren(
+    ...[...logs.values()].map((log) => {
+      const k = order.indexOf(log.id), style = k >= 0 ? sample(ink("ink"), DASHES[k % DASHES.length]) : "";
+      const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
+      return make("li", { "data-log": log.id }, make("div", { class: "name" }, style, make("span", {}, log.name), off), facts(log), clock(log) ?? "");
+    }),
+  );
+}
+
+const close = attempt(async (log) => {
+  await post("/close", { log: log.id });
+  await refresh();
+});
+
+// Where a new log begins in shown time: on its own clock with the first one where both know the date, else together.
+function place(log) {
+  const [first] = ready();
+  if (!first || first.id === log.id || offsets.has(log.id)) return;
+  const dated = log.epoch && first.epoch ? log.epoch - first.epoch : null;
+  const together = dated !== null && log.start + dated < first.stop && log.stop + dated > first.start;
+  offsets.set(log.id, offset(first) + (together ? dated : first.start - log.start));
+}
+
+// Asks until every log is read; says "logs" where something has changed.
+export const refresh = attempt(async () => {
+  clearTimeout(timer);
+  const told = await get("/logs");
+  const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state]));
+  logs.clear();
+  for (const log of told.logs) logs.set(log.id, log);
+  for (const log of ready()) place(log);
+  $("largest").textContent = Math.floor(told.largest / 1e6);
+  if (told.logs.some((log) => log.state === "reading")) timer = setTimeout(refresh, 400);
+  const now = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state]));
+  show();
+  if (now !== before) say("logs");
+  if (ready().length > 1) {
+    const { words } = await post("/common", { numbers: ready().map((log) => log.id) });
+    if (words) trouble({ words });
+  }
+  return told;
+});
+
+export function begin() {
+  on("theme", show);
+}

@@ -1,0 +1,65 @@
+// What is marked in every chart: sweeps as bands, modes as a strip above, and the event that was chosen.
+import { ink } from "./make.js";
+import { offset, ready } from "./state.js";
+
+let chosen = null;
+
+export function choose(time) {
+  chosen = time;
+}
+
+function clipped(plot, low, high) {
+  const { left, width } = plot.bbox;
+  const a = Math.max(left, plot.valToPos(low, "x", true)), b = Math.min(left + width, plot.valToPos(high, "x", true));
+  return b > a ? [a, b] : null;
+}
+
+function label(ctx, text, a, b, top) {
+  const room = b - a - 8 * devicePixelRatio;
+  if (room < 20 * devicePixelRatio) return;
+  let shown = text;
+  while (shown.length > 1 && ctx.measureText(shown).width > room) shown = `${shown.slice(0, -2)}…`;
+  if (shown.length > 2) ctx.fillText(shown, a + 4 * devicePixelRatio, top);
+}
+
+export function mark(plot, first) {
+  const { ctx, bbox } = plot, scale = devicePixelRatio;
+  ctx.save();
+  ctx.font = `${11 * scale}px system-ui, sans-serif`;
+  ctx.textBaseline = "top";
+  ctx.textAlign = "left";
+  for (const log of ready()) {
+    const shift = offset(log);
+    for (const sweep of log.sweeps) {
+      const edges = clipped(plot, sweep.start + shift, sweep.stop + shift);
+      if (!edges) continue;
+      ctx.fillStyle = ink("band");
+      ctx.fillRect(edges[0], bbox.top, edges[1] - edges[0], bbox.height);
+      if (first) {
+        ctx.fillStyle = ink("blue");
+        label(ctx, `sweep ${sweep.axis}, ${+sweep.low.toPrecision(3)} to ${+sweep.high.toPrecision(3)} Hz`, ...edges, bbox.top + 3 * scale);
+      }
+    }
+  }
+  const [log] = ready();
+  if (log) {
+    log.modes.forEach((mode, k) => {
+      const edges = clipped(plot, mode.start + offset(log), mode.stop + offset(log));
+      if (!edges) return;
+      ctx.fillStyle = k % 2 ? ink("line") : ink("soft");
+      ctx.fillRect(edges[0], bbox.top + bbox.height - 3 * scale, edges[1] - edges[0], 3 * scale);
+      if (first) {
+        ctx.fillStyle = ink("soft");
+        label(ctx, mode.text, ...edges, bbox.top + bbox.height - 17 * scale);
+      }
+    });
+  }
+  if (chosen !== null) {
+    const x = plot.valToPos(chosen, "x", true);
+    if (x >= bbox.left && x <= bbox.left + bbox.width) {
+      ctx.fillStyle = ink("red");
+      ctx.fillRect(x, bbox.top, 1.5 * scale, bbox.height);
+    }
+  }
+  ctx.restore();
+}

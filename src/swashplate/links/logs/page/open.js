@@ -1,0 +1,51 @@
+// The page for any log: its parts, and what is drawn when a log comes.
+import * as channel_list from "./channel_list.js";
+import * as code from "./code.js";
+import * as drop from "./drop.js";
+import * as events from "./events.js";
+import * as findings from "./findings.js";
+import * as log_list from "./log_list.js";
+import * as parameters from "./parameters.js";
+import * as plots from "./plots.js";
+import { post } from "./server.js";
+import * as spectrum from "./spectrum.js";
+import * as state from "./state.js";
+import * as theme from "./theme.js";
+import * as track from "./track.js";
+import * as trouble from "./trouble.js";
+import * as views from "./views.js";
+
+const FIRST = { Rates: 3, Attitude: 3, Commands: 4, Position: 3 }; // channels that are drawn unasked, by group
+const MOST = 3; // charts of them
+let known = "";
+
+// What is drawn of a log that has just come: rates, attitude and commands where it has them, else its first channels.
+function greet() {
+  const now = [...state.logs.values()].map((log) => `${log.id}:${log.version}:${log.state}`).join(" ");
+  if (now === known) return;
+  const grown = state.ready().length && (known === "" || !state.charts.length);
+  known = now;
+  for (const log of state.ready()) code.note(log.code);
+  const there = state.channels();
+  for (const chart of state.charts) chart.channels = chart.channels.filter((name) => there.has(name));
+  for (let i = state.charts.length - 1; i >= 0; i--) if (!state.charts[i].channels.length) state.charts.splice(i, 1);
+  if (grown || !state.charts.length) {
+    for (const [title, count] of Object.entries(FIRST)) {
+      const of = [...there.values()].filter((channel) => channel.group === title && !/^q[wxyz]$/.test(channel.name));
+      if (state.charts.length < MOST) for (const channel of of.slice(0, count)) state.draw(channel.name, true);
+    }
+    if (!state.charts.length) for (const name of [...there.keys()].slice(0, 3)) state.draw(name, true);
+  }
+  views.count();
+  [state.seen.low, state.seen.high] = state.whole();
+  state.say("charts");
+}
+
+for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, drop]) part.begin();
+state.on("logs", greet);
+theme.begin();
+const told = await log_list.refresh();
+if (told) drop.allow(told);
+state.say("charts");
+window.swash = { state, post };
+document.documentElement.dataset.ready = "yes";

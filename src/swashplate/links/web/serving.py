@@ -1,0 +1,105 @@
+"""A bound address, pages as files, and the server's loop: what the live page, the replay and `swash open` share."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import logging
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import uvicorn
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.types import ASGIApp
+
+from swashplate.errors import SwashError
+from swashplate.links.web.connections import OneLine, Punctual
+from swashplate.links.web.priority import come_first
+
+_POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
+
+
+def listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
+    """A bound socket.
+
+    Raises:
+        SwashError: for an address beyond this machine without `allow_remote`, an unknown host, or a port in use.
+    """
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except (OSError, UnicodeError):
+        raise SwashError(f"'{host}' is no address of this machine.", channel="--host") from None
+    address = ipaddress.ip_address(found[4][0])
+    if not address.is_loopback and not allow_remote:
+        raise SwashError(
+            f"{address} can be reached from other machines.",
+            channel="--host",
+            hint="Whoever reaches the page can do all that it does; if that is meant, add --allow-remote.",
+        )
+    made = socket.socket(found[0], socket.SOCK_STREAM)
+    try:
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(found[4])
+        made.listen(64)
+    except OSError as error:
+        made.close()
+        raise SwashError(
+            f"port {port} of {host} cannot be had: {error.strerror or error}.",
+            channel="--port",
+            hint="Is another page of swash open there? --port 0 takes any free port.",
+        ) from None
+    return made
+
+
+def address_of(listening: socket.socket) -> str:
+    """The page's address for a browser on this machine."""
+    host, port = listening.getsockname()[:2]
+    if ipaddress.ip_address(host).is_unspecified:
+        host = "127.0.0.1" if listening.family == socket.AF_INET else "::1"
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+
+
+def page(path: Path) -> Callable[[Request], Response]:
+    """Answers with an HTML page that may load only what this server has."""
+
+    def answer(_: Request) -> Response:
+        return FileResponse(path, headers={"content-security-policy": _POLICY})
+
+    return answer
+
+
+def configured(app: ASGIApp, *, frame: int = 0) -> uvicorn.Config:
+    """How an app is served: what does not ask in time, or not in text, is let go.
+
+    Args:
+        frame: longest frame of a WebSocket [bytes]; 0 where the app has none.
+    """
+    made = uvicorn.Config(
+        app,
+        http=Punctual,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        lifespan="off",
+        ws="websockets-sansio" if frame else "none",
+        ws_max_size=frame,
+        timeout_graceful_shutdown=2,
+    )
+    logging.getLogger("uvicorn.error").addFilter(OneLine())
+    return made
+
+
+def serve(app: ASGIApp, listening: socket.socket, *, frame: int = 0, first: bool = True) -> None:
+    """Serve until interrupted; an interrupt is the ordinary end.
+
+    Args:
+        app, frame: as of `configured`.
+        first: ask the system to run this thread before others: a flight that is flown cannot wait.
+    """
+    config = configured(app, frame=frame)
+    if first:
+        come_first()  # the interpreter's lock must not be held by a thread that waits for a processor
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listening])

@@ -1,0 +1,95 @@
+"""Linear models as python-control has them. It knows no delays in continuous time: they become Padé polynomials."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from swashplate.arrays import Array
+from swashplate.errors import SwashError
+
+_HIGHEST = 12
+"""Order of a Padé polynomial beyond which its coefficients lose their meaning in double precision."""
+
+
+def state_space(
+    matrices: tuple[Array, Array, Array, Array],
+    *,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    delays: Mapping[str, float],
+    pade: int | None,
+    name: str,
+) -> Any:
+    """A `control.StateSpace` with named signals, its delays as Padé polynomials.
+
+    Args:
+        matrices: A, B, C, D.
+        states, inputs, outputs: names.
+        delays: [s] by input, or by "output/input".
+        pade: order of the polynomials; 0 leaves the delays out, None does so too and warns where there are any.
+        name: of the model, for the warning.
+
+    Raises:
+        SwashError: an order that is negative or too high.
+    """
+    import control
+
+    plain = control.ss(*matrices, states=list(states), inputs=list(inputs), outputs=list(outputs))
+    late = {key: value for key, value in delays.items() if value > 0.0}
+    if not asked(pade, late, name=name):
+        return plain
+    of_pairs = {(o, i): late.get(f"{o}/{i}", late.get(i, 0.0)) for o in outputs for i in inputs}
+    own = {i: {of_pairs[o, i] for o in outputs} for i in inputs}
+    if all(len(found) == 1 for found in own.values()):
+        before = control.append(*(_delay(found.pop(), pade) for found in own.values()))
+        whole = plain * before
+    else:  # outputs answer one input after different times: each input has its own copy of the model
+        columns = []
+        for k, i in enumerate(inputs):
+            after = control.append(*(_delay(of_pairs[o, i], pade) for o in outputs))
+            columns.append(after * control.ss(plain.A, plain.B[:, [k]], plain.C, plain.D[:, [k]]))
+        whole = control.append(*columns)
+        whole = control.ss(whole.A, whole.B, _summed(whole.C, len(outputs)), _summed(whole.D, len(outputs)))
+    return control.ss(whole.A, whole.B, whole.C, whole.D, inputs=list(inputs), outputs=list(outputs))
+
+
+def transfer_function(numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str) -> Any:
+    """A `control.TransferFunction`, its delay [s] as a Padé polynomial; see `state_space` for `pade`."""
+    import control
+
+    plain = control.tf(list(numerator), list(denominator))
+    late = {name: delay} if delay > 0.0 else {}
+    return plain * control.tf(*control.pade(delay, pade)) if asked(pade, late, name=name) else plain
+
+
+def asked(pade: int | None, late: Mapping[str, float], *, name: str) -> bool:
+    """Whether delays become polynomials; warns where they are left out without having been asked to be.
+
+    Raises:
+        SwashError: an order that is negative or too high.
+    """
+    if pade is not None and not 0 <= pade <= _HIGHEST:
+        raise SwashError(f"is {pade}, expected 0 (no delays) to {_HIGHEST}.", channel="pade")
+    if late and pade is None:
+        told = ", ".join(f"{key} {1e3 * value:.3g} ms" for key, value in late.items())
+        warnings.warn(
+            f"the delays of {name} are left out ({told}): give to_control(pade=3) to have them as Padé polynomials, "
+            "or pade=0 to leave them out knowingly.",
+            stacklevel=4,
+        )
+    return bool(late and pade)
+
+
+def _delay(seconds: float, order: int | None) -> Any:
+    """A delay as a system of one input and one output."""
+    import control
+
+    return control.ss(control.tf(*control.pade(seconds, order))) if seconds > 0.0 else control.ss([], [], [], [[1.0]])
+
+
+def _summed(rows: Any, outputs: int) -> Any:
+    """Rows of several models' outputs, one model after the other, added up by output."""
+    return rows.reshape(-1, outputs, rows.shape[1]).sum(axis=0)

@@ -1,0 +1,140 @@
+"""Figures of models beside a flight: the lines, and the correlations of what is left."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swashplate.flights.schema import channel
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.reporting.downsample import joined, kept
+from swashplate.reporting.structure import Cell, Figure, Key, Section, Table, Text
+from swashplate.reporting.theme import (
+    BAND,
+    BLUE,
+    FLIGHT,
+    GREEN,
+    INPUT_COLORS,
+    MODEL,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    grid,
+    inputs_title,
+    line,
+    numbers,
+    quantity,
+    shown,
+    stacked,
+)
+from swashplate.validation.compare import ModelComparison
+from swashplate.validation.residuals import Correlation, Residuals
+from swashplate.validation.verification import Verification
+
+_STYLES = ((BLUE, "dash"), (VERMILION, "dot"), (GREEN, "dashdot"), (PURPLE, "dash"), (ORANGE, "dot"))
+
+
+def section_of_comparison(found: ModelComparison) -> Section:
+    """The lines, and how close each model comes."""
+    rows = tuple(
+        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in found.found))
+        for name, fits in found.fits().items()
+    )
+    table = Table("Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *found.found), rows)
+    told = tuple(Text(f"{n}: {t}", tone="caution") for n, v in found.found.items() for t in v.warnings)
+    return Section("comparison", "Models along the flight", (*told, _lines(found), table))
+
+
+def _units(v: Verification) -> dict[str, str]:
+    model = v.model
+    if isinstance(model, StateSpaceModel):
+        return dict(model.units)
+    names, units = (*model.input_names, *model.state_names), (*model.input_units, *model.state_units)
+    return dict(zip(names, units, strict=True))
+
+
+def _lines(found: ModelComparison) -> Figure:
+    """Inputs, then flight and models of every output."""
+    first = next(iter(found.found.values()))
+    names = list(found.fits())
+    units = _units(first)
+    titles = [quantity(n, channel(n).shown_unit or units.get(n, "")) for n in names]
+    layout = stacked([inputs_title(first.inputs, units), *titles], height=112)
+    traces, keys = [], [Key("flight", FLIGHT)]
+    for i, name in enumerate(first.inputs):
+        time, values = joined([(t.time, t.inputs[:, i]) for t in first.traces])
+        places, color = kept(values), INPUT_COLORS[i % len(INPUT_COLORS)]
+        traces.append(line(time[places], values[places], name=name, color=color))
+        keys.append(Key(name, color))
+    for number, name in enumerate(names, start=2):
+        measured = False
+        for (who, v), (color, dash) in zip(found.found.items(), _STYLES * len(found.found), strict=False):
+            if all(o.output != name for o in v.outputs):
+                continue
+            k = [o.output for o in v.outputs].index(name)
+            rows = [("flight", FLIGHT, "solid", [(t.time, t.flight[:, k]) for t in v.traces])] if not measured else []
+            rows.append((who, color, dash, [(t.time, t.model[:, k]) for t in v.traces]))
+            measured = True
+            for words, ink, style, pieces in rows:
+                time, values = joined(pieces)
+                places, values = kept(values), shown(name, values)
+                traces.append(line(time[places], values[places], name=words, color=ink, dash=style, axis=str(number)))
+    told = zip(found.found, _STYLES * len(found.found), strict=False)
+    keys += [Key(f"{who} ({_mean_fit(found.found[who]):.0f} %)", color, dash) for who, (color, dash) in told]
+    return Figure(
+        "models",
+        {"data": traces, "layout": layout},
+        int(layout["height"]),
+        "Flight and models along the recorded inputs; in brackets the mean fit over the outputs. Biases and start "
+        "states are solved for.",
+        f"{', '.join(names)} of the flight and of {', '.join(found.found)} over time.",
+        keys=tuple(keys),
+    )
+
+
+def _mean_fit(v: Verification) -> float:
+    return float(np.mean([o.fit for o in v.outputs]))
+
+
+def section_of_residuals(found: Residuals) -> Section:
+    """The verdict, and the correlations with their bounds."""
+    tone = "good" if found.complete else "bad"
+    rows = tuple(
+        (Cell(c.output), Cell(c.input), Cell(f"{c.worst[1]:+.3f}", True), Cell(f"{c.worst[0]:.3g}", True),
+         Cell(f"{c.limit:.3f}", True))
+        for c in found.cross
+    )  # fmt: skip
+    table = Table("Largest causal correlations", ("output", "input", "largest", "at [s]", "limit"), rows)
+    title = f"Residuals of {found.verification.model.name}"
+    cross = _correlations(
+        found.cross,
+        "cross-correlation",
+        "Correlation of residuals with inputs; at positive lags the input comes first. Outside the band (99 % for each "
+        "lag) the input explains what the model left; what is left of zero is feedback.",
+    )
+    auto = _correlations(
+        found.auto, "autocorrelation", "Autocorrelation of the residuals; outside the band (99 % a lag) it is coloured."
+    )
+    return Section("residuals", title, (Text(found.headline, tone=tone), cross, auto, table))
+
+
+def _correlations(found: tuple[Correlation, ...], identifier: str, caption: str) -> Figure:
+    titles = [f"{c.output} / {c.input}" if c.input else c.output for c in found]
+    columns = min(2, len(titles))
+    layout = grid(titles, columns=columns, height=140, x_title="lag [s]", y_title="correlation [-]")
+    traces = []
+    for i, c in enumerate(found):
+        number = "" if i == 0 else str(i + 1)
+        low, high = float(c.lags[0]), float(c.lags[-1])
+        edge = [c.bound, c.bound, -c.bound, -c.bound]
+        band = line([low, high, high, low], edge, name="99 %", color=BAND, width=0, axis=number)
+        traces.append({**band, "fill": "toself", "fillcolor": BAND, "hoverinfo": "skip", "hovertemplate": None})
+        hover = f"{titles[i]}<br>lag %{{x:.3f}} s: %{{y:.3f}}"
+        traces.append(line(numbers(c.lags), numbers(c.values), name=titles[i], color=MODEL, axis=number, hover=hover))
+    return Figure(
+        identifier,
+        {"data": traces, "layout": layout},
+        int(layout["height"]),
+        caption,
+        f"{identifier} of {', '.join(titles)} over the lag.",
+        keys=(Key("correlation", MODEL), Key("99 % bound of each lag", BAND, "band")),
+    )

@@ -1,0 +1,208 @@
+"""What an object shows of itself: a title, words, figures and a table; and the verbs behind its methods.
+
+The figures are those of its report. `plot` draws one with matplotlib, `explore` with plotly, `html_of` shows all of it
+in a notebook.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.flights.inspect import Inspection
+from swashplate.identification.core.result import Result
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.registry import nearest
+from swashplate.reporting.figures import bode_matrix
+from swashplate.reporting.figures.interactive import interactive
+from swashplate.reporting.figures.of_comparison import section_of_comparison, section_of_residuals
+from swashplate.reporting.figures.of_flight import over_time, section_of_flight, section_of_inspection
+from swashplate.reporting.figures.still import still
+from swashplate.reporting.figures.themes import Frequency, Theme
+from swashplate.reporting.figures_fit import eigenvalues
+from swashplate.reporting.report import structure_of
+from swashplate.reporting.speed_page import by_contributor, controls
+from swashplate.reporting.structure import Block, Cell, Figure, Report, Section, Table, Text
+from swashplate.simulation.derivatives_over_speed import Derivatives
+from swashplate.simulation.linearize import LinearModel
+from swashplate.simulation.trim_curve import TrimCurve
+from swashplate.validation.compare import ModelComparison
+from swashplate.validation.residuals import Residuals
+from swashplate.validation.validation import Validation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Still
+
+
+def section_of(shown: Any) -> Section:
+    """What an object shows; the first figure is the main one.
+
+    Raises:
+        SwashError: an object that shows nothing.
+    """
+    if isinstance(shown, Flight):
+        return section_of_flight(shown)
+    if isinstance(shown, Inspection):
+        return section_of_inspection(shown)
+    if isinstance(shown, FrequencyResponse):
+        return _of_responses(shown)
+    if isinstance(shown, TrimCurve):
+        return _of_trims(shown)
+    if isinstance(shown, Derivatives):
+        return _of_derivatives(shown)
+    if isinstance(shown, ModelComparison):
+        return section_of_comparison(shown)
+    if isinstance(shown, Residuals):
+        return section_of_residuals(shown)
+    if isinstance(shown, LinearModel):
+        return Section("modes", "Linear model", (eigenvalues({"model": shown.modes()}), _listing(repr(shown))))
+    return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
+
+
+def _has_modes(shown: Any) -> bool:
+    """Whether its report would look for modes at hover, which a figure does not wait for."""
+    return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.model, "card"))
+
+
+def _of_report(page: Report, shown: Any) -> Section:
+    """The figures of an object's report, and its words."""
+    words = tuple(Text(text, tone=tone) for tone, text in page.banners)
+    picture = (page.picture,) if page.picture else ()
+    rest = tuple(block for section in page.sections for block in section.blocks if isinstance(block, Figure))
+    if isinstance(shown, Result) and shown.targets:
+        rest = tuple(sorted(rest, key=lambda figure: figure.identifier != "fitted-responses"))
+    if isinstance(shown, Result):
+        told = (*shown.problems, *shown.warnings)
+        columns = [(head, cells) for head, cells in shown.columns() if any(cells)]
+        rows = tuple(tuple(Cell(cell) for cell in row) for row in zip(*(cells for _, cells in columns), strict=True))
+        estimates = Table("Estimates", tuple(head for head, _ in columns), rows)
+        title = f"{shown.name} by {shown.method}: {shown.state}"
+        return Section("result", title, (*(Text(text, tone="caution") for text in told), *picture, *rest, estimates))
+    summary = Table("Summary", ("", ""), tuple((Cell(label), Cell(text)) for label, text, _ in page.summary))
+    return Section("shown", page.title, (*words, *picture, *rest, summary))
+
+
+def _listing(text: str) -> Text:
+    return Text(text)
+
+
+def _of_responses(found: FrequencyResponse) -> Section:
+    """Coherent bands of every pair, and Bode plots of those that have one."""
+    rows = []
+    for output in found.outputs:
+        for name in found.inputs:
+            band = found.band(output, name)
+            ends = "none" if band is None else f"{band[0] / TWO_PI:.3g} - {band[1] / TWO_PI:.3g}"
+            rows.append((Cell(f"{output} / {name}"), Cell(ends)))
+    told = tuple(Text(text, tone="caution") for text in (*found.problems, *found.warnings))
+    table = Table("Where they may be used", ("output / input", "coherent band [Hz]"), tuple(rows))
+    title = f"Frequency responses ({found.method}): {found.omega.size} lines"
+    return Section("responses", title, (*told, bode_matrix.of_responses(found), table))
+
+
+def _of_trims(curve: TrimCurve) -> Section:
+    columns = curve.columns()
+    rows = tuple(tuple(Cell(f"{v:.3f}", number=True) for v in row) for row in zip(*columns.values(), strict=True))
+    told: tuple[Block, ...] = tuple(Text(text, tone="caution") for text in curve.remarks)
+    title = f"Trims of {curve.vehicle.card.title}"
+    return Section("trims", title, (*told, controls(curve), Table("Trims", tuple(columns), rows)))
+
+
+def _of_derivatives(found: Derivatives, row: str = "M") -> Section:
+    head, rows = found.rows(found.tables[0])
+    title = f"Derivatives of {found.vehicle.card.title} at {found.trims[0].speed:g} m/s"
+    table = Table("Derivatives", tuple(head), tuple(tuple(Cell(cell) for cell in line) for line in rows))
+    others = tuple(by_contributor(found, other) for other in "XYZLMN" if other != row)
+    return Section("derivatives", title, (by_contributor(found, row), *others, table))
+
+
+# ---- the verbs behind the methods ------------------------------------------------------------------------------
+def figures_of(shown: Any) -> dict[str, Figure]:
+    """The figures that an object has, by name, the main one first."""
+    return {block.identifier: block for block in section_of(shown).blocks if isinstance(block, Figure)}
+
+
+def figure_names(shown: Any) -> tuple[str, ...]:
+    """Names of the figures that an object has, the main one first."""
+    return tuple(figures_of(shown))
+
+
+def _chosen(shown: Any, name: str | None) -> Figure:
+    """A figure by its name, the main one where None.
+
+    Raises:
+        SwashError: a name that it has not, or an object without figures.
+    """
+    found = figures_of(shown)
+    if not found:
+        raise SwashError("has nothing to draw.", channel=type(shown).__name__)
+    if name is None:
+        return next(iter(found.values()))
+    if name not in found:
+        raise SwashError(
+            f"is no figure of it; there are {', '.join(found)}.",
+            channel=name,
+            hint=nearest(name, found) or None,
+        )
+    return found[name]
+
+
+def _title(shown: Any) -> str:
+    name = shown.provenance.source if isinstance(shown, Flight) else section_of(shown).title
+    return str(name)
+
+
+def plot(shown: Any, figure: str | None = None, *, theme: Theme = "paper", frequency: Frequency = "Hz") -> Still:
+    """One figure of an object, with matplotlib; see `swashplate.shown.Shown.plot`."""
+    return still(
+        [_chosen(shown, figure)], theme=theme, frequency=frequency, title="" if theme == "paper" else _title(shown)
+    )
+
+
+def explore(shown: Any, figure: str | None = None, *, theme: Theme = "light", frequency: Frequency = "Hz") -> Any:
+    """One figure of an object, with plotly; see `swashplate.shown.Shown.explore`."""
+    return interactive(_chosen(shown, figure), theme=theme, frequency=frequency, title=_title(shown))
+
+
+def plot_flight(flight: Flight, *, channels: Sequence[str] | None = None, theme: Theme = "paper") -> Still:
+    """Channels over time; see `Flight.plot`."""
+    return still([over_time([flight], channels=channels)], theme=theme, title=flight.provenance.source)
+
+
+def explore_flight(flight: Flight, *, channels: Sequence[str] | None = None, theme: Theme = "light") -> Any:
+    """Channels over time, to zoom; see `Flight.explore`."""
+    return interactive(over_time([flight], channels=channels), theme=theme, title=flight.provenance.source)
+
+
+def plot_responses(
+    response: FrequencyResponse,
+    *,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    theme: Theme = "paper",
+    frequency: Frequency = "Hz",
+) -> Still:
+    """Bode diagrams; see `FrequencyResponse.plot`."""
+    return still([bode_matrix.of_responses(response, pairs)], theme=theme, frequency=frequency)
+
+
+def explore_responses(
+    response: FrequencyResponse,
+    *,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    theme: Theme = "light",
+    frequency: Frequency = "Hz",
+) -> Any:
+    """Bode diagrams, to zoom; see `FrequencyResponse.explore`."""
+    return interactive(bode_matrix.of_responses(response, pairs), theme=theme, frequency=frequency)
+
+
+def plot_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "paper") -> Still:
+    """Derivatives over speed by contributor; see `Derivatives.plot`."""
+    return still([by_contributor(derivatives, row)], theme=theme)
+
+
+def explore_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "light") -> Any:
+    """Derivatives over speed by contributor, to zoom; see `Derivatives.explore`."""
+    return interactive(by_contributor(derivatives, row), theme=theme)

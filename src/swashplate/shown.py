@@ -1,0 +1,54 @@
+"""`Shown`: what every result can do to be seen. The drawing itself lies layers above and is found by name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from swashplate.public import resolve
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Shown:
+    """A result that plots itself, can be explored, and shows itself in a notebook."""
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of the figures that `plot` and `explore` can draw, the main one first."""
+        found: tuple[str, ...] = resolve("figure_names")(self)
+        return found
+
+    def plot(
+        self,
+        figure: str | None = None,
+        *,
+        theme: Literal["paper", "light", "dark"] = "paper",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Figure:
+        """One figure as a matplotlib figure; `savefig` writes it as PDF, SVG or PNG.
+
+        Args:
+            figure: its name (see `figures`); the main one where None.
+            theme: "paper" (for print: small type, no title), "light" or "dark".
+            frequency: unit of axes of frequency.
+
+        Raises:
+            SwashError: a figure, a theme or a unit that there is not; matplotlib missing.
+        """
+        drawn: Figure = resolve("plot")(self, figure, theme=theme, frequency=frequency)
+        return drawn
+
+    def explore(
+        self,
+        figure: str | None = None,
+        *,
+        theme: Literal["paper", "light", "dark"] = "light",
+        frequency: Literal["Hz", "rad/s"] = "Hz",
+    ) -> Any:
+        """One figure as a `plotly.graph_objects.Figure`, to zoom and point at; arguments and errors as of `plot`."""
+        return resolve("explore")(self, figure, theme=theme, frequency=frequency)
+
+    def _repr_html_(self) -> str:
+        page: str = resolve("html_of")(self)
+        return page

@@ -1,0 +1,24 @@
+"""Modes of a linear model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One real eigenvalue or one conjugate pair.
+
+    Attributes:
+        eigenvalue: with the positive imaginary part [1/s].
+        frequency: its modulus, the natural frequency [rad/s].
+        damping: damping ratio; 1 for a stable real mode, -1 for an unstable one, 0 at the origin.
+        time_constant: -1 / real part [s]; negative where the mode grows, infinite where it does neither.
+        states: the states that take part most, largest first, with their share (participation factors).
+    """
+
+    eigenvalue: complex
+    frequency: float
+    damping: float
+    time_constant: float
+    states: tuple[tuple[str, float], ...]

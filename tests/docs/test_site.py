@@ -1,0 +1,146 @@
+"""The site: it builds without a warning, its links and pictures are there, a browser searches and follows a door."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from html import unescape
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import pytest
+
+import swashplate as sp
+from chromium import running_browser
+
+sphinx = pytest.importorskip("sphinx", reason="the site's packages are not installed")
+
+import build_site  # noqa: E402
+import docs_pages  # noqa: E402
+import real_results  # noqa: E402
+import site_pages  # noqa: E402
+import site_reference  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[2]
+_TARGET = re.compile(r'<(?:a|img|script|link)\b[^>]*?\b(?:href|src)="([^"]*)"')
+_ID = re.compile(r'\bid="([^"]+)"')
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built as `make site` builds it."""
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        build_site.command(folder / "site", folder / "pages"), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "scripts/build_site.py" in (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nsite:")[2][:80]
+    return folder / "site"
+
+
+def dead_links(site: Path) -> list[str]:
+    """Links, pictures and scripts of every page that lead nowhere inside the site, or out of it without http."""
+    pages = (page for page in site.rglob("*.html") if "_static" not in page.parts)  # there lie the theme's templates
+    texts = {page.resolve(): page.read_text(encoding="utf-8") for page in pages}
+    ids = {page: {unescape(name) for name in _ID.findall(text)} for page, text in texts.items()}
+    dead = []
+    for page, text in texts.items():
+        for target in map(unescape, _TARGET.findall(text)):
+            if target.startswith(("http://", "https://", "mailto:", "data:")) or target == "#":
+                continue
+            path, _, anchor = target.partition("#")
+            place = (page.parent / unquote(path.partition("?")[0])).resolve() if path else page
+            inside = place.is_relative_to(site.resolve()) and place.is_file()
+            if not inside or (anchor and place in ids and unquote(anchor) not in ids[place]):
+                dead.append(f"{page.relative_to(site.resolve())}: {target}")
+    return dead
+
+
+def test_every_page_is_on_the_site_and_every_link_leads_somewhere(site: Path) -> None:
+    pages = {page.relative_to(ROOT / "docs").with_suffix(".html") for page in (ROOT / "docs").rglob("*.md")}
+    assert {page for page in pages if not (site / page).is_file()} == set()
+    assert dead_links(site) == []
+
+
+def test_a_dead_link_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text('<a href="b.html#here">b</a><a href="#gone">x</a><img src="c.png">')
+    (tmp_path / "b.html").write_text(
+        '<p id="here"></p><a href="../away.html">out</a><a href="https://example.org">y</a>'
+    )
+    assert sorted(dead_links(tmp_path)) == ["a.html: #gone", "a.html: c.png", "b.html: ../away.html"]
+
+
+def test_the_python_reference_has_every_public_name_with_its_signature(site: Path) -> None:
+    text = (site / "reference" / "python.html").read_text(encoding="utf-8")
+    assert set(site_reference.places()) == set(sp.__all__) - {"__version__"}
+    missing = [name for name in site_reference.places() if f'id="swashplate.{name}"' not in text]
+    assert missing == []
+    plain = unescape(re.sub(r"<[^>]+>", "", text))
+    assert "keep_unexcited: bool = False" in plain.replace("keep_unexcited: bool=False", "keep_unexcited: bool = False")
+    assert "in SI units, radians, NED and FRD" in plain
+
+
+def test_a_worked_example_is_a_notebook_too(site: Path) -> None:
+    made = sorted((site / "notebooks").glob("*.ipynb"))
+    assert [file.stem for file in made] == sorted(page.stem for page in (ROOT / "docs" / "notebooks").glob("*.md"))
+    page = (ROOT / "docs" / "notebooks" / f"{made[0].stem}.md").read_text(encoding="utf-8")
+    cells = json.loads(made[0].read_text(encoding="utf-8"))["cells"]
+    code = [cell["source"] + "\n" for cell in cells if cell["cell_type"] == "code"]
+    assert code == [fence.text for fence in docs_pages.fences(page) if fence.language == "python"]
+    assert cells[0]["source"].startswith("# ")
+
+
+def test_navigation_is_the_pages_own_lists() -> None:
+    page = (
+        "# A\n\n<!-- navigation -->\n\n## Fly\n\n* [One](one.md): first\n* no page\n\n## Rest\n\nSee [two](two.md).\n"
+    )
+    assert site_pages.navigation(page) == "```{toctree}\n:hidden:\n:caption: Fly\n\none\n```"
+
+
+def test_verdicts_that_have_another_form_are_refused() -> None:
+    page = real_results.PAGE.read_text(encoding="utf-8")
+    assert len(real_results.directions(page)) == 2
+    with pytest.raises(ValueError, match="two directions"):
+        real_results.directions(page.replace("**poor**", "**splendid**"))
+    with pytest.raises(ValueError, match="two directions"):
+        real_results.directions(page.replace("## Learnt in July, predicting August", "## The other way round"))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    yield from running_browser()
+
+
+@pytest.mark.parametrize("size", [(1280, 900), (390, 844)], ids=["desk", "telephone"])
+def test_a_reader_searches_a_word_and_follows_a_door(browser: Any, site: Path, size: tuple[int, int]) -> None:
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    said: list[str] = []
+    asked: list[str] = []
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((site / "index.html").as_uri())
+    for door in ("Tune an autopilot", "Identify from motion capture", "Get a model"):
+        assert page.locator("h2", has_text=door).is_visible()
+    assert page.locator(".bd-article img").count() >= 3
+
+    page.locator("button.search-button__button:visible, button.search-button:visible").first.click()
+    page.locator("dialog input[name=q], .search-button__search-container input[name=q]").first.fill("coherence")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/search.html?*")
+    results = page.locator("#search-results li a")
+    results.first.wait_for()
+    assert any("howto/identify-from-a-sweep.html" in (a.get_attribute("href") or "") for a in results.all())
+
+    page.goto((site / "index.html").as_uri())
+    page.locator(".bd-article a[href='doors/tune-an-autopilot.html']").first.click()
+    page.wait_for_url("**/doors/tune-an-autopilot.html")
+    page.locator(".bd-article a[href$='howto/fly-a-sweep.html']").click()
+    page.wait_for_url("**/howto/fly-a-sweep.html")
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    assert said == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+    page.close()

@@ -1,0 +1,154 @@
+"""Every object that shows itself: all of its figures, in every theme, with a name and a unit on every axis."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import swashplate as sp
+from report_samples import fit, flight, modes, validation
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.reporting.compose import compose
+from swashplate.reporting.figures import of_flight
+from swashplate.reporting.figures.interactive import interactive
+from swashplate.reporting.figures.libraries import library
+from swashplate.reporting.figures.still import still
+from swashplate.reporting.figures.themes import DARK
+from swashplate.reporting.figures.views import figures_of
+from swashplate.reporting.structure import Figure, Key
+from swashplate.reporting.theme import axis, base_layout, line
+from swashplate.simulation.linearize import LinearModel
+from swashplate.simulation.trim_curve import trim_curve
+
+_UNIT = re.compile(r"\[[^\]]+\]")
+
+
+def _sweep() -> Flight:
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal((2, 3000))
+    p = lfilter([0.1], [1, -0.9], u[0]) + 0.1 * rng.standard_normal(3000)
+    q = lfilter([0.2], [1, -0.8], u[1]) + 0.1 * rng.standard_normal(3000)
+    channels = {"servo_roll": u[0], "servo_pitch": u[1], "p": p, "q": q}
+    return Flight.from_arrays(np.arange(3000) / 50.0, channels, source="sweep.csv")
+
+
+def _responses() -> Any:
+    return sp.respond(_sweep(), inputs=["servo_roll", "servo_pitch"], outputs=["p", "q"])
+
+
+def _linear() -> LinearModel:
+    a, none = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.zeros((2, 1))
+    trim = sp.trim(sp.vehicle("coax"))
+    return LinearModel(a, np.array([[0.0], [1.0]]), np.eye(2), none, none, ("x", "u"), ("push",), ("wind",), trim)
+
+
+def _spectra() -> dict[str, Figure]:
+    flown = flight(8.0)
+    drawn = [
+        of_flight.over_time([flown, _sweep()], channels=["p", "q"], shifts=(0.0, 1.0)),
+        of_flight.spectrum([flown, _sweep()], channels=["p"]),
+        of_flight.spectrogram(flown, channels=["p", "servo_roll"]),
+    ]
+    return {figure.identifier: figure for figure in drawn}
+
+
+MADE: dict[str, Callable[[], dict[str, Figure]]] = {
+    "flight": lambda: figures_of(flight(5.0)),
+    "inspection": lambda: figures_of(sp.inspect(flight(5.0))),
+    "responses": lambda: figures_of(_responses()),
+    "transfer function": lambda: figures_of(
+        sp.fit_transfer_function(_responses(), "0/1", input="servo_roll", outputs=["p"])
+    ),
+    "linear model": lambda: figures_of(_linear()),
+    "trims": lambda: figures_of(trim_curve(sp.vehicle("coax"), (0.0,))),
+    "fit and validation": lambda: {f.identifier: f for f in compose(fit(), validation(), modes=modes()).figures},
+    "spectra": _spectra,
+}
+
+
+def nameless(drawn: Any) -> list[str]:
+    """Axes of a matplotlib figure that say neither what they show nor in which unit."""
+    found = []
+    for panel in drawn.axes:
+        title = panel.get_title(loc="left")
+        column = [p for p in drawn.axes if abs(p.get_position().x0 - panel.get_position().x0) < 0.02]
+        row = [p for p in drawn.axes if abs(p.get_position().y0 - panel.get_position().y0) < 0.02]
+        words = {
+            "x": [p.get_xlabel() for p in column] + [title],
+            "y": [p.get_ylabel() for p in row] + [title],
+        }
+        names = {"x": panel.get_xticklabels(), "y": panel.get_yticklabels()}
+        for side, said in words.items():
+            if side == "x" and panel.get_label() == "<colorbar>":
+                continue
+            of_names = any(re.match(r"[a-z]", label.get_text()) for label in names[side])
+            if not of_names and not any(_UNIT.search(each) for each in said):
+                found.append(f"{side} of '{title or panel.get_ylabel()}'")
+    return found
+
+
+@pytest.mark.parametrize("what", MADE)
+def test_every_axis_says_what_it_shows_and_in_which_unit(what: str) -> None:
+    figures = MADE[what]()
+    assert figures
+    for name, figure in figures.items():
+        drawn = still([figure])
+        assert drawn.axes, name
+        assert nameless(drawn) == [], name
+        assert any(panel.lines or panel.patches or panel.images or panel.collections for panel in drawn.axes), name
+        explored = interactive(figure, theme="dark")
+        drawn_there = [
+            trace for trace in explored.data if trace.x is None or len(trace.x) != 1 or trace.x[0] is not None
+        ]
+        assert len(drawn_there) == len(figure.spec["data"]), "what one library draws the other draws"
+
+
+def test_an_axis_without_a_unit_would_be_found() -> None:
+    layout = base_layout(200)
+    layout["xaxis"], layout["yaxis"] = axis("time [s]"), axis("speed")
+    bare = Figure("bare", {"data": [line([0, 1], [1, 2], name="u", color="#000000")], "layout": layout}, 200, "", "")
+    drawn = still([bare])
+    assert nameless(drawn) == ["y of 'speed'"]
+
+
+def test_a_file_of_every_kind_is_written(tmp_path: Any) -> None:
+    drawn = flight(2.0).plot(channels=["phi"], theme="dark")
+    for suffix, head in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")):
+        drawn.savefig(tmp_path / f"a.{suffix}")
+        assert (tmp_path / f"a.{suffix}").read_bytes().startswith(head)
+
+
+def test_dark_figures_have_no_colour_of_the_light_ones() -> None:
+    drawn = still(list(figures_of(validation()).values())[:1], theme="dark")
+    assert drawn.get_facecolor()[:3] == pytest.approx([0x15 / 255, 0x19 / 255, 0x1E / 255])
+    explored = interactive(next(iter(figures_of(flight(2.0)).values())), theme="dark").to_json()
+    found = [color for color in DARK if f'"{color}"' in explored]
+    assert found == []
+
+
+def test_what_there_is_not_is_refused_by_name() -> None:
+    found = sp.inspect(flight(2.0))
+    with pytest.raises(SwashError, match=r"no figure of it; there are recorded\. Did you mean 'recorded'"):
+        found.plot("recorder")
+    with pytest.raises(SwashError, match="expected one of paper, light, dark"):
+        found.plot(theme="sepia")  # type: ignore[arg-type]
+    with pytest.raises(SwashError, match="expected Hz or rad/s"):
+        found.plot(frequency="rpm")  # type: ignore[arg-type]
+    with pytest.raises(SwashError, match="pip install no_such_library"):
+        library("no_such_library.part")
+
+
+def test_the_key_names_what_is_drawn() -> None:
+    explored = interactive(next(iter(figures_of(validation()).values())), title="<b>x</b>")
+    assert next(trace.name for trace in explored.data if trace.showlegend) == "identified model"
+    assert explored.layout.title.text == "‹b>x‹/b>"
+    layout = base_layout(200)
+    layout["xaxis"], layout["yaxis"] = axis("time [s]"), axis("u [m/s]")
+    figure = Figure("a", {"data": [], "layout": layout}, 200, "", "", keys=(Key("band", "rgba(0,0,0,0.15)", "band"),))
+    assert [text.get_text() for text in still([figure]).legends[0].texts] == ["band"]
