@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
@@ -173,15 +174,15 @@ def _flying(
     control: Step,
     every: int,
     waiting: int,
-    x0: Any,
-    memory: Any,
-    gains: Any,
-    tables: Any,
-    p: Any,
-    limits: Any,
-    late: Any,
-    first: Any,
-    dt: Any,
+    x0: Float[jax.Array, " states"],
+    memory: Float[jax.Array, " memory"],
+    gains: Float[jax.Array, " gains"],
+    tables: tuple[Float[jax.Array, "samples ..."], ...],
+    p: Float[jax.Array, " parameters"],
+    limits: Float[jax.Array, "2 inputs"],
+    late: Int[jax.Array, " inputs"],
+    first: Float[jax.Array, " inputs"],
+    dt: Float[jax.Array, ""],
 ) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=True)
     around, wanted, added = tables
@@ -215,7 +216,7 @@ def _flying(
     return record  # type: ignore[no-any-return]
 
 
-def _arrived(sent: Any, late: Any) -> Any:
+def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " inputs"]) -> Any:
     """Of each input the command of so many steps ago; `sent` has the newest first."""
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
@@ -225,7 +226,14 @@ _fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3))
 _fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
 
 
-def told(control: Step, equations: Equations, x: Any, inputs: Any, surroundings: Any, p: Any) -> Any:
+def told(
+    control: Step,
+    equations: Equations,
+    x: Float[jax.Array, " states"],
+    inputs: Float[jax.Array, " inputs"],
+    surroundings: Float[jax.Array, " surroundings"],
+    p: Float[jax.Array, " parameters"],
+) -> Any:
     """What a controller is given as `measured`: the state, the specific force if it feels it, the voltage."""
     if not getattr(control, "feels", False):
         return jnp.concatenate([x, surroundings[-1:]])

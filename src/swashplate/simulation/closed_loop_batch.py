@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
@@ -178,19 +179,19 @@ def _flying_many(
     keep: int,
     noisy: bool,
     waiting: int,
-    x0: Any,
-    memory: Any,
-    gains: Any,
-    around: Any,
-    wanted: Any,
-    added: Any,
-    p: Any,
-    limits: Any,
-    sigma: Any,
-    late: Any,
-    first: Any,
-    key: Any,
-    dt: Any,
+    x0: Float[jax.Array, "states vehicles"],
+    memory: Float[jax.Array, "memory vehicles"],
+    gains: Float[jax.Array, " gains"],
+    around: Float[jax.Array, "samples surroundings ..."],
+    wanted: Float[jax.Array, "samples references"],
+    added: Float[jax.Array, "samples inputs"],
+    p: Float[jax.Array, "parameters vehicles"],
+    limits: Float[jax.Array, "2 inputs ..."],
+    sigma: Float[jax.Array, ...],
+    late: Int[jax.Array, "inputs vehicles"],
+    first: Float[jax.Array, " inputs"],
+    key: jax.Array,
+    dt: Float[jax.Array, ""],
 ) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=False, xp=vector_backend())
     flying: Any = jax.vmap(
@@ -206,7 +207,7 @@ def _flying_many(
     feels = getattr(control, "feels", False)
     feeling: Any = jax.vmap(row_force(equations, xp=vector_backend()), in_axes=(1, 1, 1), out_axes=1)
 
-    def arrived(sent: Any, j: Any) -> Any:
+    def arrived(sent: Float[jax.Array, "commands inputs vehicles"], j: Int[jax.Array, ""] | int) -> Any:
         """What the actuators get in step j of a sample: the command of so many samples ago."""
         ago = jnp.clip(-((j - late) // substeps), 0, waiting)
         return jnp.take_along_axis(sent, ago[None], axis=0)[0]
@@ -228,7 +229,7 @@ def _flying_many(
             return (after, memory, inputs[None], k + 1), (x, inputs)
         sent = jnp.concatenate([inputs[None], sent[:-1]])
 
-        def step(x: Any, j: Any) -> tuple[Any, None]:
+        def step(x: Float[jax.Array, "states vehicles"], j: Int[jax.Array, ""]) -> tuple[Any, None]:
             return flying(x, jnp.concatenate([arrived(sent, j), surroundings]), p), None
 
         after, _ = jax.lax.scan(step, x, jnp.arange(substeps))

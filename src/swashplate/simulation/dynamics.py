@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.models.nesting import rebuild
@@ -44,7 +45,7 @@ def rates_function(vehicle: Vehicle) -> Rates:
     """`f(x, u, parameters, environment) -> dx/dt` on flat rows of shape (n_states,) and (n_inputs,)."""
     xp = jax_backend()
 
-    def rates(x: Any, u: Any, parameters: Any, environment: Environment) -> Any:
+    def rates(x: Float[jax.Array, "states ..."], u: Any, parameters: Any, environment: Environment) -> Any:
         return jnp.stack([jnp.asarray(rate) for rate in vehicle.rates(x, u, parameters, environment, xp)])
 
     return rates
@@ -86,7 +87,9 @@ def parameter_row(vehicle: Vehicle, environment: Environment) -> NDArray[np.floa
     return np.array([*vehicle.values(), *constants], dtype=np.float64)
 
 
-def unpack_rows(equations: Equations, w: Any, p: Any) -> tuple[Any, Any, Environment]:
+def unpack_rows(
+    equations: Equations, w: Float[jax.Array, "driving ..."], p: Float[jax.Array, "parameters ..."]
+) -> tuple[Any, Any, Environment]:
     """Inputs, named parameters and environment from a driving row `w` and a parameter row `p`."""
     n_inputs, names = len(equations.vehicle.input_names), equations.vehicle.parameter_names
     parameters = equations.vehicle.parameters(*(p[i] for i in range(len(names))))
@@ -108,7 +111,9 @@ def row_rates(equations: Equations, *, padded: bool, xp: JaxBackend | None = Non
 
     operations = xp or (vector_backend() if padded else jax_backend())
 
-    def rates(x: Any, w: Any, p: Any) -> Any:
+    def rates(
+        x: Float[jax.Array, "states ..."], w: Float[jax.Array, "driving ..."], p: Float[jax.Array, "parameters ..."]
+    ) -> Any:
         u, parameters, environment = unpack_rows(equations, w, p)
         scalars = equations.vehicle.rates(x, u, parameters, environment, operations)
         entries = [jnp.asarray(scalar, dtype=x.dtype) for scalar in scalars]
@@ -127,7 +132,9 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
     """`f(x, w, p)`: the specific force at the centre of gravity [m/s^2], three numbers; rows as in `row_rates`."""
     vehicle, operations = equations.vehicle, xp or jax_backend()
 
-    def felt(x: Any, w: Any, p: Any) -> Any:
+    def felt(
+        x: Float[jax.Array, "states ..."], w: Float[jax.Array, "driving ..."], p: Float[jax.Array, "parameters ..."]
+    ) -> Any:
         u, parameters, environment = unpack_rows(equations, w, p)
         nested = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
         commands = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))

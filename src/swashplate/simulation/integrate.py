@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
@@ -97,7 +98,16 @@ def simulate(
 
 
 @partial(jax.jit, static_argnums=0, static_argnames=("substeps", "held"))
-def trajectory(equations: Equations, x0: Any, rows: Any, p: Any, dt: Any, *, substeps: int, held: bool) -> Any:
+def trajectory(
+    equations: Equations,
+    x0: Float[jax.Array, " states"],
+    rows: Float[jax.Array, "samples driving"],
+    p: Float[jax.Array, " parameters"],
+    dt: Float[jax.Array, ""],
+    *,
+    substeps: int,
+    held: bool,
+) -> Any:
     """States at every sample, shape (n, n_states), from driving rows of shape (n, n_inputs + 4).
 
     Compiled once per vehicle equations and shape; the card's numbers are arguments.
@@ -105,10 +115,10 @@ def trajectory(equations: Equations, x0: Any, rows: Any, p: Any, dt: Any, *, sub
     rates = row_rates(equations, padded=True)
     h = dt / substeps
 
-    def sample(x: Any, ends: tuple[Any, Any]) -> tuple[Any, Any]:
+    def sample(x: Float[jax.Array, " states"], ends: tuple[Any, Any]) -> tuple[Any, Any]:
         w0, w1 = ends
 
-        def drive(i: Any, fraction: Any) -> Any:
+        def drive(i: Int[jax.Array, ""], fraction: Float[jax.Array, ""]) -> Any:
             return w0 if held else w0 + ((i + fraction) / substeps) * (w1 - w0)
 
         after = rk4_steps(lambda x, w: rates(x, w, p), x, drive, h, substeps)

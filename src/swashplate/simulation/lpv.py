@@ -21,6 +21,7 @@ from typing import Any, Literal
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
@@ -145,12 +146,17 @@ _CHUNK = 50
 """Steps per inner loop: XLA makes one function of a loop that touches little (`compile_small_loops_whole`)."""
 
 
-def _product(A: Any, x: Any) -> Any:
+def _product(A: Float[jax.Array, "rows inner"], x: Float[jax.Array, ...]) -> Any:
     """A @ x for a small matrix and a vector or matrix: a loop with a matrix product in it would not be one function."""
     return jnp.sum(A[:, :, None] * x[None], axis=1) if x.ndim == 2 else jnp.sum(A * x, axis=1)
 
 
-def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
+def _linear_step(
+    A: Float[jax.Array, "states states"],
+    c: Float[jax.Array, " states"],
+    x: Float[jax.Array, " states"],
+    dt: Float[jax.Array, ""],
+) -> Any:
     """One Runge-Kutta step of dx/dt = A x + c: the Taylor series to fourth order."""
     k = _product(A, x) + c
     total, term = x + dt * k, k
@@ -161,7 +167,15 @@ def _linear_step(A: Any, c: Any, x: Any, dt: Any) -> Any:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p: Any, dt: Any) -> Any:
+def _printed(
+    equations: Equations,
+    trimmed: tuple[Float[jax.Array, " states"], Float[jax.Array, " inputs"]],
+    begin: tuple[Float[jax.Array, " states"], Float[jax.Array, " disc"]],
+    u: Float[jax.Array, "samples inputs"],
+    row: Float[jax.Array, " surroundings"],
+    p: Float[jax.Array, " parameters"],
+    dt: Float[jax.Array, ""],
+) -> Any:
     vehicle = equations.vehicle
     x0, u0 = trimmed
     rates = row_rates(equations, padded=False)
@@ -169,7 +183,7 @@ def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p
     ten = (*PAPER_STATES, "a1", "b1")
     order = [10 + PAPER_INPUTS.index(name) for name in vehicle.input_names]
 
-    def moving(z: Any) -> Any:
+    def moving(z: Float[jax.Array, " unknowns"]) -> Any:
         """Rates of the eight states and the disc, from these ten and the controls."""
         zero = jnp.zeros(())
         # Stacks and slices only: XLA makes no function of a loop that gathers or scatters.
@@ -177,7 +191,7 @@ def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p
         found = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
         return jnp.stack([found[names.index(name)] for name in ten])
 
-    def step(carry: tuple[Any, Any], command: Any) -> tuple[Any, Any]:
+    def step(carry: tuple[Any, Any], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
         x, disc = carry
         z = jnp.concatenate([x, disc, command])
         # Sixteen directions side by side fill the processor's vectors; the last two are nothing.
@@ -199,15 +213,23 @@ def _printed(equations: Equations, trimmed: Any, begin: Any, u: Any, row: Any, p
 
 
 @partial(jax.jit, static_argnames=("stitched",))
-def _scheduled(tables: Any, x0: Any, u: Any, dt: Any, g: Any, *, stitched: bool) -> Any:
+def _scheduled(
+    tables: tuple[Float[jax.Array, "speeds ..."], ...],
+    x0: Float[jax.Array, " states"],
+    u: Float[jax.Array, "samples inputs"],
+    dt: Float[jax.Array, ""],
+    g: Float[jax.Array, ""],
+    *,
+    stitched: bool,
+) -> Any:
     speeds = tables[0]
 
-    def between(speed: Any) -> tuple[Any, ...]:
+    def between(speed: Float[jax.Array, ""]) -> tuple[Any, ...]:
         i = jnp.clip(jnp.searchsorted(speeds, speed) - 1, 0, speeds.size - 2)
         f = jnp.clip((speed - speeds[i]) / (speeds[i + 1] - speeds[i]), 0.0, 1.0)
         return tuple(table[i] + f * (table[i + 1] - table[i]) for table in tables[1:])
 
-    def rates(x: Any, command: Any) -> Any:
+    def rates(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> Any:
         xt, ut, A, B = between(x[_U])
         if not stitched:
             return A @ (x - xt) + B @ (command - ut)
@@ -216,14 +238,14 @@ def _scheduled(tables: Any, x0: Any, u: Any, dt: Any, g: Any, *, stitched: bool)
         aerodynamic = (A - linear) @ (x - xt) + B @ (command - ut)
         return aerodynamic + _kinematics(x, g) - _kinematics(xt, g)
 
-    def step(x: Any, command: Any) -> tuple[Any, Any]:
+    def step(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
         return rk4_step(rates, x, lambda _: command, dt, looped=False), x
 
     _, states = jax.lax.scan(step, jnp.asarray(x0), jnp.asarray(u))
     return states
 
 
-def _kinematics(x: Any, g: Any) -> Any:
+def _kinematics(x: Float[jax.Array, " states"], g: Float[jax.Array, ""]) -> Any:
     """Gravity, Coriolis and Euler-angle terms of the eight states (the products of inertia's rates are left linear)."""
     u, w, q, theta, v, p, phi, r = (x[i] for i in range(8))
     sf, cf, st, ct = jnp.sin(phi), jnp.cos(phi), jnp.sin(theta), jnp.cos(theta)
@@ -241,5 +263,5 @@ def _kinematics(x: Any, g: Any) -> Any:
     )
 
 
-def _kinematic_slope(x: Any, g: Any) -> Any:
+def _kinematic_slope(x: Float[jax.Array, " states"], g: Float[jax.Array, ""]) -> Any:
     return jax.jacfwd(_kinematics)(x, g)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
@@ -130,17 +131,22 @@ def _compiled(equations: Equations) -> Any:
     return jax.jit(partial(_advance, equations), donate_argnums=0)
 
 
-def _advance(equations: Equations, x: Any, row: Any, p: Any) -> tuple[Any, Any]:
+def _advance(
+    equations: Equations,
+    x: Float[jax.Array, " states"],
+    row: Float[jax.Array, " row"],
+    p: Float[jax.Array, " parameters"],
+) -> tuple[Any, Any]:
     """Steps of Runge-Kutta under held inputs: the state row, and it again with its derivative behind it."""
     rates = row_rates(equations, padded=True)
     w, h, steps = row[:-2], row[-2], row[-1].astype(jnp.int32)
 
     barrier: Any = jax.lax.optimization_barrier
 
-    def held(x: Any, w: Any) -> Any:
+    def held(x: Float[jax.Array, " states"], w: Float[jax.Array, " driving"]) -> Any:
         return rates(*barrier((x, w, p)))
 
-    def one(i: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+    def one(i: Int[jax.Array, ""], carry: tuple[Any, Any]) -> tuple[Any, Any]:
         after = rk4_step(held, carry[0], lambda _: w, h, looped=True)
         return after, held(after, w)
 

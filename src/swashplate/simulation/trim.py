@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
@@ -190,7 +191,11 @@ _CLEAR = 10.0
 """m: a height at which no skid touches."""
 
 
-def assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
+def assemble(
+    equations: Equations,
+    z: Float[jax.Array | np.ndarray, " unknowns"],
+    course: Float[jax.Array | np.ndarray, " course"],
+) -> tuple[Any, Any]:
     """State and input rows of a steady flight from the unknowns (traceable).
 
     Args:
@@ -214,7 +219,13 @@ def assemble(equations: Equations, z: Any, course: Any) -> tuple[Any, Any]:
     )
 
 
-def unrest(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple[Any, Any]:
+def unrest(
+    equations: Equations,
+    z: Float[jax.Array, " unknowns"],
+    course: Float[jax.Array, " course"],
+    row: Float[jax.Array, " surroundings"],
+    p: Float[jax.Array, " parameters"],
+) -> tuple[Any, Any]:
     """What should vanish in the steady flight that `assemble` makes, and its derivatives by the unknowns (traceable).
 
     Args:
@@ -222,7 +233,7 @@ def unrest(equations: Equations, z: Any, course: Any, row: Any, p: Any) -> tuple
         row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
     """
 
-    def rest(z: Any) -> tuple[Any, Any]:
+    def rest(z: Float[jax.Array, " unknowns"]) -> tuple[Any, Any]:
         state, inputs = assemble(equations, z, course)
         rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
         value = jnp.concatenate([rates[_ACCELERATIONS], rates[_ANGULAR_ACCELERATIONS], rates[_BODY:]])

@@ -25,7 +25,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
-from swashplate.validation.black_box import Motion
+from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.calibration import calibrate
 from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
@@ -186,7 +186,7 @@ def validate(
     )
 
 
-def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[Motion]:
+def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[FilteredMotion]:
     """The records of the fit, where it brings them."""
     if not isinstance(model, Result):
         return []

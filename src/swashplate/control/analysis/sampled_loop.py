@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
@@ -165,10 +166,18 @@ def sampled_loop(
 
 
 @partial(jax.jit, static_argnums=(0, 6), compiler_options=QUICK_TO_COMPILE)
-def _decisions(control: Step, measured: Any, memory: Any, gains: Any, reference: Any, limits: Any, n: int) -> Any:
+def _decisions(
+    control: Step,
+    measured: Float[jax.Array, " measured"],
+    memory: Float[jax.Array, " memory"],
+    gains: Float[jax.Array, " gains"],
+    reference: Float[jax.Array, " references"],
+    limits: Float[jax.Array, "2 inputs"],
+    n: int,
+) -> Any:
     """The command, and the derivatives of command and memory by (state, memory) and by the reference."""
 
-    def deciding(both: Any, reference: Any) -> tuple[Any, Any]:
+    def deciding(both: Float[jax.Array, " both"], reference: Float[jax.Array, " references"]) -> tuple[Any, Any]:
         after, command = control(both[n:], 0.0, jnp.concatenate([both[:n], measured[n:]]), reference, gains)
         return jnp.clip(command, limits[0], limits[1]), after
 

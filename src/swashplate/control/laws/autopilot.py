@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
+import jax
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.control.laws.decoupling import Decoupler, Lag, decouple, decoupler, fit_into_limits
@@ -274,17 +276,24 @@ def autopilot(
     return Autopilot(vehicle.name, vehicle.card.title, mode, numbers)
 
 
-def unpack(row: Any) -> Gains:
+def unpack(row: Float[jax.Array, " gains"]) -> Gains:
     """The gains from their row."""
     values = iter(row[i] for i in range(len(row)))
 
     def group(kind: Any) -> Any:
         return kind(*(next(values) for _ in kind._fields))
 
-    return Gains(next(values), group(HeightYawGains), group(CoaxialRotors), group(CyclicGains), group(Decoupler))
+    kinds = (HeightYawGains, CoaxialRotors, CyclicGains, Decoupler)
+    return Gains._make([next(values), *map(group, kinds)])
 
 
-def row_step(memory: Any, time: Any, measured: Any, reference: Any, gains: Any) -> tuple[Any, Any]:
+def row_step(
+    memory: Float[jax.Array, " memory"],
+    time: Float[jax.Array, ""],
+    measured: Float[jax.Array, " measured"],
+    reference: Float[jax.Array, " references"],
+    gains: Float[jax.Array, " gains"],
+) -> tuple[Any, Any]:
     """`step` on JAX rows, as `simulate_closed_loop` calls it."""
     import jax.numpy as jnp
 

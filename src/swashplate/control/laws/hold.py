@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
@@ -87,9 +89,15 @@ def hover_hold(
     return Hold(rate, np.array([0.0, 0.0, 1.0 / rate]), row, hold_step)
 
 
-def hold_step(memory: Any, time: Any, measured: Any, reference: Any, gains: Any) -> tuple[Any, Any]:
+def hold_step(
+    memory: Float[jax.Array, " memory"],
+    time: Float[jax.Array, ""],
+    measured: Float[jax.Array, " measured"],
+    reference: Float[jax.Array, " references"],
+    gains: Float[jax.Array, " gains"],
+) -> tuple[Any, Any]:
     """One step: integrals of height and heading error and the sample time in, the same and four inputs out."""
-    g = HoldGains(*(gains[i] for i in range(len(HoldGains._fields))))
+    g = HoldGains._make(gains[i] for i in range(len(HoldGains._fields)))
     gravity, lower_gain, upper_gain, lower_yaw, upper_yaw = gains[len(g) : len(g) + 5]
     trim_inputs = gains[len(g) + 5 :]
     body = RigidBody(*(measured[i] for i in range(_BODY)))

@@ -44,7 +44,7 @@ class Decoupling:
         return np.asarray(self.system.D, dtype=np.float64)
 
 
-def chosen(model: Any, names: Sequence[str], kind: str) -> list[int]:
+def chosen(model: control.StateSpace, names: Sequence[str], kind: str) -> list[int]:
     """Places of named signals in a `control.StateSpace`.
 
     Raises:
@@ -57,7 +57,7 @@ def chosen(model: Any, names: Sequence[str], kind: str) -> list[int]:
     return [labels.index(name) for name in names]
 
 
-def _square(model: Any, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Array, Array, Array]:
+def _square(model: control.StateSpace, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Array, Array, Array]:
     if len(inputs) != len(outputs):
         raise SwashError(
             f"{len(inputs)} inputs cannot decouple {len(outputs)} outputs; expected one input for each output.",
@@ -69,7 +69,9 @@ def _square(model: Any, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[
     return np.asarray(model.A), np.asarray(model.B)[:, ins], np.asarray(model.C)[outs]
 
 
-def control_matrix(model: Any, *, inputs: Sequence[str], outputs: Sequence[str]) -> tuple[Array, tuple[int, ...]]:
+def control_matrix(
+    model: control.StateSpace, *, inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[Array, tuple[int, ...]]:
     """The first derivative of each output that the inputs move, and which derivative that is (Falb and Wolovich 1967).
 
     Row i is c_i A^(r_i - 1) B with the smallest r_i that does not vanish.
@@ -104,7 +106,7 @@ def control_matrix(model: Any, *, inputs: Sequence[str], outputs: Sequence[str])
 
 
 def static_decoupling(
-    model: Any, *, inputs: Sequence[str], outputs: Sequence[str], frequency: float | None = None
+    model: control.StateSpace, *, inputs: Sequence[str], outputs: Sequence[str], frequency: float | None = None
 ) -> Decoupling:
     """A constant matrix of input mixing.
 
@@ -144,7 +146,7 @@ def _static(mixing: Array, inputs: Sequence[str], outputs: Sequence[str]) -> Dec
 
 
 def dynamic_decoupling(
-    model: Any,
+    model: control.StateSpace,
     *,
     inputs: Sequence[str],
     outputs: Sequence[str],
@@ -204,7 +206,12 @@ def dynamic_decoupling(
 
 
 def coupling(
-    model: Any, frequencies: ArrayLike, *, inputs: Sequence[str], outputs: Sequence[str], by: Decoupling | None = None
+    model: control.StateSpace,
+    frequencies: ArrayLike,
+    *,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    by: Decoupling | None = None,
 ) -> Array:
     """Off-axis over on-axis response, |G_ik / G_kk|, shape (n_outputs, n_axes, n_frequencies); the diagonal is one.
 

@@ -5,10 +5,13 @@ The law cancels what speed does across the motion (eqs 19, 20) and so needs a ve
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import jax
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.control.laws.autopilot import Autopilot, Memory, Reference, step, unpack
@@ -28,7 +31,7 @@ class ObservedStep(SensedStep):
 
     autopilot_gains: int = 0
 
-    def law(self, gains: Any) -> Law | None:
+    def law(self, gains: Float[jax.Array, " gains"]) -> Law | None:
         numbers = unpack(gains[gains.shape[0] - self.autopilot_gains :])
 
         def decided(
@@ -85,7 +88,7 @@ class ObservedAutopilot:
     def memory(self) -> Array:
         return self.memories([self.observer.seed])[:, 0]
 
-    def memories(self, seeds: Any) -> Array:
+    def memories(self, seeds: Iterable[int]) -> Array:
         """Starts with other noise and biases each, shape (memory, number of seeds)."""
         found = self.observer.memories(seeds)
         end = self.observer.inner_memory.size

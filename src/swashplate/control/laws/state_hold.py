@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
@@ -102,7 +104,14 @@ _STEPS: dict[tuple[int, int], Step] = {}
 
 
 def state_hold_step(
-    memory: Any, time: Any, measured: Any, reference: Any, gains: Any, *, inputs: int, states: int
+    memory: Float[jax.Array, " memory"],
+    time: Float[jax.Array, ""],
+    measured: Float[jax.Array, " measured"],
+    reference: Float[jax.Array, " references"],
+    gains: Float[jax.Array, " gains"],
+    *,
+    inputs: int,
+    states: int,
 ) -> tuple[Any, Any]:
     """Inputs for a measured state row: the trim's, less the gains times the deviation in heading axes."""
     K = gains[: inputs * states].reshape(inputs, states)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -171,7 +170,9 @@ def _channels(plan: ObserverPlan, model: SampledObserverModel) -> list[tuple[str
     ]
 
 
-def _closed(plant: Any, compensator: Any, noisy: bool) -> tuple[Array, tuple[Array, Array]]:
+def _closed(
+    plant: tuple[Array, Array, Array], compensator: tuple[Array, Array, Array, Array], noisy: bool
+) -> tuple[Array, tuple[Array, Array]]:
     """The closed loop's matrix, and how process noise (on the plant) and measurement noise enter it."""
     A, B, H = plant
     Ac, Bc, Cc, Dc = compensator

@@ -7,7 +7,7 @@ simulation's matter: a controller believes in delays, and an aircraft has its ow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
@@ -15,6 +15,8 @@ from typing import Any, ClassVar, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
@@ -135,7 +137,7 @@ def carried_size(plan: ObserverPlan) -> int:
     return N + rows * rows + (max(plan.delays) + 1) * plan.inputs + counts + LAW_MEMORY
 
 
-def carried_from(plan: ObserverPlan, row: Any, M: JaxMatrices) -> Carried:
+def carried_from(plan: ObserverPlan, row: Float[jax.Array, "memory ..."], M: JaxMatrices) -> Carried:
     """What is carried, from a flat row."""
     N, rows, counts = sizes(plan)
     m, depth = plan.inputs, max(plan.delays) + 1
@@ -169,7 +171,7 @@ def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
     return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
 
 
-def numbers_from(plan: ObserverPlan, speeds: int, row: Any) -> tuple[Numbers, Feedback]:
+def numbers_from(plan: ObserverPlan, speeds: int, row: Float[jax.Array, " numbers"]) -> tuple[Numbers, Feedback]:
     parts, place = [], 0
     for shape in _shapes(plan, speeds):
         size = int(np.prod(shape))
@@ -203,7 +205,14 @@ class SensedStep:
         """Vehicles of a batch whose covariances stay in a core's cache."""
         return _BLOCK if self.plan.sensors and not self.plan.period else _BLOCK_STEADY
 
-    def __call__(self, memory: Any, time: Any, measured: Any, reference: Any, gains: Any) -> tuple[Any, Any]:
+    def __call__(
+        self,
+        memory: Float[jax.Array, "memory ..."],
+        time: Float[jax.Array, ""],
+        measured: Float[jax.Array, "measured ..."],
+        reference: Float[jax.Array, " references"],
+        gains: Float[jax.Array, " gains"],
+    ) -> tuple[Any, Any]:
         plan, M = self.plan, JaxMatrices() if measured.ndim == 1 else StackMatrices(measured.shape[1])
         inner = carried_size(plan)
         numbers, feedback = numbers_from(plan, self.speeds, gains)
@@ -217,11 +226,18 @@ class SensedStep:
         after, commands = lqg_step(plan, numbers, feedback, carried, column, voltage, wanted, M, self.law(gains))
         return jnp.concatenate([carried_row(after, M), own]), M.row(commands)
 
-    def law(self, gains: Any) -> Law | None:
+    def law(self, gains: Float[jax.Array, " gains"]) -> Law | None:
         """The feedback, where it is not the linear-quadratic one."""
         return None
 
-    def _read(self, own: Any, x: Any, force: Any, numbers: Numbers, M: JaxMatrices) -> tuple[Any, Any]:
+    def _read(
+        self,
+        own: Float[jax.Array, "own ..."],
+        x: Float[jax.Array, "body ..."],
+        force: Float[jax.Array, "3 ..."],
+        numbers: Numbers,
+        M: JaxMatrices,
+    ) -> tuple[Any, Any]:
         """Readings that arrive now, and what the sensors carry: biases, seed, count, the last readings."""
         plan = self.plan
         nb, channels = len(plan.biases), len(plan.channels)
@@ -230,7 +246,7 @@ class SensedStep:
         now = true_readings(plan, x, force, bias, M)
         queue = jnp.where(count < 0.5, jnp.broadcast_to(now, queue.shape), jnp.concatenate([now[None], queue[:-1]]))
 
-        def drawing(seed: Any, count: Any) -> Any:
+        def drawing(seed: Int[jax.Array, ""], count: Int[jax.Array, ""]) -> Any:
             return jax.random.normal(jax.random.fold_in(jax.random.key(seed), count), (channels + nb,))
 
         each: Any = drawing if own.ndim == 1 else jax.vmap(drawing, out_axes=1)
@@ -248,7 +264,13 @@ class SensedStep:
         return noisy, jnp.concatenate([bias, jnp.stack([seed, count + 1.0]), queue.reshape(-1, *own.shape[1:])])
 
 
-def true_readings(plan: ObserverPlan, x: Any, force: Any, bias: Any, M: JaxMatrices) -> Any:
+def true_readings(
+    plan: ObserverPlan,
+    x: Float[jax.Array, "states ..."],
+    force: Float[jax.Array, "3 ..."],
+    bias: Float[jax.Array, "biases ..."],
+    M: JaxMatrices,
+) -> Any:
     """All channels of a true state row, without noise."""
     body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
     named = {name: bias[i] for i, name in enumerate(plan.biases)}
@@ -342,7 +364,7 @@ class Lqg:
         depth = SensedStep(plan, 1).depth
         return np.concatenate([bias, [float(seed), 0.0], np.zeros(depth * len(plan.channels))])
 
-    def memories(self, seeds: Any) -> Array:
+    def memories(self, seeds: Iterable[int]) -> Array:
         """Starts with other noise and biases each, shape (memory, number of seeds)."""
         inner = self.inner_memory
         return np.stack([np.concatenate([inner, self._sensor_memory(int(seed))]) for seed in seeds], axis=1)
@@ -367,13 +389,15 @@ class Lqg:
         return replace(self, start=start, seed=self.seed if seed is None else seed)
 
 
-def _stored(plan: ObserverPlan, numbers: Numbers, mean: Any, w: Any) -> Any:
+def _stored(plan: ObserverPlan, numbers: Numbers, mean: ArrayLike, w: ArrayLike) -> Any:
     made = Numbers(*(None if part is None else jnp.asarray(part) for part in numbers))
     return _stored_compiled(plan, made, jnp.asarray(mean), jnp.asarray(w))
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _stored_compiled(plan: ObserverPlan, numbers: Numbers, mean: Any, w: Any) -> Any:
+def _stored_compiled(
+    plan: ObserverPlan, numbers: Numbers, mean: Float[jax.Array, "n 1"], w: Float[jax.Array, " driving"]
+) -> Any:
     M = JaxMatrices()
     flags = M.column([*M.scalars(w), *[1.0] * len(plan.sensors)])
     return M.linearised(lambda e, w: observer.keeping(plan, numbers, e, w, M.xp), mean, flags)

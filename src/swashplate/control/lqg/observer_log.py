@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.ndimage
+from jaxtyping import Float
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
@@ -172,20 +173,20 @@ def _along(
     plan: ObserverPlan,
     steps: int,
     numbers: Numbers,
-    mean: Any,
-    covariance: Any,
-    pose: Any,
-    driving: Any,
-    body: Any,
+    mean: Float[jax.Array, "n 1"],
+    covariance: Float[jax.Array, "n n"],
+    pose: Float[jax.Array, "samples channels"],
+    driving: Float[jax.Array, "samples driving"],
+    body: Float[jax.Array, "samples body"],
 ) -> Any:
     M = JaxMatrices()
     n = plan.n
     p = slice(plan.equations.vehicle.index("p"), plan.equations.vehicle.index("r") + 1)
 
-    def moved(e: Any, w: Any, count: int) -> Any:
+    def moved(e: Float[jax.Array, "n 1"], w: Float[jax.Array, "driving 1"], count: int) -> Any:
         """The state `count` samples later."""
 
-        def rates(e: Any, w: Any) -> Any:
+        def rates(e: Float[jax.Array, "n 1"], w: Float[jax.Array, "driving 1"]) -> Any:
             return M.value(lambda e, w: observer.moving(plan, numbers, e, w, M.xp), e, w)
 
         return rk4_steps(rates, e, lambda *_: w, plan.dt, count)

@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.control.lqg.constant_gain import steady_sigmas
@@ -161,23 +162,25 @@ def _fly(
     equations: Equations,
     control: SensedStep,
     substeps: int,
-    x0: Any,
-    first: Any,
-    memories: Any,
-    gains: Any,
-    seeds: Any,
-    around: Any,
-    wanted: Any,
-    p: Any,
-    spread: Any,
-    promised: Any,
+    x0: Float[jax.Array, " states"],
+    first: Float[jax.Array, " inputs"],
+    memories: Float[jax.Array, "memory flights"],
+    gains: Float[jax.Array, " gains"],
+    seeds: Int[jax.Array, " flights"],
+    around: Float[jax.Array, "samples surroundings flights"],
+    wanted: Float[jax.Array, " references"],
+    p: Float[jax.Array, " parameters"],
+    spread: Float[jax.Array, " states"],
+    promised: Float[jax.Array, " states"],
 ) -> Any:
     rates = row_rates(equations, padded=False)
     n, N, dt = x0.shape[0], len(control.plan.names), control.plan.dt
     late = jnp.asarray(control.plan.delays)
     before = jnp.broadcast_to(first, (max(control.plan.delays) + 1, first.shape[0]))
 
-    def one(memory: Any, seed: Any, winds: Any) -> Any:
+    def one(
+        memory: Float[jax.Array, " memory"], seed: Int[jax.Array, ""], winds: Float[jax.Array, "samples surroundings"]
+    ) -> Any:
         own = jax.random.fold_in(jax.random.key(seed), 1_000_003)
 
         def sample(carry: Any, now: Any) -> Any:

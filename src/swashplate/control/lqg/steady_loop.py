@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.control.analysis.sampled_loop import SampledLoop
 from swashplate.control.lqg.controller import Lqg
@@ -246,7 +246,7 @@ def _compensator(
     return A, B, np.hstack([Cu, -Kq]), Du
 
 
-def response(z: Any, A: Array, B: Array, C: Array, D: Array | None) -> Any:
+def response(z: Complex, A: Array, B: Array, C: Array, D: Array | None) -> Any:
     """C (z - A)^-1 B + D over the frequencies, by the Schur form: one decomposition for all of them."""
     T, U = scipy.linalg.schur(A, output="complex")
     right, left = U.conj().T @ B, C @ U

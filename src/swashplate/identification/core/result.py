@@ -314,12 +314,14 @@ class Result(Shown, Generic[Model, Details]):
     def columns(self) -> list[tuple[str, list[str]]]:
         """Headings and cells of the table of estimates."""
         every = self.estimates
+        # The targets for fits to responses (20 %, 10 %) are set for the plain bound.
+        sigma = {e.name: e.sigma if self.costs else e.best_sigma for e in every}
         return [
             ("parameter", [e.name for e in every]),
             ("start", [f"{e.start:.5g}" for e in every]),
             ("value", [f"{e.value:.5g}" for e in every]),
-            ("sigma", [_number(e.best_sigma) if not e.fixed else "" for e in every]),
-            ("sigma %", [_percent(e.best_sigma, e.value) if e.free else "" for e in every]),
+            ("sigma", [_number(sigma[e.name]) if not e.fixed else "" for e in every]),
+            ("sigma %", [_percent(sigma[e.name], e.value) if e.free else "" for e in every]),
             ("I %", [percent(e.insensitivity_percent).strip() if np.isfinite(e.insensitivity) else "" for e in every]),
             ("unit", [e.unit for e in every]),
             ("remarks", [remark(e) for e in every]),

@@ -13,7 +13,7 @@ _GAP = (10.0, 0.5)
 """Usual steps, and seconds: a step longer than both is a gap. The rule of `flights.maneuvers.sweeps`."""
 
 
-class Trace(NamedTuple):
+class BinnedTrace(NamedTuple):
     """What is drawn: times [s] and values, NaN where the line is broken."""
 
     time: Array
@@ -67,7 +67,9 @@ def extremes(values: Array, bins: int) -> NDArray[np.int64]:
     return np.unique(np.concatenate(found))
 
 
-def trace(time: Array, values: Array, *, start: float, stop: float, bins: int, breaks: NDArray[np.int64]) -> Trace:
+def trace(
+    time: Array, values: Array, *, start: float, stop: float, bins: int, breaks: NDArray[np.int64]
+) -> BinnedTrace:
     """A channel between two times, thinned where it has more than two samples a bin, broken at its gaps.
 
     Args:
@@ -87,4 +89,4 @@ def trace(time: Array, values: Array, *, start: float, stop: float, bins: int, b
     places = np.searchsorted(chosen, here)
     inner = (places > 0) & (places < chosen.size)
     places, middle = places[inner], 0.5 * (time[here[inner] - 1] + time[here[inner]])
-    return Trace(np.insert(shown_time, places, middle), np.insert(shown, places, np.nan), thinned)
+    return BinnedTrace(np.insert(shown_time, places, middle), np.insert(shown, places, np.nan), thinned)
