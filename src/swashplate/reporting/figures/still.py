@@ -82,8 +82,9 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
         )
         heights = np.add(shares, legends)
         apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
-        several = made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0] if apart else ()
-        parts: Sequence[Any] = several if apart else (made,)
+        parts: Sequence[Any] = (made,)
+        if apart:
+            parts = list(made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
         for part, figure in zip(parts, figures, strict=True):
             part.set_facecolor(ground)
             _Sheet(part, coloured(in_unit(figure.spec, frequency), look), look).draw(figure.keys)
