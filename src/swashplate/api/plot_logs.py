@@ -108,7 +108,7 @@ def plot_logs(
     given = (flights,) if isinstance(flights, Flight) else tuple(flights)
     if path is not None and Path(path).suffix.lower() not in SUFFIXES:
         raise SwashError(
-            f"ends in '{Path(path).suffix}', expected one of {', '.join(SUFFIXES)}.", where=path, channel="-o"
+            f"ends in '{Path(path).suffix}', expected one of {', '.join(SUFFIXES)}.", where=Path(path), channel="-o"
         )
     known = any(name in flight for flight in given for name in channels or ())
     for k, flight in enumerate(given):

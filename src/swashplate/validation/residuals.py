@@ -150,19 +150,20 @@ def residuals(
         )
     names = [o.output for o in found.outputs]
     pairs = len(names) * len(found.inputs)
-    each = float(ndtri(1.0 - 0.5 * _LEVEL))
+    single = float(ndtri(1.0 - 0.5 * _LEVEL))
     all_together = float(ndtri(1.0 - 0.5 * _LEVEL / (pairs * (lags + 1))))
     left = {name: [_level(t.flight[:, k] - t.model[:, k]) for t in found.traces] for k, name in enumerate(names)}
     moved = {name: [_level(t.inputs[:, k]) for t in found.traces] for k, name in enumerate(found.inputs)}
-    own = {name: _correlation(rows, rows, lags) for name, rows in (left | moved).items()}
-    times = dt * np.arange(-lags, lags + 1)
+    own, theirs = ({n: _correlation(rows, rows, lags) for n, rows in each.items()} for each in (left, moved))
+    times = np.asarray(dt * np.arange(-lags, lags + 1), dtype=np.float64)
     cross = []
     for output in names:
         for name in found.inputs:
-            spread = float(np.sqrt(max(_LEAST_SPREAD, own[output] @ own[name]) / samples))
+            pooled = max(_LEAST_SPREAD, float(own[output] @ theirs[name]))
+            spread = float(np.sqrt(pooled / samples))
             values = _correlation(left[output], moved[name], lags)
-            cross.append(Correlation(output, name, times, values, each * spread, all_together * spread))
-    bound = each / float(np.sqrt(samples))
+            cross.append(Correlation(output, name, times, values, single * spread, all_together * spread))
+    bound = single / float(np.sqrt(samples))
     auto = tuple(Correlation(n, "", times[lags:], own[n][lags:], bound, bound) for n in names)
     return Residuals(found, auto, tuple(cross), samples)
 

@@ -133,8 +133,8 @@ class FrequencyResponse:
         import control
 
         data = np.moveaxis(self.response, 0, -1)
-        name = ", ".join(self.sources) or "responses"  # python-control's plots fail without one
-        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name=name)
+        # python-control's plots fail on responses without a name.
+        return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name="responses")
 
     @staticmethod
     def from_control(frd: Any) -> FrequencyResponse:

@@ -82,7 +82,7 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
         )
         heights = np.add(shares, legends)
         apart = len(shares) > 1 or (bool(title) and look != "paper")  # a title and a legend share no place
-        parts: list[Any] = [made]
+        parts: Sequence[Any] = (made,)
         if apart:
             parts = list(made.subfigures(len(figures), 1, squeeze=False, height_ratios=heights)[:, 0])
         for part, figure in zip(parts, figures, strict=True):

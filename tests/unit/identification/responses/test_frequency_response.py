@@ -272,6 +272,7 @@ def test_file_and_control_round_trip(tmp_path: Path) -> None:
         found.sources,
     )
     frd = found.to_control()
+    assert frd.name == "responses"
     again = FrequencyResponse.from_control(frd)
     np.testing.assert_array_equal(again.response, found.response)
     assert again.outputs == ("out",)
