@@ -59,8 +59,8 @@ class Contact:
         side = "above" if self.above else "below"
         return (
             f"CONTACT? {self.record}, {self.feature} {side} {self.limit:.2f} {unit} ({100.0 * self.share:.0f} % "
-            f"of it): pushed {self.axis} by {self.push:+.2f} m/s^2, chance {self.chance:.3f}. A tether, a cable or a touch, or "
-            "equations that are wrong just there. Nothing was left out."
+            f"of it): pushed {self.axis} by {self.push:+.2f} m/s^2, chance {self.chance:.3f}. A tether, a cable "
+            "or a touch, or equations that are wrong just there. Nothing was left out."
         )
 
     def touches(self, start: Array, horizon: float) -> NDArray[np.bool_]:
