@@ -107,6 +107,8 @@ def validate(
         if validation.floors:
             typer.echo("\nWhat the model's scores stand beside")
             screen.print(floors_table(validation))
+        for one in validation.contacts:
+            typer.echo(f"\n{one.words}")
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

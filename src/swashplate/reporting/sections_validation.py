@@ -59,11 +59,13 @@ def prediction(validation: Validation) -> Section:
     ]
     for i, source in enumerate(sorted(names)):
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
+    blocks += [Text(one.words, tone="caution") for one in validation.contacts]
     blocks += _told(validation)
     blocks.append(fit_over_horizon(validation))
     for horizon in horizons(validation):
         blocks.append(_table(validation, horizon))
         blocks += _beside(validation, horizon)
+        blocks += _without_contact(validation, horizon)
     return Section("prediction", "Prediction", tuple(blocks))
 
 
@@ -168,6 +170,27 @@ def _table(validation: Validation, horizon: float) -> Table:
         note="Model: the identified one. Card: the published one. Hold: the last value stays. Rates: constant rates. "
         "Bold: the best of the row by each measure. Fit: 100 (1 − rms error / rms change since the start). "
         "Theil: 0 perfect, 1 no better than the opposite; holding the last value always has 1.",
+    )
+
+
+def _without_contact(validation: Validation, horizon: float) -> tuple[Block, ...]:
+    """The model's scores with and without the starts that a proposed mask touches."""
+    rows = {s.channel: s for s in validation.without_contact if s.horizon == horizon}
+    if not rows:
+        return ()
+    table = []
+    for name in [n for n in JUDGED if n in rows]:
+        whole = validation.score(name, horizon)
+        counts = (whole.starts, rows[name].starts)
+        cells = [_cell(percent(s.fit), False) for s in (whole, rows[name])]
+        table.append((Cell(name), *cells, *(_cell(str(count), False) for count in counts)))
+    return (
+        Table(
+            f"With and without the suspected contact, {horizon:g} s ahead",
+            ("channel", "fit [%]", "without [%]", "starts", "starts without"),
+            tuple(table),
+            note="The mask is a proposal; every other figure has all starts.",
+        ),
     )
 
 

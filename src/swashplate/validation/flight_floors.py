@@ -21,6 +21,7 @@ _FEWEST = 2  # starts of a record below which nothing is told of it
 class ScoredRecord(NamedTuple):
     """A record with its starts at one horizon, and the standard deviations (12,) that the filter promises there."""
 
+    name: str
     motion: FilteredMotion
     promised: Array
 

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import (
+    N_DISTURBANCES,
+    FilterState,
+    StochasticModel,
+    commands,
+    stochastic_model,
+)
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, predicted_covariance
 from swashplate.identification.core.records import Record
@@ -36,6 +42,8 @@ class Predictions:
         states: predicted body states, shape (s, longest horizon in samples, 12), the first one sample after the start.
         filtered: the observer's body states at every sample, shape (n, 12).
         innovations: one-step prediction errors (n, outputs), and `covariance` their model covariance.
+        disturbances: what the observer saw act beside the equations, gusts and drifts together, at every sample (n, 6):
+            accelerations of u, v, w [m/s^2] and p, q, r [rad/s^2].
     """
 
     starts: NDArray[np.intp]
@@ -43,6 +51,7 @@ class Predictions:
     filtered: Array
     innovations: Array
     covariance: Array
+    disturbances: Array
 
 
 def predict(
@@ -68,7 +77,7 @@ def predict(
     inputs, voltage = (
         np.concatenate([rows, np.repeat(rows[-1:], ahead, axis=0)]) for rows in (record.inputs, record.voltage)
     )
-    innovations, covariance, filtered, states = _predict(
+    innovations, covariance, filtered, disturbances, states = _predict(
         model,
         ahead,
         record.outputs,
@@ -86,6 +95,7 @@ def predict(
         filtered=np.asarray(filtered),
         innovations=np.asarray(innovations),
         covariance=np.asarray(covariance),
+        disturbances=np.asarray(disturbances),
     )
 
 
@@ -117,7 +127,7 @@ def _predict(
     noise: Noise,
     nuisance: Nuisance,
     starts: Any,
-) -> tuple[Any, Any, Any, Any]:
+) -> tuple[Any, Any, Any, Any, Any]:
     n = y.shape[0]
     innovations, covariance, filtered = filter_record(
         model,
@@ -144,7 +154,8 @@ def _predict(
 
         return jax.lax.scan(sample, jax.tree.map(lambda rows: rows[start], filtered), start + jnp.arange(ahead))[1]
 
-    return innovations, covariance, filtered.x[:, kept], jax.vmap(run)(starts)
+    acting = filtered.gust[:, :N_DISTURBANCES] + filtered.drift
+    return innovations, covariance, filtered.x[:, kept], acting, jax.vmap(run)(starts)
 
 
 def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:

@@ -27,6 +27,7 @@ from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
 from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.calibration import calibrate
+from swashplate.validation.contact import Contact, contact
 from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
@@ -108,6 +109,7 @@ def validate(
         )
     parts: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
     scored: dict[float, list[ScoredRecord]] = {}
+    contacts: list[Contact | None] = []
     judged: list[AxisExcitation] = []
     measured: list[Array] = []
     examples: list[Example] = []
@@ -140,9 +142,13 @@ def validate(
                 for name, part in made.items():
                     parts.setdefault((name, horizon), []).append(part)
                 promised = sigma[round(horizon / piece.dt) - 1]
-                scored.setdefault(horizon, []).append(ScoredRecord(motion_of(piece, truth, starts), promised))
+                scored.setdefault(horizon, []).append(
+                    ScoredRecord(piece.name, motion_of(piece, truth, starts), promised)
+                )
         examples.extend(_examples(piece, own, sigma[: round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
+        pushed = contact(piece.name, piece.time[settled:], truth[settled:], own.predictions.disturbances[settled:])
+        contacts.append(pushed)
         checks.append((own.predictions.innovations[settled:], own.predictions.covariance))
         likelihoods.append(
             {
@@ -183,7 +189,28 @@ def validate(
         },
         calibrated=tuple(calibrated),
         floors=beside,
+        contacts=tuple(one for one in contacts if one is not None),
+        without_contact=_scores(_without_contact(parts, scored, contacts)),
     )
+
+
+def _without_contact(
+    parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array]]],
+    scored: Mapping[float, Sequence[ScoredRecord]],
+    contacts: Sequence[Contact | None],
+) -> dict[tuple[str, float], list[tuple[Array, Array, Array]]]:
+    """The model's predictions that no proposed mask touches; nothing where none is proposed."""
+    if not any(contacts):
+        return {}
+    made: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
+    for horizon, records_at in scored.items():
+        for record, rows in zip(records_at, parts["model", horizon], strict=True):
+            start = record.motion.time[record.motion.starts]
+            mask = next((c for c in contacts if c is not None and c.record == record.name), None)
+            free = ~mask.touches(start, horizon) if mask else np.ones(start.shape, dtype=bool)
+            predicted, truth, first = rows
+            made.setdefault(("model", horizon), []).append((predicted[free], truth[free], first[free]))
+    return made
 
 
 def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[FilteredMotion]:

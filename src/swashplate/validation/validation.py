@@ -15,6 +15,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
+from swashplate.validation.contact import Contact
 from swashplate.validation.floors import ROWS, Floor
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
@@ -106,6 +107,8 @@ class Validation(Shown):
         settings: observer, horizons.
         calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
         floors: what the model's scores stand beside, per channel and horizon.
+        contacts: proposed masks; none was applied.
+        without_contact: the model's scores from starts that no mask touches.
     """
 
     vehicle: Vehicle
@@ -122,6 +125,8 @@ class Validation(Shown):
     settings: Mapping[str, Any]
     calibrated: tuple[Nuisance, ...] = ()
     floors: tuple[Floor, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    without_contact: tuple[Score, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -142,6 +147,8 @@ class Validation(Shown):
             "vehicle": self.vehicle.name,
             "scores": [vars(score) for score in self.scores],
             "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
+            "contacts": [vars(one) | {"words": one.words} for one in self.contacts],
+            "scores_without_contact": [vars(score) for score in self.without_contact],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -169,8 +176,14 @@ class Validation(Shown):
             for predictor in PREDICTORS:
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
+            masked = {s.channel: s.fit for s in self.without_contact if s.horizon == horizon}
+            if masked:
+                row = (masked.get(channel, float("nan")) for channel in channels)
+                lines.append(f"  {'no contact':16s}" + "".join(f"{value:9.1f}" for value in row))
             beside = {f.channel: f for f in self.floors if f.horizon == horizon}
             for words, cell in ROWS if beside else ():
                 row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
                 lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
-        return "\n".join([*lines, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])
+        return "\n".join(
+            [*lines, *(c.words for c in self.contacts), *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)]
+        )
