@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from typer.testing import CliRunner
 
+from swashplate.filtering.disturbances import SEPARATE
+
 from .case import Values, apart, flat, named, thinned
 
 
@@ -42,7 +44,8 @@ def of_fit(fit: Any) -> Values:
     for k, e in enumerate(fit.constants):
         found |= {f"{k}.{e.name}": e.value, f"{k}.{e.name}.sigma": e.sigma}
     if fit.noise is not None:
-        found |= apart("noise", fit.noise)
+        told = [n for n in fit.noise._fields if n not in SEPARATE or getattr(fit.noise, n) > 0.0]  # others are shared
+        found |= apart("noise", (getattr(fit.noise, name) for name in told))
     found["directions"] = [d.sigma for d in fit.directions]
     for k, a in enumerate(fit.details.excitation):
         found |= {f"{k}.{a.axis}.identifiable": bool(a.identifiable)}

@@ -140,10 +140,11 @@ def balance(start: Vehicle, found: Vehicle, trims: Mapping[str, float]) -> tuple
         return yaw, (before.k_thrust_upper * high + before.k_thrust_lower * low) / after.mass - LABORATORY_GRAVITY
 
     (yaw, climb), (yaw_trimmed, climb_trimmed) = left(False), left(True)
+    yaw_left, climb_left = round(yaw_trimmed, 1) + 0.0, round(climb_trimmed, 2) + 0.0  # no minus before a zero
     factors = ", ".join(f"{name} {100.0 * share:+.1f} %" for name, share in moved.items() if share)
     return (
         f"balance: the numbers before the fit leave {yaw:+.1f} rad/s^2 of yaw and {climb:+.2f} m/s^2 of climb in the "
-        f"hover that was flown, {yaw_trimmed:+.1f} and {climb_trimmed:+.2f} with the motor trims found "
+        f"hover that was flown, {yaw_left:+.1f} and {climb_left:+.2f} with the motor trims found "
         f"({upper:+.4f} upper, {lower:+.4f} lower); the factors make up for the rest ({factors or 'none moved'}). One "
         "hover cannot tell a trim from a factor: the priors do.",
     )

@@ -27,8 +27,14 @@ _GROUPS: dict[str, Any] = {
     "cyclic": CyclicGains,
     "law": Decoupler,
 }
+_ADDED = ("linkage_asymmetry", "phase_asymmetry")
+"""Numbers that files of earlier versions do not have."""
 _NUMBERS: dict[str, Any] = {
-    name: msgspec.defstruct(name, [(field, float) for field in kind._fields], forbid_unknown_fields=True)
+    name: msgspec.defstruct(
+        name,
+        [(field, float, kind._field_defaults[field]) if field in _ADDED else (field, float) for field in kind._fields],
+        forbid_unknown_fields=True,
+    )
     for name, kind in _GROUPS.items()
 }
 _FILE: Any = msgspec.defstruct(
