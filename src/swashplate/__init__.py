@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from swashplate.api.open_logs import open_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
+    from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
     from swashplate.control.laws.state_hold import state_hold
@@ -160,6 +161,7 @@ __all__ = [
     "open_logs",
     "plan_bench",
     "plan_maneuver",
+    "rate_loop_steps",
     "read",
     "read_control",
     "replay",
