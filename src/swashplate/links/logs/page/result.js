@@ -17,8 +17,8 @@ const overshoot = (axis) => make("tr", {}, make("td", {}, "overshoot of a step")
 function gains(home, found) {
   for (const axis of found.gains) {
     const head = make("tr", {}, make("th", {}, "parameter"), make("th", { class: "number" }, "flown"), make("th", { class: "number" }, "suggested"));
-    const number = (value) => make("td", { class: "number" }, value === null ? "–" : (+value).toFixed(4));
-    const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : (+suggested).toFixed(4)))));
+    const number = (value) => make("td", { class: "number" }, value === null ? "–" : String(+(+value).toPrecision(4)));
+    const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
     const margin = (name, key, unit) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key], unit)) : "–")));
     home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
       margin("phase margin", "phase_margin", "°"), margin("gain margin", "gain_margin", "dB"), margin("crossover", "crossover", "rad/s"), margin("largest sensitivity", "peak", ""), overshoot(axis))));
