@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
+    from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
     from swashplate.control.analysis.stability import loop_margins, loop_modes
     from swashplate.control.laws.autopilot import autopilot
     from swashplate.control.laws.hold import hover_hold
@@ -177,6 +178,7 @@ __all__ = [
     "plan_bench",
     "plan_maneuver",
     "plot_logs",
+    "rate_loop_steps",
     "read",
     "read_control",
     "reconstruct",

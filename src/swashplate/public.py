@@ -45,6 +45,7 @@ _LIGHT: Mapping[str, str] = {
     "merge": "swashplate.flights.conditioning.synchronise:merge",
     "new_card": "swashplate.models.conventional.new_card:new_card",
     "plan_maneuver": "swashplate.flights.maneuvers.planned:plan_maneuver",
+    "rate_loop_steps": "swashplate.control.analysis.rate_loop_steps:rate_loop_steps",
     "read": "swashplate.flights.readers.read:read",
     "open_logs": "swashplate.api.open_logs:open_logs",
     "plot_logs": "swashplate.api.plot_logs:plot_logs",

@@ -71,6 +71,7 @@ class Visit:
             self.of("Promise.all([...swash.state.logs.keys()].map(log => swash.post('/close', {log})))")
             self.page.reload()
             self.until("document.documentElement.dataset.ready")
+            self.said.clear()
 
     def of(self, expression: str) -> Any:
         return self.page.evaluate(expression)
@@ -107,8 +108,7 @@ class Visit:
         assert len(errors) == complaints, errors
         assert all(url.startswith((self.url, "data:")) for url in self.asked)
         assert self.of("document.documentElement.scrollWidth") <= self.width
-        for log in self.of("[...swash.state.logs.keys()]"):
-            self.page.click(f"#logs [data-log='{log}'] button[aria-label^=close]") if self.width > 900 else None
+        self.of("Promise.all([...swash.state.logs.keys()].map(log => swash.post('/close', {log})))")
         self.page.close()
 
 
@@ -240,3 +240,44 @@ def test_a_real_log_has_its_sweep_modes_and_parameters(browser: Any, shared_data
         visit.page.click("#play")
         visit.until(f"document.getElementById('clock').textContent !== '{first}'")
         visit.close()
+
+
+def test_from_a_dropped_log_to_gains_in_two_clicks(
+    browser: Any, address: str, shared_data: Path, tmp_path: Path
+) -> None:
+    visit = Visit(browser, address, "telephone")
+    visit.page.evaluate(
+        "window.clicks = 0; addEventListener('click', (event) => event.isTrusted && (window.clicks += 1), true)"
+    )
+    visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
+    drawn(visit)
+    visit.page.locator("#sweeps button").click()
+    visit.until("document.querySelector('#identify progress')")
+    visit.until("document.getElementById('identify').dataset.state === 'done'", seconds=240.0)
+    assert visit.of("window.clicks") <= 4
+    told = visit.text("#identify")
+    assert "ATC_RAT_RLL_P" in told
+    assert "NO verification" in told, "this log holds nothing but its sweep"
+    titles = visit.of("[...document.querySelectorAll('.curves strong')].map(e => e.textContent)")
+    assert titles[:2] == ["Step of the target", "Disturbance: 0.1 of the command"]
+    assert "Coherence, from 0.6 on it counts" in titles
+    labels = visit.of("document.querySelectorAll('.curves canvas').length")
+    assert labels == len(titles)
+    with visit.page.expect_download() as download:
+        visit.page.click("a[href='/download/gains.param']")
+    assert Path(download.value.path()).read_text().startswith("ATC_RAT_RLL_FF,0.2")
+    with visit.page.context.expect_page() as opened:
+        visit.page.click("a[href='/download/report.html']")
+    opened.value.wait_for_selector("html[data-drawn=all]", state="attached", timeout=60_000)
+    opened.value.close()
+    visit.close()
+
+
+def test_an_identification_is_cancelled(browser: Any, address: str, shared_data: Path) -> None:
+    visit = Visit(browser, address)
+    visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_allbits_roll_rate.BIN")
+    drawn(visit)
+    visit.page.locator("#sweeps button").click()
+    visit.page.click("#cancel")
+    visit.until("document.getElementById('identify').innerText.includes('Cancelled. Nothing was kept.')")
+    visit.close()

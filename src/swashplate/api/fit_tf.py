@@ -64,7 +64,14 @@ def fit_tf(
     say("fitting")
     trials: tuple[TriedStructure, ...] = ()
     if form is None and not fixed:
-        best, trials = suggest(responses, input=input, outputs=outputs, band=band, least_coherence=least_coherence)
+        best, trials = suggest(
+            responses,
+            input=input,
+            outputs=outputs,
+            band=band,
+            least_coherence=least_coherence,
+            tell=lambda done, total: say("fitting", done=done, total=total),
+        )
         fit = best.fit
     else:
         fit = fit_transfer_function(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -143,18 +143,21 @@ def suggest(
     forms: Sequence[Form] = USUAL,
     least_coherence: float = 0.6,
     seed: int = 0,
+    tell: Callable[[int, int], None] | None = None,
 ) -> tuple[TriedStructure, tuple[TriedStructure, ...]]:
     """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
 
     Hardly: J within 10 of, or within 1.5 times, the least J of all (the pair of Tischler and Remple's "acceptable" and
-    "indistinguishable" lies a factor of two apart).
+    "indistinguishable" lies a factor of two apart). `tell` hears how many structures of how many are done.
 
     Returns:
         The suggestion, and all trials by number of parameters.
     """
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
     trials = []
-    for form in forms:
+    for k, form in enumerate(forms):
+        if tell is not None:
+            tell(k, len(forms))
         fit = _as_told(_fit(wanted, form, fixed={}, seed=seed), responses)
         trials.append(TriedStructure(form, len(fit.estimates), fit.cost, fit))
     trials.sort(key=lambda trial: (trial.parameters, trial.cost))

@@ -8,7 +8,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
@@ -61,6 +61,17 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         chosen = [(int(log), str(name)) for log, name in wanted]
         return desk.plot_code(chosen, (span[0][0], span[0][1]) if span else None)
 
+    def download(request: Request) -> Response:
+        name = request.path_params["name"]
+        try:
+            path = desk.job.file(name)
+        except Exception as error:
+            return ask.refused(error)
+        if path is None or not path.is_file():
+            return PlainTextResponse("No such file.\n", status_code=404)
+        shown = "inline" if name == "report.html" else "attachment"
+        return FileResponse(path, filename=name, content_disposition_type=shown)
+
     routes = [
         Route("/", page(PAGE / "open.html")),
         Mount("/page", StaticFiles(directory=SHARED)),
@@ -92,6 +103,17 @@ def logs_app(desk: Desk, *, remote: bool = False) -> ASGIApp:
         ),
         _post("/track", lambda log: track(desk.log(log)), log=_LOG),
         _post("/align", desk.align, first=_LOG, second=_LOG),
+        _post(
+            "/identify",
+            lambda log, sweep, input, output: desk.identify(log, sweep, input, output),
+            log=_LOG,
+            sweep=ask.whole(0, 1000),
+            input=ask.text(200, least=0),
+            output=ask.text(200, least=0),
+        ),
+        _post("/cancel", desk.job.cancel),
+        Route("/job", ask.get(desk.job.as_dict)),
+        Route("/download/{name}", download),
         _post("/common", desk.common, numbers=_numbers),
     ]
     return Guard(Starlette(routes=routes), remote=remote)

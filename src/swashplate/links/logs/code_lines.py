@@ -47,7 +47,7 @@ class Read:
     def named(self, start: float | None = None, stop: float | None = None) -> str:
         """The log as a command's argument, or the part of it from start to stop [s]."""
         number = "" if self.log is None else f"#{self.log}"
-        part = "" if start is None or stop is None else f"@{start:g}-{stop:g}"
+        part = "" if start is None or stop is None else f"@{start:.10g}-{stop:.10g}"
         return shlex.quote(f"{self.file}{number}{part}")
 
     def python(self, name: str = "flight") -> str:
@@ -114,3 +114,38 @@ def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:
     lines = [IMPORT, read.python(), f"figure = flight.plot(channels={list(channels)!r})", 'figure.savefig("track.pdf")']
     shell = f"swash replay {read.named()} {read.words}".strip() if whole else ""
     return Code("Track", shell, "\n".join(lines))
+
+
+def identified(
+    read: Read,
+    part: tuple[float, float],
+    chosen: tuple[str, str, str],
+    band: tuple[float, float],
+    seen: tuple[Read, float, float],
+    *,
+    gains: bool,
+) -> Code:
+    """From a sweep to gains; `chosen` are input, output and reference, `seen` what the model is verified on."""
+    moved, answer, reference = chosen
+    other, start, stop = seen
+    shell = [
+        f"swash respond {read.named(*part)} --inputs {moved} --outputs {answer}"
+        + (f" --references {reference}" if reference else "")
+        + f" --band {band[0]:g}-{band[1]:g} --out responses {read.words}".rstrip(),
+        f"swash fit-tf responses --input {moved}{' --gains' if gains else ''} --hold-out {other.named(start, stop)}"
+        + f" --out study {other.words}".rstrip(),
+    ]
+    names = [moved, answer, *([reference] if reference else [])]
+    references = f"references=[{reference!r}], " if reference else ""
+    lines = [
+        IMPORT,
+        read.python(),
+        f"records = sp.uniform_records(flight.between({part[0]:.10g}, {part[1]:.10g}), {names!r})",
+        f"responses = sp.respond(records, inputs=[{moved!r}], outputs=[{answer!r}], {references}band={band!r})",
+        other.python("other"),
+        f"unseen = other.between({start:.10g}, {stop:.10g})",
+        f"study = sp.fit_tf(responses, input={moved!r}, gains={gains}, hold_out=unseen)",
+        "print(study)",
+        'study.save("study")',
+    ]
+    return Code(f"Identify {answer} / {moved}", "\n".join(shell), "\n".join(lines))

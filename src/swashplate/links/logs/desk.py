@@ -13,8 +13,11 @@ from swashplate.flights.flight import did_you_mean
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.bins import trace
 from swashplate.links.logs.code_lines import Read
+from swashplate.links.logs.identify_sweep import Identified, Tell, identify_sweep
+from swashplate.links.logs.job import Job
 from swashplate.links.logs.opened import READY, Opened
 from swashplate.links.logs.remedies import Remedy
+from swashplate.links.logs.sweep_channels import channels_of
 from swashplate.links.logs.uploads import LARGEST, PIECE, Uploads
 
 MOST_LOGS = 12
@@ -34,11 +37,13 @@ class Desk:
         self._lock = threading.Lock()
         self._logs: dict[int, Opened] = {}
         self.uploads = Uploads()
+        self.job = Job()
         for path, read in given:
             self._put(path, read)
 
     def close(self) -> None:
-        """Remove what was dropped."""
+        """Stop what runs, and remove what was dropped and made."""
+        self.job.close()
         self.uploads.close()
 
     # ---- logs --------------------------------------------------------------------------------------------------
@@ -146,6 +151,26 @@ class Desk:
             "words": str(found),
             "code": code_lines.aligned(one.read, other.read).as_dict(),
         }
+
+    # ---- identification ----------------------------------------------------------------------------------------
+    def identify(self, number: int, sweep: int, input: str, output: str) -> dict[str, Any]:
+        """Begin with the identification of a sweep, by its number in the log; channels by its axis where "" is given.
+
+        Raises:
+            SwashError: no such log or sweep, no channels for it, or another identification is running.
+        """
+        opened = self.log(number)
+        flight, found = opened.ready, opened.inspection
+        if found is None or not sweep < len(found.sweeps):
+            raise SwashError(f"has no sweep {sweep + 1}.", where=opened.read.file)
+        chosen = channels_of(flight, found.sweeps[sweep], input=input, output=output)
+        with self._lock:
+            others = [log for log in self._logs.values() if log is not opened and log.state == READY]
+
+        def work(folder: Path, tell: Tell) -> Identified:
+            return identify_sweep(opened, found.sweeps[sweep], chosen, others=others, folder=folder, tell=tell)
+
+        return {"number": self.job.start(work), "channels": chosen._asdict()}
 
     def common(self, numbers: Sequence[int]) -> dict[str, Any]:
         """Channels that several logs share, and a sentence where they share none."""

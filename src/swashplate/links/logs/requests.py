@@ -116,9 +116,9 @@ def switch(value: Any) -> bool:
     return isinstance(value, bool)
 
 
-def text(longest: int) -> Check:
+def text(longest: int, *, least: int = 1) -> Check:
     """Text of limited length."""
-    return lambda value: isinstance(value, str) and 0 < len(value) <= longest
+    return lambda value: isinstance(value, str) and least <= len(value) <= longest
 
 
 def rows(most: int, *cells: Check) -> Check:

@@ -28,6 +28,7 @@ export function mark(plot, first) {
   ctx.font = `${11 * scale}px system-ui, sans-serif`;
   ctx.textBaseline = "top";
   ctx.textAlign = "left";
+  const rows = []; // where the labels of each row end: of logs over each other, each sweep's label stands below the last
   for (const log of ready()) {
     const shift = offset(log);
     for (const sweep of log.sweeps) {
@@ -37,7 +38,11 @@ export function mark(plot, first) {
       ctx.fillRect(edges[0], bbox.top, edges[1] - edges[0], bbox.height);
       if (first) {
         ctx.fillStyle = ink("blue");
-        label(ctx, `sweep ${sweep.axis}, ${+sweep.low.toPrecision(3)} to ${+sweep.high.toPrecision(3)} Hz`, ...edges, bbox.top + 3 * scale);
+        const words = `sweep ${sweep.axis}, ${+sweep.low.toPrecision(3)} to ${+sweep.high.toPrecision(3)} Hz`;
+        let row = rows.findIndex((end) => end < edges[0]);
+        if (row < 0) row = rows.push(0) - 1;
+        rows[row] = Math.min(edges[1], edges[0] + ctx.measureText(words).width + 12 * scale);
+        label(ctx, words, ...edges, bbox.top + (3 + 14 * row) * scale);
       }
     }
   }

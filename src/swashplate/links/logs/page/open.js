@@ -4,6 +4,7 @@ import * as code from "./code.js";
 import * as drop from "./drop.js";
 import * as events from "./events.js";
 import * as findings from "./findings.js";
+import * as identify from "./identify.js";
 import * as log_list from "./log_list.js";
 import * as parameters from "./parameters.js";
 import * as plots from "./plots.js";
@@ -41,7 +42,7 @@ function greet() {
   state.say("charts");
 }
 
-for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, drop]) part.begin();
+for (const part of [trouble, code, views, channel_list, log_list, plots, findings, events, parameters, spectrum, track, identify, drop]) part.begin();
 state.on("logs", greet);
 theme.begin();
 const told = await log_list.refresh();

@@ -1,0 +1,206 @@
+"""From a sweep to gains: truth recovered, the copied lines give the same, and what was seen is never called unseen."""
+
+from __future__ import annotations
+
+import functools
+import shlex
+import time as clock
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import chirp, lsim
+from typer.testing import CliRunner
+
+from swashplate.api import fit_tf
+from swashplate.cli.app import app
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights.maneuvers.sweeps import Sweep
+from swashplate.identification.frequency.transfer_function_fit import suggest
+from swashplate.links.logs.code_lines import Read
+from swashplate.links.logs.desk import Desk
+from swashplate.links.logs.hold_out import hold_out
+from swashplate.links.logs.identify_sweep import Identified
+from swashplate.links.logs.job import Job
+from swashplate.links.logs.sweep_channels import channels_of
+from swashplate.models.linear.transfer_function import Form
+
+GAIN, POLE, DELAY = 25.0, 6.0, 0.03
+
+
+def flown(path: Path, *, further: bool) -> None:
+    """A roll sweep of 40 s on p / mixer_roll = 25 e^(-0.03 s) / (s + 6), and after it doublets where `further`."""
+    time = np.arange(0.0, 90.0 if further else 44.0, 0.01)
+    sweep = np.where((time > 2.0) & (time < 42.0), chirp(time - 2.0, 0.3, 40.0, 8.0, method="logarithmic"), 0.0)
+    doublets = np.where(time > 50.0, np.sign(np.sin(2.0 * np.pi * 0.4 * time)), 0.0)
+    u = 0.1 * (sweep + doublets)
+    late = np.interp(time - DELAY, time, u)
+    p = lsim(([GAIN], [1.0, POLE]), late, time)[1] + 0.005 * np.random.default_rng(3).standard_normal(time.size)
+    rows = np.stack([time, u, p], axis=1).tolist()
+    path.write_text("time [s],mixer_roll [1],p [rad/s]\n" + "\n".join(",".join(map(repr, row)) for row in rows) + "\n")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Desk, dict[str, Any], Path]]:
+    """A desk with both logs, what the job made of the first one's sweep, and their folder."""
+    folder = tmp_path_factory.mktemp("sweep")
+    flown(folder / "flight.csv", further=True)
+    flown(folder / "short.csv", further=False)
+    desk = Desk([(folder / name, Read(name)) for name in ("flight.csv", "short.csv")])
+    desk.read_given()
+    desk.drop(2)  # of one log alone first
+    with pytest.MonkeyPatch.context() as patch:
+        few = functools.partial(suggest, forms=(Form.parse("0/1"), Form.parse("1/2")))
+        patch.setattr(fit_tf, "suggest", few)
+        patch.chdir(folder)
+        desk.identify(1, 0, "", "")
+        end = clock.monotonic() + 120.0
+        while desk.job.as_dict()["state"] == "running":
+            assert clock.monotonic() < end
+            clock.sleep(0.05)
+        state = desk.job.as_dict()
+        assert state["state"] == "done", state
+        yield desk, state["result"], folder
+    desk.close()
+
+
+def test_the_truth_is_recovered_and_gains_are_suggested(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    _, result, _ = made
+    assert (result["input"], result["output"], result["reference"]) == ("mixer_roll", "p", "")
+    values = {name: value for name, value, *_ in result["fit"]["rows"]}
+    assert result["fit"]["form"] == "0/1"
+    assert values["K"] == pytest.approx(GAIN, rel=0.03)
+    assert values["pole"] == pytest.approx(POLE, rel=0.06)
+    assert values["tau"] == pytest.approx(DELAY, abs=0.003)
+    (axis,) = result["gains"]
+    suggested = {name: after for name, _, after in axis["rows"]}
+    assert suggested["ATC_RAT_RLL_FF"] == pytest.approx(POLE / GAIN, rel=0.05)
+    assert axis["before"] is None, "the log holds no gains"
+    assert axis["after"]["stable"]
+    assert axis["after"]["step"][-1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_it_is_verified_on_the_doublets_that_the_fit_has_not_seen(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    _, result, _ = made
+    seen = result["verification"]
+    assert seen["unseen"]
+    assert seen["on"].startswith("another part of the log, 4")
+    assert min(seen["time"]) > 42.0
+    error = np.asarray(seen["flight"]) - np.asarray(seen["model"])
+    assert np.std(error) < 0.1 * np.std(seen["flight"])
+    assert not any("NOT A HOLD-OUT" in text for text in seen["warnings"])
+
+
+def test_the_copied_lines_give_the_same(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    _, result, folder = made
+    names: dict[str, Any] = {}
+    exec(result["code"]["python"], names)
+    wanted = {name: value for name, value, *_ in result["fit"]["rows"]}
+    found = {row.name: row.value for row in names["study"].fit.estimates}
+    assert found == pytest.approx(wanted, rel=1e-6)
+    (suggestion,) = names["study"].material.gains
+    suggested = {name: after for name, _, after in result["gains"][0]["rows"]}
+    assert suggestion.parameters == pytest.approx(suggested, rel=1e-6)
+    for line in result["code"]["shell"].splitlines():
+        done = CliRunner().invoke(app, shlex.split(line)[1:])
+        assert done.exit_code == 0, done.output
+    assert f"{suggested['ATC_RAT_RLL_P']:.4f}" in done.output
+    assert (folder / "study" / "report.html").is_file()
+
+
+def test_every_file_is_made_when_it_is_asked_for(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    desk, result, _ = made
+    assert {"gains.param", "report.html", "model.toml", "sweep.csv", "responses.nc"} <= set(result["files"])
+    for name in result["files"]:
+        path = desk.job.file(name)
+        assert path is not None
+        assert path.stat().st_size > 50
+    parameters = desk.job.file("gains.param")
+    assert parameters is not None
+    assert parameters.read_text().startswith("ATC_RAT_RLL_FF,0.2")
+    for name in ("../flight.csv", "/etc/passwd", "nothing", ""):
+        assert desk.job.file(name) is None
+
+
+def test_without_another_part_it_says_that_nothing_was_verified(made: tuple[Desk, dict[str, Any], Path]) -> None:
+    _, _, folder = made
+    desk = Desk([(folder / name, Read(name)) for name in ("short.csv", "flight.csv")])
+    desk.read_given()
+    short, long = desk.log(1), desk.log(2)
+    assert short.inspection is not None
+    sweep = short.inspection.sweeps[0]
+    alone = hold_out(short, sweep, "mixer_roll", "p", [])
+    assert not alone.unseen
+    assert "NO verification" in alone.words
+    other = hold_out(short, sweep, "mixer_roll", "p", [long])
+    assert other.unseen
+    assert other.flight is long.flight
+    desk.close()
+
+
+@pytest.mark.parametrize(
+    ("axis", "channel", "wanted"),
+    [("roll mixer", "sid_target", ("mixer_roll", "p")), ("roll", "mixer_roll", ("mixer_roll", "p"))],
+)
+def test_channels_follow_from_the_axis(
+    made: tuple[Desk, dict[str, Any], Path], axis: str, channel: str, wanted: tuple[str, str]
+) -> None:
+    flight = made[0].log(1).ready
+    sweep = Sweep(0.0, 10.0, axis, 0.1, 10.0, channel, "log")
+    assert channels_of(flight, sweep)[:2] == wanted
+    with pytest.raises(FlightError, match="no output is known for a sweep of 'pitch'"):
+        channels_of(flight, Sweep(0.0, 10.0, "pitch", 0.1, 10.0, "mixer_roll", "signal"))
+    with pytest.raises(FlightError, match="no input is known"):
+        channels_of(flight, sweep, input="nosuch")
+
+
+def until(job: Job, state: str) -> dict[str, Any]:
+    for _ in range(400):
+        told = job.as_dict()
+        if told["state"] == state:
+            return told
+        clock.sleep(0.01)
+    raise AssertionError(job.as_dict())
+
+
+def test_work_is_stopped_and_nothing_of_it_is_kept(tmp_path: Path) -> None:
+    job, ended = Job(), []
+
+    def endless(_: Path, tell: Any) -> Identified:
+        try:
+            while True:
+                tell("working", 0.5)
+                clock.sleep(0.01)
+        finally:
+            ended.append(True)
+
+    job.start(endless)
+    assert until(job, "running")["doing"] in ("starting", "working")
+    with pytest.raises(SwashError, match="another identification is running"):
+        job.start(endless)
+    job.cancel()
+    until(job, "cancelled")
+    job.start(lambda *_: Identified({"a": 1}, {}))
+    assert until(job, "done")["result"] == {"a": 1}
+    assert ended == [True]
+    job.close()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (SwashError("is too short.", channel="p", hint="Fly longer."), "p: is too short."),
+        (ZeroDivisionError("by nought"), "This went wrong inside swash (ZeroDivisionError: by nought)."),
+    ],
+)
+def test_what_fails_is_told_in_words(error: Exception, words: str) -> None:
+    job = Job()
+
+    def broken(*_: Any) -> Identified:
+        raise error
+
+    job.start(broken)
+    assert until(job, "failed")["problem"] == words
+    job.close()
