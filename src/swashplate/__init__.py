@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from swashplate.control.lqg.observer_trial import trial as observer_trial
     from swashplate.errors import SwashError
     from swashplate.export.control_json import read_control
+    from swashplate.flights.conditioning.reconstruction import reconstruct
     from swashplate.flights.conditioning.synchronise import merge, synchronise
     from swashplate.flights.datasets import listing as datasets
     from swashplate.flights.flight import Flight
@@ -130,6 +131,7 @@ __all__ = [
     "plan_bench",
     "read",
     "read_control",
+    "reconstruct",
     "replay",
     "report",
     "respond",

@@ -37,6 +37,7 @@ _LIGHT: Mapping[str, str] = {
     "maneuver": "swashplate.flights.maneuvers.series:parse",
     "merge": "swashplate.flights.conditioning.synchronise:merge",
     "read_control": "swashplate.export.control_json:read_control",
+    "reconstruct": "swashplate.flights.conditioning.reconstruction:reconstruct",
     "report": "swashplate.reporting.report:report",
     "respond": "swashplate.identification.responses.respond:respond",
     "stepwise": "swashplate.identification.time.equation_error:stepwise",

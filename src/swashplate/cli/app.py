@@ -25,6 +25,7 @@ from swashplate.cli import (
     link,
     live,
     maneuver,
+    reconstruct,
     replay,
     respond,
     simulate,
@@ -79,6 +80,9 @@ app.command("live", short_help="Fly a model in the browser, in real time.")(live
 app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
+app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and take them out.")(
+    reconstruct.reconstruct
+)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)

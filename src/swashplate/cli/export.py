@@ -99,9 +99,7 @@ def export(
         made = _flight(model, name, refused)
     elif kind_of(model) == "controller":
         if form != "c":
-            raise SwashError(
-                "is a controller: --format c writes its step.", where=model, channel=f"--format {form}"
-            )
+            raise SwashError("is a controller: --format c writes its step.", where=model, channel=f"--format {form}")
         if refused:
             raise SwashError("is for vehicles, and this is a controller.", where=model, channel=", ".join(refused))
         made = verbs.export_controller(model, name=name, precision=precision.value)
