@@ -27,6 +27,7 @@ from swashplate.cli import (
     maneuver,
     open,
     plot,
+    reconstruct,
     replay,
     respond,
     rotor_speed,
@@ -85,6 +86,9 @@ app.command("decouple", short_help="Design the decoupling controller of a coaxia
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
 app.command("plot", short_help="Draw logs over time or frequency, several over each other.")(plot.plot)
 app.command("rotor-speed", short_help="Measure rotor speed from vibration in a log.")(rotor_speed.rotor_speed)
+app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and take them out.")(
+    reconstruct.reconstruct
+)
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)

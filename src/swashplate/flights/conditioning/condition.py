@@ -14,6 +14,7 @@ from swashplate.flights.conditioning.ground import cut
 from swashplate.flights.conditioning.ground import trim_ground as trim
 from swashplate.flights.conditioning.lever_arm import move_to_cg
 from swashplate.flights.conditioning.outliers import remove_outliers
+from swashplate.flights.conditioning.reconstruction import correct_sensors
 from swashplate.flights.conditioning.resample import resample
 from swashplate.flights.consistency import UNCHECKED, refuse_inconsistent
 from swashplate.flights.flight import Flight
@@ -111,6 +112,7 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Flight], tuple[str, ...]]] = {
     "lowpass": (lowpass, ("cutoff", "order", "zero_phase")),
     "derive": (derive_motion, ("gravity",)),
     "move_to_cg": (move_to_cg, ("lever_arm",)),
+    "correct_sensors": (correct_sensors, ("biases", "scales")),
 }
 
 

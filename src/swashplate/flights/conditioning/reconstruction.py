@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -23,11 +24,13 @@ from swashplate.flights.conditioning.lever_arm import LeverArm, lever_arm
 from swashplate.flights.conditioning.regression import regress
 from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES
+from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, channel
+from swashplate.text_table import text_table
 
 _FORCES = ("ax", "ay", "az")
 _DRIVES = (("servo_roll", "p"), ("servo_pitch", "q"), ("motor_lower", "r"), ("motor_upper", "r"))
 _SIGNIFICANT = 3.0
+_HEAD = ("channel", "unit", "bias", "sigma", "scale - 1", "sigma", "significant")
 
 
 @dataclass(frozen=True)
@@ -64,15 +67,57 @@ class Reconstruction:
     lever: LeverArm | None = None
     notes: tuple[str, ...] = ()
 
+    def corrected(self, flight: Flight) -> Flight:
+        """The flight with every channel's significant bias and scale factor taken out; its history says so.
+
+        A scale factor of a half or more is no sensor's error but a channel that hardly moved, and stays.
+
+        Raises:
+            FlightError: where it lacks a channel that was judged.
+        """
+        bias = {name: e.value if e.significant else 0.0 for name, e in self.biases.items()}
+        scale = {n: e.value if e.significant and abs(e.value) < 0.5 else 0.0 for n, e in self.scales.items()}
+        return correct_sensors(flight, biases=bias, scales=scale)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON types: values and standard errors by channel, time shifts and lever arm in words."""
+        return {
+            "biases": {name: [e.value, e.sigma] for name, e in self.biases.items()},
+            "scales": {name: [e.value, e.sigma] for name, e in self.scales.items()},
+            "time_shifts": [str(shift) for shift in self.time_shifts],
+            "lever": None if self.lever is None else str(self.lever),
+            "notes": list(self.notes),
+        }
+
     def __str__(self) -> str:
-        lines = []
-        for name in self.biases:
-            b, s = self.biases[name], self.scales[name]
-            lines.append(f"{name}: bias {b.value:+.4g} ± {b.sigma:.2g}, scale {s.value:+.4g} ± {s.sigma:.2g}")
+        rows = []
+        for name, b in self.biases.items():
+            s = self.scales[name]
+            told = [word for word, e in (("bias", b), ("scale", s)) if e.significant]
+            numbers = [f"{b.value:+.4g}", f"{b.sigma:.2g}", f"{s.value:+.4g}", f"{s.sigma:.2g}"]
+            rows.append([name, channel(name).unit, *numbers, " and ".join(told)])
+        lines = [text_table(_HEAD, rows, left=(0, 1, 6))] if rows else []
         lines += [str(shift) for shift in self.time_shifts]
         if self.lever is not None:
             lines.append(str(self.lever))
         return "\n".join([*lines, *self.notes])
+
+
+def correct_sensors(flight: Flight, *, biases: Mapping[str, float], scales: Mapping[str, float]) -> Flight:
+    """The flight with (measured - bias) / (1 + scale) in place of what was measured.
+
+    Args:
+        flight: as logged or conditioned.
+        biases: by channel, in its unit. scales: by channel, 0 for none.
+
+    Raises:
+        FlightError: for a channel that the flight does not have.
+    """
+    out = flight
+    for name in dict.fromkeys((*biases, *scales)):
+        true = (flight.values(name) - biases.get(name, 0.0)) / (1.0 + scales.get(name, 0.0))
+        out = out.with_channel(name, true, like=name)
+    return out.done("correct_sensors", biases=dict(biases), scales=dict(scales))
 
 
 def _windows(flight: Flight, length: float) -> list[Flight]:

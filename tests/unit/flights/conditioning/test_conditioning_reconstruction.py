@@ -1,11 +1,14 @@
 """Flight-path reconstruction finds what was put in, within its own bounds."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
+import swashplate as sp
 from conditioning_flights import hover, tracked
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.condition import condition
+from swashplate.flights.conditioning.condition import condition, replay
 from swashplate.flights.conditioning.derive import derive
 from swashplate.flights.conditioning.lever_arm import lever_arm, move_to_cg, percussion_offset
 from swashplate.flights.conditioning.reconstruction import reconstruct
@@ -88,7 +91,12 @@ def test_a_delay_in_open_loop_is_found_and_feedback_is_reported() -> None:
     assert "not identifiable" in str(loop)
 
 
-def test_biases_and_scale_factors_of_sensors() -> None:
+BIAS = {"p": 0.02, "r": -0.03, "ax": 0.1, "az": -0.2}
+SCALE = {"q": 0.05, "r": -0.02, "ay": 0.04}
+
+
+def sensed_flight(bias: Mapping[str, float] = BIAS, scale: Mapping[str, float] = SCALE) -> Flight:
+    """A hover of 40 s with gyroscopes, accelerometers and a pose, with errors that are known."""
     motion = hover(40.0, 9)
     turn = motion.rotation()
     omega = (turn[:-1].inv() * turn[1:]).as_rotvec() / 1e-3
@@ -96,7 +104,6 @@ def test_biases_and_scale_factors_of_sensors() -> None:
     force = turn.inv().apply(acceleration - [0, 0, 9.80665])
     t = np.arange(0.5, 39.0, 0.01)
     rng = np.random.default_rng(9)
-    bias, scale = {"p": 0.02, "r": -0.03, "ax": 0.1, "az": -0.2}, {"q": 0.05, "r": -0.02, "ay": 0.04}
 
     def sensed(name: str, time: np.ndarray, truth: np.ndarray) -> np.ndarray:
         true = np.interp(t, time, truth)
@@ -112,7 +119,12 @@ def test_biases_and_scale_factors_of_sensors() -> None:
         n: np.interp(t, motion.time, motion.position[:, k]) + 2e-4 * rng.standard_normal(t.size)
         for k, n in enumerate("xyz")
     }
-    found = reconstruct(Flight({"uniform": stream(t, channels)}))
+    return Flight({"uniform": stream(t, channels)})
+
+
+def test_biases_and_scale_factors_of_sensors() -> None:
+    bias, scale = BIAS, SCALE
+    found = reconstruct(sensed_flight())
     for name in ("p", "q", "r", "ax", "ay", "az"):
         for estimates, truth, floor in ((found.biases, bias, 2e-3), (found.scales, scale, 5e-3)):
             estimate = estimates[name]
@@ -121,7 +133,29 @@ def test_biases_and_scale_factors_of_sensors() -> None:
     assert found.scales["q"].significant
     assert found.biases["p"].significant
     assert not found.scales["p"].significant
-    assert "p: bias" in str(found)
+    (line,) = (row for row in str(found).splitlines() if row.startswith("p "))
+    assert line.endswith("bias")
+
+
+def test_what_was_found_is_taken_out_of_the_flight() -> None:
+    wrong, right = sensed_flight(), sensed_flight({}, {})
+    found = sp.reconstruct(wrong)
+    mended = found.corrected(wrong)
+    for name in ("p", "q", "r", "ax", "ay"):
+        before, after = (np.std(f.values(name) - right.values(name)) for f in (wrong, mended))
+        shift = abs(np.mean(mended.values(name) - right.values(name)))
+        assert shift < 0.2 * abs(BIAS.get(name, 0.0)) + 4e-3, name
+        assert after <= before + 1e-6, name
+    again = reconstruct(mended)
+    for name in ("p", "q", "r", "ax", "ay"):
+        assert not again.biases[name].significant, name
+        assert not again.scales[name].significant, name
+    step = mended.history[-1]
+    assert step.operation == "correct_sensors"
+    assert replay(wrong, mended.history).values("p") == pytest.approx(mended.values("p"))
+    calm = reconstruct(right)
+    assert not any(e.significant for e in (calm.biases["p"], calm.biases["q"], *calm.scales.values()))
+    assert abs(calm.biases["r"].value) < 5e-4  # noise of the attitude in the kinematics is not in its bound
 
 
 def test_what_was_not_measured_is_said() -> None:
