@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import options
-from swashplate.cli.reading import Reading
 from swashplate.errors import SwashError
 
 _LINE = re.compile(r"(?P<name>[a-z]\w*)=(?P<low>[-+]?[\d.]+)\.\.(?P<high>[-+]?[\d.]+)")
@@ -35,7 +34,7 @@ def rotor_speed(
 ) -> None:
     """Measure rotor speed from the vibration that a rotor leaves in motion capture, gyros or accelerometers."""
     from swashplate.cli.console import as_json
-    from swashplate.cli.reading import read
+    from swashplate.cli.reading import asked, read
     from swashplate.flights.rotor_speed import rotor_speed as measure
 
     bands = {}
@@ -47,7 +46,7 @@ def rotor_speed(
             raise SwashError(
                 f"'{text}' is no line.", channel="--line", hint="For example --line omega_upper=-40..-30."
             ) from None
-    how = Reading(mapping, options.assignments(unit, option="--unit"), drop_bad_stamps)
+    how = asked(mapping, unit, drop_bad_stamps)
     measured = measure(read(flight, how=how), lines=bands or None, per_turn=per_turn)
     if out is not None:
         measured.save(out)
