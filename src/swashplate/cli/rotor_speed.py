@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import options
-from swashplate.cli.reading import asked
 from swashplate.errors import SwashError
 
 _LINE = re.compile(r"(?P<name>[a-z]\w*)=(?P<low>[-+]?[\d.]+)\.\.(?P<high>[-+]?[\d.]+)")
@@ -35,7 +34,7 @@ def rotor_speed(
 ) -> None:
     """Measure rotor speed from the vibration that a rotor leaves in motion capture, gyros or accelerometers."""
     from swashplate.cli.console import as_json
-    from swashplate.cli.reading import read
+    from swashplate.cli.reading import asked, read
     from swashplate.flights.rotor_speed import rotor_speed as measure
 
     bands = {}

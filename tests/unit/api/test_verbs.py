@@ -34,6 +34,8 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "link ardupilot": ("link_ardupilot", "write_ardupilot_parameters"),
     "link px4": ("link_px4",),
     "maneuver": ("plan_maneuver", "maneuver"),
+    "open": ("open_logs",),
+    "plot": ("plot_logs",),
     "replay": ("replay", "show_replay", "film_replay"),
     "respond": ("respond", "uniform_records"),
     "simulate": ("fly_maneuver", "monte_carlo"),

@@ -23,7 +23,7 @@ READING, READY, FAILED = "reading", "ready", "failed"
 
 
 @dataclass(frozen=True)
-class OpenedLog:
+class DrawnChannel:
     """A channel as it is drawn: stamps [s], values and unit of the screen, and where it has gaps."""
 
     time: Array
@@ -55,7 +55,7 @@ class Opened:
     problem: str = ""
     hint: str = ""
     version: int = 0
-    _channels: dict[str, OpenedLog] = field(default_factory=dict, repr=False)
+    _channels: dict[str, DrawnChannel] = field(default_factory=dict, repr=False)
 
     def load(self, read: Read) -> None:
         """Read the log; what cannot be read is said in `problem`, never raised."""
@@ -94,7 +94,7 @@ class Opened:
             raise FlightError(self.problem or "is still being read.", where=self.read.file, hint=self.hint or None)
         return self.flight
 
-    def shown(self, name: str) -> OpenedLog:
+    def shown(self, name: str) -> DrawnChannel:
         """A channel in the unit of the screen, kept for the next zoom.
 
         Raises:
@@ -104,7 +104,7 @@ class Opened:
             flight = self.ready
             unit, factor = shown_unit(flight, name)
             time, values = flight.time(name), flight.values(name)
-            self._channels[name] = OpenedLog(time, values if factor == 1.0 else values * factor, unit, gaps(time))
+            self._channels[name] = DrawnChannel(time, values if factor == 1.0 else values * factor, unit, gaps(time))
         return self._channels[name]
 
     def as_dict(self) -> dict[str, Any]:
