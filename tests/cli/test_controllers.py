@@ -11,6 +11,7 @@ from commands import swash
 
 import swashplate as sp
 from made_results import result
+from report_pages import whole
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.errors import ControllerError
@@ -65,7 +66,7 @@ def test_the_law_on_estimates_is_a_file_that_comes_back(tmp_path: Path) -> None:
 def test_decoupling_of_a_linear_model_as_a_page(tmp_path: Path) -> None:
     outcome = swash("control", "decouple", "hybrid", "--report", tmp_path / "d.html")
     assert outcome.code == 0, outcome.err
-    page = (tmp_path / "d.html").read_text(encoding="utf-8")
+    page = whole(tmp_path / "d.html")
     assert "p over q [%]" in page
     assert "largest off-axis over on-axis response at 3 rad/s: bare inputs" in page
     assert "The filter's modes" in page or "The filter&#39;s modes" in page
@@ -216,7 +217,7 @@ def test_a_controller_is_checked_and_the_report_written(tmp_path: Path) -> None:
     assert found["steps"]["psi"]["overshoot"] == pytest.approx(0.19, abs=0.03)
     own = [boundary["name"] for boundary in found["boundaries"] if boundary["checked"]]
     assert own == ["delay margin [ms]"]  # of the check itself; no standard's text was at hand
-    page = (out / "report.html").read_text()
+    page = whole(out / "report.html")
     assert "Disturbance rejection" in page
     assert "Level 2" in page
     for options, level in ((("--scale", "1"), 1), (("--task", "tracking"), 3)):
