@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import butter, sosfiltfilt
 
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import interpolate, quaternion_from_euler, rotation
@@ -252,6 +251,8 @@ def _agreements(
     window: float,
 ) -> dict[int, dict[int, _Agreement]]:
     """By channel and axis: how they agree in a band [Hz], over windows of that length [s]."""
+    from scipy.signal import butter, sosfiltfilt
+
     there = [i for i, name in enumerate(names) if name]
     k = len(there)
     spreads, correlations = [], []

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Num
 from scipy.linalg import expm
-from scipy.signal import cont2discrete
 
 from swashplate.arrays import Array
 
@@ -18,6 +17,8 @@ _SAMPLE = 1e-6
 
 def zero_order_hold(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
     """(F, G) of x' = A x + B u under inputs held for `dt` [s]: x+ = F x + G u."""
+    from scipy.signal import cont2discrete
+
     n, m = B.shape
     F, G, *_ = cont2discrete((A, B, np.zeros((1, n)), np.zeros((1, m))), dt)
     return np.asarray(F), np.asarray(G)

@@ -12,8 +12,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.stats import f as fisher
 
 from swashplate.arrays import Array, Complex
 from swashplate.identification.time.feedback import FOLLOWS
@@ -130,6 +128,8 @@ def _memories(dt: float, low: float) -> Array:
 
 def _fading(values: Array, memory: float) -> Array:
     """Fading average of a signal's past samples; before the first one nothing moved."""
+    from scipy.signal import lfilter
+
     late = np.concatenate([np.zeros_like(values[:1]), values[:-1]])
     return np.asarray(lfilter([1.0 - memory], [1.0, -memory], late, axis=0))
 
@@ -194,6 +194,8 @@ class NoiseLevel:
 
     def largest(self, record: int, chance: float) -> Array:
         """Root mean square by band (n_bands, 1) that P w stays below but for a chance (Fisher's F)."""
+        from scipy.stats import f as fisher
+
         behind = np.maximum(2.0 * _INDEPENDENT * self.free, 1.0)
         square = self.floor[record] * fisher.isf(chance, self.freedom[record], behind)
         return np.asarray(np.sqrt(square)[:, None])

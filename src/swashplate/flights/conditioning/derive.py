@@ -7,7 +7,6 @@ The differentiator is a local polynomial (Savitzky and Golay 1964) of degree fou
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -28,6 +27,8 @@ def differentiate(values: Array, *, rate: float, order: int = 1) -> Array:
         rate: [Hz].
         order: 1 or 2.
     """
+    from scipy.signal import savgol_filter
+
     if values.shape[0] < _POINTS:
         raise FlightError(f"{values.shape[0]} samples cannot be differentiated, expected at least {_POINTS}.")
     return np.asarray(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -36,6 +35,8 @@ def filtered(
     Raises:
         FlightError: the corner is not below half the rate, or the record is too short.
     """
+    from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+
     band = isinstance(cutoff, tuple)
     corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
     if not (np.all(corners > 0) and np.all(corners < rate / 2) and np.all(np.diff(corners) > 0)):

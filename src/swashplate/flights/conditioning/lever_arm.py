@@ -23,8 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import coherence
-from scipy.stats import norm
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -139,6 +137,8 @@ def _partial_coherence(
     regressors: Array, response: Array, column: int, *, rate: float, band: tuple[float, float]
 ) -> float:
     """Mean coherence in the band of what the other regressors leave of the response and of one regressor."""
+    from scipy.signal import coherence
+
     others = np.delete(regressors, column, axis=1)
     pair = np.column_stack([regressors[:, column], response])
     rest = pair - others @ np.linalg.lstsq(others, pair, rcond=None)[0]
@@ -152,6 +152,8 @@ def _partial_coherence(
 
 def _component(found: Mapping[str, tuple[float, float, float, float]]) -> LeverComponent:
     """Equations of one component put together by their variances; where they disagree the bound grows (Birge 1932)."""
+    from scipy.stats import norm
+
     values = np.array([v for v, _, _, _ in found.values()])
     sigmas = np.array([s for _, s, _, _ in found.values()])
     weight = sigmas**-2

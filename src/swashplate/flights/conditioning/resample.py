@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -80,6 +79,8 @@ def _between(time: Array, values: Array, grid: Array, method: str) -> Array:
 
     A quintic spline keeps a sine of a third of the sample rate within 0.2 dB (lines: 3 dB; Unser 1999, box 2).
     """
+    from scipy.interpolate import PchipInterpolator, make_interp_spline
+
     if method == "spline" and time.size > _QUINTIC:
         return np.asarray(make_interp_spline(time, values, k=_QUINTIC)(grid))
     return np.asarray(PchipInterpolator(time, values)(grid)) if method == "pchip" else np.interp(grid, time, values)

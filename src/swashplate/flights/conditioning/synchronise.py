@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import CubicSpline
-from scipy.signal import correlate, correlation_lags
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -75,6 +73,8 @@ def _shared(first: Flight, second: Flight) -> tuple[str, ...]:
 
 def _smooth(flight: Flight, names: Sequence[str], *, rate: float, band: float) -> tuple[Array, Array]:
     """The channels at `rate` on one grid, low-passed: then a spline between samples adds nothing of its own."""
+    from scipy.interpolate import CubicSpline
+
     start = max(float(flight.time(name)[0]) for name in names)
     stop = min(float(flight.time(name)[-1]) for name in names)
     grid = start + np.arange(int((stop - start) * rate + 1e-6) + 1) / rate
@@ -94,6 +94,8 @@ def _smooth(flight: Flight, names: Sequence[str], *, rate: float, band: float) -
 
 def _coarse(one: Array, two: Array, *, rate: float) -> float:
     """Delay of the second record's samples against the first's [s] by cross-correlation, channels summed."""
+    from scipy.signal import correlate, correlation_lags
+
     total = np.zeros(one.shape[0] + two.shape[0] - 1)
     for a, b in zip(one.T, two.T, strict=True):
         total += correlate((a - a.mean()) / a.std(), (b - b.mean()) / b.std(), mode="full", method="fft")
@@ -116,6 +118,8 @@ def synchronise(
     Raises:
         FlightError: no shared motion, too little overlap, or motions that do not agree.
     """
+    from scipy.interpolate import CubicSpline
+
     names = tuple(channels) if channels else _shared(first, second)
     rate = max(first.rate(names[0]), second.rate(names[0]))
     time, one = _smooth(first, names, rate=rate, band=band)

@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import csd, welch
-from scipy.stats import chi2
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -81,6 +79,8 @@ class TimeShift:
 
 def _future(source: Array, response: Array, *, rate: float) -> tuple[float, float]:
     """Sims' test: probability without feedback, and the share that the future explains of what the past leaves."""
+    from scipy.stats import chi2
+
     step, reach = max(1, round(0.05 * rate)), 6
     lags = np.arange(-reach, reach + 1) * step  # positive: the input's past
     margin = reach * step
@@ -113,6 +113,8 @@ def time_shift(flight: Flight, source: str, *, response: str, band: tuple[float,
     Raises:
         FlightError: channels missing, or an input that does not move.
     """
+    from scipy.signal import csd, welch
+
     rate = uniform_rate(flight)
     part = max(flight.split(), key=lambda piece: piece.duration)
     u, y = part.values(source), part.values(response)

@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize
 
 from swashplate.arrays import Array
 
@@ -55,6 +54,8 @@ def _sum(harmonics: NDArray[np.int64], phases: Array, turns: Array) -> Array:
 @lru_cache(maxsize=64)
 def _optimised(numbers: tuple[int, ...]) -> tuple[tuple[float, ...], float]:
     """Phases of least peak, turned so that the signal begins at zero, and that peak."""
+    from scipy.optimize import minimize
+
     harmonics = np.asarray(numbers, dtype=np.int64)
     size = int(2 ** np.ceil(np.log2(8 * harmonics[-1])))
     number = np.arange(1.0, harmonics.size + 1.0)
@@ -89,6 +90,8 @@ def _optimised(numbers: tuple[int, ...]) -> tuple[tuple[float, ...], float]:
 
 def _from_zero(harmonics: NDArray[np.int64], phases: Array, x: Array) -> tuple[tuple[float, ...], float]:
     """The same signal begun at its gentlest upward passage through zero."""
+    from scipy.optimize import brentq
+
     up = np.flatnonzero((x <= 0.0) & (np.roll(x, -1) > 0.0))
     first = int(up[np.argmin(np.roll(x, -1)[up] - x[up])])
     at = brentq(

@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import detrend
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -21,6 +20,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweep_tracking import Ridge
 from swashplate.flights.provenance import Event
 from swashplate.flights.schema import is_known
+from swashplate.flights.straight_line import detrended
 
 _CYCLES = 6.0  # of a wavelet: resolves a third of an octave
 _PER_OCTAVE = 8
@@ -160,7 +160,7 @@ def rising(time: Array, values: Array) -> Ridge | None:
         return None
     rate = min((time.size - 1) / length, _FASTEST)
     grid = np.arange(int(length * rate) + 1) / rate
-    signal = np.asarray(detrend(np.interp(grid + time[0], time, _thinned(time, values, rate))), dtype=np.float64)
+    signal = detrended(np.interp(grid + time[0], time, _thinned(time, values, rate)))
     low, high = max(2.0 / length, 0.05), _HIGHEST * rate
     if high < _LEAST_RATIO * low:
         return None

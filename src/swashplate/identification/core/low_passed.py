@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.signal import welch
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -55,6 +54,8 @@ def refuse_lowpassed(flights: Iterable[Flight]) -> None:
 
 def without_floor(values: Array) -> float:
     """By how much [dB] a channel's spectrum falls from 0.15-0.3 to 0.5-0.7 of half the sample rate."""
+    from scipy.signal import welch
+
     frequency, power = welch(values - values.mean(), nperseg=min(_SEGMENT, values.size), detrend="linear")
     part = 2.0 * frequency
     low, high = (float(np.median(power[(part >= a) & (part <= b)])) for a, b in (_LOW, _HIGH))

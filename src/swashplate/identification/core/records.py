@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -153,5 +152,7 @@ _STILL = 1e-6
 
 def _slow(voltage: Array, dt: float, seconds: float) -> Array:
     """A logged voltage without its noise: straight lines over some seconds each way (Savitzky and Golay 1964)."""
+    from scipy.signal import savgol_filter
+
     window = min(2 * round(seconds / dt) + 1, voltage.size - (voltage.size + 1) % 2)
     return np.asarray(savgol_filter(voltage, window, 1), dtype=np.float64)

@@ -100,7 +100,7 @@ def _events_of(flights: Sequence[Flight], pieces: Sequence[Signals]) -> list[lis
 
 def _sweeps_in(k: int, piece: Signals, inputs: int, events: Sequence[Event]) -> list[_Found]:
     """The sweeps of one record: those that the log tells of, and where it tells none, those that are seen."""
-    time = piece.start + np.arange(len(piece.values)) * piece.dt
+    time: Array = np.asarray(piece.start + np.arange(len(piece.values)) * piece.dt, dtype=np.float64)
     told = [one for event in events if (one := _told(k, time, event)) is not None]
     if told:
         return told
@@ -123,10 +123,11 @@ def _sweeps_in(k: int, piece: Signals, inputs: int, events: Sequence[Event]) -> 
 
 def _told(k: int, time: Array, event: Event) -> _Found | None:
     """An autopilot's chirp by its law, as far as it was flown; None where it lies outside the record."""
-    law = {field.name: event.details.get(field.name) for field in fields(Chirp)}
-    if any(isinstance(value, bool) or not isinstance(value, int | float) for value in law.values()):
+    law = [event.details.get(field.name) for field in fields(Chirp)]
+    numbers = [value for value in law if isinstance(value, int | float) and not isinstance(value, bool)]
+    if len(numbers) < len(law):
         return None  # a sweep without its law is looked for in the inputs
-    chirp = Chirp(**law)
+    chirp = Chirp(int(numbers[0]), *map(float, numbers[1:]))
     start, stop = float(event.details["start"]), float(event.details.get("seen", event.details["stop"]))
     inside = (time >= start) & (time <= stop)
     if inside.sum() * float(time[1] - time[0]) < 2.0 / chirp.start_hz:

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import detrend, windows
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
+from swashplate.flights.straight_line import detrended
 from swashplate.identification.core.records import uniform_table
 
 
@@ -52,7 +52,7 @@ def signals(flights: Sequence[Flight], names: Sequence[str]) -> list[Signals]:
             time, table = uniform_table(piece, names, who="the frequency response")
             dt = float((time[-1] - time[0]) / (time.size - 1))
             name = f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s"
-            found.append(Signals(name, dt, np.asarray(detrend(table, axis=0)), float(time[0])))
+            found.append(Signals(name, dt, detrended(table), float(time[0])))
     if not found:
         raise FlightError("there is no flight to work on.")
     rates = sorted({round(1.0 / piece.dt, 3) for piece in found})
@@ -103,7 +103,7 @@ def spectral_matrix(
     long_enough = [piece for piece in pieces if len(piece.values) >= n]
     if not long_enough or n < 4:
         return None
-    taper = windows.hann(n, sym=False)
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)  # Hann's window, periodic
     seen = omega * n * dt >= 2.0 * np.pi * periods * (1.0 - 1e-9)
     kernel = _kernel(omega[seen], taper, dt)
     step = max(1, round((1.0 - overlap) * n))

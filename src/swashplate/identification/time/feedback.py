@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import butter, coherence, csd, sosfiltfilt
 
 from swashplate.arrays import Array
 from swashplate.identification.core.records import Record
@@ -66,6 +65,8 @@ def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExc
 
 
 def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array]) -> AxisExcitation:
+    from scipy.signal import butter, sosfiltfilt
+
     rate = 1.0 / record.dt
     high = min(_BAND[1], 0.4 * rate)
     sos = butter(2, (_BAND[0], high), "bandpass", fs=rate, output="sos")
@@ -102,6 +103,8 @@ def _called(inputs: Mapping[str, float]) -> str:
 
 def _explained(command: Array, motion: list[Array], rate: float) -> float:
     """Adjusted R^2 of the command on present and past motion, everything low-passed to the band and decimated."""
+    from scipy.signal import butter, sosfiltfilt
+
     keep = max(1, round(rate / (4.0 * _BAND[1])))
     sos = butter(4, min(_BAND[1], 0.4 * rate), fs=rate, output="sos")
     slow = [sosfiltfilt(sos, signal)[::keep] for signal in (command, *motion)]
@@ -120,6 +123,8 @@ def _explained(command: Array, motion: list[Array], rate: float) -> float:
 
 
 def _coherence(command: Array, response: Array, rate: float, high: float) -> tuple[float, float]:
+    from scipy.signal import coherence, csd
+
     length = int(min(command.size, 4.0 * rate))
     frequency, squared = coherence(command, response, rate, nperseg=length)
     cross = csd(command, response, rate, nperseg=length)[1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
@@ -20,6 +19,8 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13)
     Rates and velocities are slopes of a cubic fitted to the samples within `window` seconds (Savitzky and Golay 1964),
     so each uses samples after its own time too: this is what predictions are held against, never what they start from.
     """
+    from scipy.signal import savgol_filter
+
     names = list(record.output_names)
     pose = record.outputs[:, [names.index(name) for name in ("x", "y", "z", "phi", "theta", "psi")]].copy()
     pose[:, 3] -= float(nuisance.level_phi)
