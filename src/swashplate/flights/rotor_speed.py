@@ -16,7 +16,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.schema import QUATERNION
-from swashplate.flights.spectral_lines import HOP, STANDS_OUT, WINDOW, Line, track
+from swashplate.flights.spectral_lines import HOP, STANDS_OUT, WINDOW, TrackedLine, track
 
 LOWEST = 8.0
 """Hz below which a helicopter moves by itself."""
@@ -93,7 +93,7 @@ def rotor_speed(
 
 def _best(
     flight: Flight, pairs: list[tuple[str, ...]], name: str, band: tuple[float, float] | None
-) -> tuple[tuple[str, ...], float, Line]:
+) -> tuple[tuple[str, ...], float, TrackedLine]:
     """The pair of signals in which the line stands out most, their rate, and the line."""
     source, found, shown = flight.provenance.source or None, [], []
     for pair in pairs:
@@ -148,7 +148,7 @@ def _unbroken(flight: Flight, pair: tuple[str, ...]) -> tuple[list[tuple[Array, 
     return parts, float((longest.size - 1) / (longest[-1] - longest[0]))
 
 
-def _refuse_crossing(line: Line, name: str, source: str | None) -> None:
+def _refuse_crossing(line: TrackedLine, name: str, source: str | None) -> None:
     if line.crossing:
         raise FlightError(
             f"two lines cross at {line.crossing[0]:.1f} s (and {len(line.crossing) - 1} times more): which is "
@@ -159,7 +159,7 @@ def _refuse_crossing(line: Line, name: str, source: str | None) -> None:
         )
 
 
-def _refuse_folded(flight: Flight, line: Line, name: str, rate: float, source: str | None) -> None:
+def _refuse_folded(flight: Flight, line: TrackedLine, name: str, rate: float, source: str | None) -> None:
     """Refuses a line that slows down when the motors are told to speed up: such is the image of one beyond the band."""
     motors = [motor for motor in flight.channels if motor.startswith("motor")]
     size = np.abs(line.frequency)

@@ -35,7 +35,7 @@ _APART = 6.0  # resolved bins by which two lines must part somewhere to be two
 
 
 @dataclass(frozen=True)
-class Line:
+class TrackedLine:
     """A tracked line.
 
     Attributes:
@@ -69,7 +69,7 @@ def spectra(signal: Complex, rate: float, band: tuple[float, float]) -> tuple[Ar
     return frequency[near][inside], (power / np.maximum(around, 1e-300))[:, inside]
 
 
-def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, float]) -> Line | None:
+def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, float]) -> TrackedLine | None:
     """The line within a band of frequencies, or None where the pieces are shorter than a window.
 
     Args:
@@ -98,7 +98,7 @@ def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, f
     rows = np.concatenate(tables)
     place = np.concatenate(paths)
     peak = rows[np.arange(place.size), place]
-    return Line(
+    return TrackedLine(
         np.concatenate(middles),
         _between_bins(rows, place, hertz),
         _sigma(peak, rate),

@@ -49,7 +49,7 @@ _FEWEST = 1.0  # rows of a regression per number that it finds
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionRecord:
     """One record as the regression sees it.
 
     Attributes:
@@ -71,7 +71,7 @@ class Motion:
         return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
 
 
-Regressors = Callable[[Motion, NDArray[np.intp], int, float], Array]
+Regressors = Callable[[MotionRecord, NDArray[np.intp], int, float], Array]
 """(record, starts, samples ahead, seconds of inputs after the target or `NO_INPUTS`) to rows (s, columns)."""
 
 
@@ -97,7 +97,7 @@ class Ceiling:
 TRAINED, CROSSED = "the flights of the fit", "blocked cross-validation"
 
 
-def past_and_inputs(record: Motion, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
+def past_and_inputs(record: MotionRecord, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
     """Past motion in heading axes at several times, and averages of the inputs past and to come.
 
     Inputs count from their average over the second before the start, which stands beside them: a trim is no motion.
@@ -128,10 +128,10 @@ def past_and_inputs(record: Motion, starts: NDArray[np.intp], ahead: int, after:
 
 
 def ceiling(
-    records: Sequence[Motion],
+    records: Sequence[MotionRecord],
     horizon: float,
     *,
-    training: Sequence[Motion] = (),
+    training: Sequence[MotionRecord] = (),
     regressors: Regressors = past_and_inputs,
 ) -> Ceiling:
     """What the regression reaches `horizon` seconds ahead.
@@ -153,7 +153,7 @@ def ceiling(
     return Ceiling(how, tuple(plain), tuple(past), np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300))))
 
 
-def _known(record: Motion, seconds: float) -> tuple[Array, Array]:
+def _known(record: MotionRecord, seconds: float) -> tuple[Array, Array]:
     """Speeds, lean and turn rates (n, 8) in heading axes, and the pose (n, 6), from the samples up to each one.
 
     The end of a parabola through the last `seconds`, least squares.
@@ -173,7 +173,7 @@ def _turned(x: Array, y: Array, heading: Array) -> tuple[Array, Array]:
     return c * x + s * y, c * y - s * x
 
 
-def _now(record: Motion) -> tuple[Array, Array]:
+def _now(record: MotionRecord) -> tuple[Array, Array]:
     """The states (n, 12) as far as they are known without later samples, and the heading (n,)."""
     motion, pose = _known(record, _WINDOWS[0])
     return np.column_stack([pose[:, :3], motion[:, :3], pose[:, 3:], motion[:, 5:]]), pose[:, 5]
@@ -186,7 +186,7 @@ def _in_heading(change: Array, heading: Array) -> Array:
     return turned
 
 
-def _sees_the_future(record: Motion, ahead: int, regressors: Regressors) -> bool:
+def _sees_the_future(record: MotionRecord, ahead: int, regressors: Regressors) -> bool:
     """Whether rows up to a start change with the motion after it, or with the inputs after its target."""
     if not record.starts.size:
         return False
@@ -196,17 +196,17 @@ def _sees_the_future(record: Motion, ahead: int, regressors: Regressors) -> bool
     pose, truth, inputs = record.pose.copy(), record.truth.copy(), record.inputs.copy()
     for rows, first in ((pose, last + 1), (truth, last + 1), (inputs, last + ahead)):
         rows[first:] += 1.0 + rng.standard_normal(rows[first:].shape)
-    spoilt = Motion(record.time, inputs, pose, truth, record.starts)
+    spoilt = MotionRecord(record.time, inputs, pose, truth, record.starts)
     return not np.array_equal(regressors(record, before, ahead, 0.0), regressors(spoilt, before, ahead, 0.0))
 
 
-def _rows(record: Motion, ahead: int) -> NDArray[np.intp]:
+def _rows(record: MotionRecord, ahead: int) -> NDArray[np.intp]:
     last = record.time.size - ahead - round(_WINDOWS[0] / record.dt)
     return np.arange(round(MEMORY / record.dt), max(last, 0), max(1, round(_ROWS / record.dt)), dtype=np.intp)
 
 
 def _predicted(
-    records: Sequence[Motion], training: Sequence[Motion], ahead: int, after: float, regressors: Regressors
+    records: Sequence[MotionRecord], training: Sequence[MotionRecord], ahead: int, after: float, regressors: Regressors
 ) -> list[Array] | None:
     """Squared errors at the starts of each record (s, 12), of the strength that is best for each state."""
     learnt = [_table(r, _rows(r, ahead), ahead, after, regressors) for r in (training or records)]
@@ -245,14 +245,14 @@ def best_of_strengths(squares: Sequence[Array]) -> list[Array]:
 
 
 def _table(
-    record: Motion, rows: NDArray[np.intp], ahead: int, after: float, regressors: Regressors
+    record: MotionRecord, rows: NDArray[np.intp], ahead: int, after: float, regressors: Regressors
 ) -> tuple[Array, Array]:
     now, heading = _now(record)
     change = _in_heading(record.truth[rows + ahead] - now[rows], heading[rows])
     return regressors(record, rows, ahead, after), change
 
 
-def _out_of_heading(errors: Array, record: Motion) -> Array:
+def _out_of_heading(errors: Array, record: MotionRecord) -> Array:
     heading = _now(record)[1][record.starts]
     return np.stack([_in_heading(rows, -heading) for rows in errors])
 

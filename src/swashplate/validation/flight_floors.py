@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.identification.core.records import POSE, Record
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.validation.black_box import Motion, ceiling
+from swashplate.validation.black_box import MotionRecord, ceiling
 from swashplate.validation.floors import Floor, floors
 
 _PLACE = [PREDICTED.index(name) for name in ("x", "y")]
@@ -22,25 +22,25 @@ class ScoredRecord(NamedTuple):
     """A record with its starts at one horizon, and the standard deviations (12,) that the filter promises there."""
 
     name: str
-    motion: Motion
+    motion: MotionRecord
     promised: Array
 
 
-def motion_of(record: Record, truth: Array, starts: NDArray[np.intp]) -> Motion:
+def motion_of(record: Record, truth: Array, starts: NDArray[np.intp]) -> MotionRecord:
     """A record as the black box sees it.
 
     Args:
         record: with a tracked pose among its outputs. truth: body states (n, 12). starts: sample indices (s,).
     """
     columns = [record.output_names.index(name) for name in POSE]
-    return Motion(record.time, record.inputs, record.outputs[:, columns], truth, starts)
+    return MotionRecord(record.time, record.inputs, record.outputs[:, columns], truth, starts)
 
 
 def flight_floors(
     scored: Mapping[float, Sequence[ScoredRecord]],
     parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array]]],
     *,
-    training: Sequence[Motion] = (),
+    training: Sequence[MotionRecord] = (),
 ) -> tuple[Floor, ...]:
     """What the scores stand beside, by horizon and channel.
 

@@ -25,7 +25,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation import innovations
-from swashplate.validation.black_box import Motion
+from swashplate.validation.black_box import MotionRecord
 from swashplate.validation.calibration import CALIBRATION, SHORTEST_CALIBRATION, calibrate
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
@@ -211,7 +211,7 @@ def _without_contact(
     return made
 
 
-def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[Motion]:
+def _learnt(model: Result[Vehicle, Any] | Vehicle, nuisance: Nuisance) -> list[MotionRecord]:
     """The records of the fit, where it brings them."""
     if not isinstance(model, Result):
         return []

@@ -12,7 +12,7 @@ from swashplate.arrays import Array
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.validation import block_bootstrap
-from swashplate.validation.black_box import LEAK, NO_INPUTS, Motion, ceiling, past_and_inputs
+from swashplate.validation.black_box import LEAK, NO_INPUTS, MotionRecord, ceiling, past_and_inputs
 from swashplate.validation.floors import Floor, floors
 from swashplate.validation.validation import Score
 from swashplate.validation.verdict import verdict
@@ -26,7 +26,7 @@ A, B, C = 3.0, 6.0, 8.0
 
 def _roll(
     seed: int, *, inputs: float, gust: float, feedback: float = 0.0, late: float = 0.1, seconds: float = 40.0
-) -> Motion:
+) -> MotionRecord:
     """A body that only rolls, moved by independent inputs, by gusts, and by a controller that answers late."""
     rng = np.random.default_rng(seed)
     n = round(seconds / DT)
@@ -43,10 +43,10 @@ def _roll(
     truth = 1e-3 * rng.standard_normal((n, 12))
     truth[:, PHI], truth[:, P] = phi, p
     starts = np.arange(round(1.0 / DT), n - AHEAD - 30, 5)
-    return Motion(np.arange(n) * DT, u[:, None], pose, truth, starts)
+    return MotionRecord(np.arange(n) * DT, u[:, None], pose, truth, starts)
 
 
-def _model(record: Motion, *, gain: float) -> Array:
+def _model(record: MotionRecord, *, gain: float) -> Array:
     """The equations from the true state at each start on, along the inputs, with their gain times `gain`."""
     phi, p = record.truth[record.starts, PHI], record.truth[record.starts, P]
     for k in range(AHEAD):
@@ -57,7 +57,7 @@ def _model(record: Motion, *, gain: float) -> Array:
     return made
 
 
-def _floor(record: Motion, predicted: Array, *, regressors=past_and_inputs) -> Floor:  # type: ignore[no-untyped-def]
+def _floor(record: MotionRecord, predicted: Array, *, regressors=past_and_inputs) -> Floor:  # type: ignore[no-untyped-def]
     truth, first = record.truth[record.starts + AHEAD], record.truth[record.starts]
     box = ceiling([record], HORIZON, regressors=regressors)
     found = floors(
@@ -73,7 +73,7 @@ def _floor(record: Motion, predicted: Array, *, regressors=past_and_inputs) -> F
 
 
 @lru_cache(maxsize=1)
-def _moved() -> Motion:
+def _moved() -> MotionRecord:
     return _roll(1, inputs=1.0, gust=0.5)
 
 
@@ -115,11 +115,11 @@ def test_a_controllers_answers_are_a_leak_and_the_ceiling_is_refused(seed: int) 
     assert "No ceiling" in found.words
 
 
-def _peeping(record: Motion, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
+def _peeping(record: MotionRecord, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
     return np.column_stack([past_and_inputs(record, starts, ahead, after), record.pose[starts + ahead // 2, 3]])
 
 
-def _late(record: Motion, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
+def _late(record: MotionRecord, starts: NDArray[np.intp], ahead: int, after: float) -> Array:
     return past_and_inputs(record, starts, ahead + 3, after)
 
 
@@ -156,14 +156,14 @@ def test_what_the_fit_saw_may_teach_the_box() -> None:
     assert (learnt.how, crossed.how) == ("the flights of the fit", "blocked cross-validation")
     errors = [np.sqrt(box.squares[0][:, PHI].mean()) for box in (learnt, crossed)]
     assert errors[0] == pytest.approx(errors[1], rel=0.2)
-    wrong = Motion(other.time, -other.inputs, other.pose, other.truth, other.starts)  # another aircraft
+    wrong = MotionRecord(other.time, -other.inputs, other.pose, other.truth, other.starts)  # another aircraft
     misled = ceiling([record], HORIZON, training=[wrong])
     assert np.sqrt(misled.squares[0][:, PHI].mean()) > 1.5 * errors[0]
 
 
 def test_without_inputs_to_come_the_regression_is_blind_to_them() -> None:
     record = _moved()
-    changed = Motion(record.time, record.inputs.copy(), record.pose, record.truth, record.starts)
+    changed = MotionRecord(record.time, record.inputs.copy(), record.pose, record.truth, record.starts)
     changed.inputs[record.starts[-1] + 1 :] += 1.0
     rows = [past_and_inputs(r, record.starts, AHEAD, NO_INPUTS) for r in (record, changed)]
     np.testing.assert_array_equal(*rows)
