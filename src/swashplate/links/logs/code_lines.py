@@ -90,7 +90,13 @@ def plotted(reads: Sequence[Read], channels: Sequence[Sequence[str]], span: tupl
             lines.append(f"{flight} = {flight}.between({span[0]:.6g}, {span[1]:.6g})")
         lines.append(f"figure = {flight}.plot(channels={list(names)!r})")
         lines.append(f'figure.savefig("{"flight" if len(reads) == 1 else f"flight-{k + 1}"}.pdf")')
-    return Code("Plot", "", "\n".join(lines))
+    named = [read.named(*span) if k == 0 and span is not None else read.named() for k, read in enumerate(reads)]
+    every = ",".join(dict.fromkeys(name for names in channels for name in names))
+    words = {read.words for read in reads}
+    # One command has one set of options: logs that were read differently, or lack a channel, have none.
+    alike = len(words) == 1 and len({tuple(names) for names in channels}) == 1
+    shell = f"swash plot {' '.join(named)} --channels {every} --out flight.pdf {words.pop()}".strip() if alike else ""
+    return Code("Plot", shell, "\n".join(lines))
 
 
 def aligned(first: Read, second: Read) -> Code:
@@ -106,7 +112,8 @@ def spectra(read: Read, channel: str, start: float, stop: float, *, rotor: bool)
     lines.append(f"over_time = sp.spectrogram(flight, {part})")
     if rotor:
         lines.append(f"print(sp.harmonics(flight, {part}))")
-    return Code(f"Spectrum of {channel}", "", "\n".join(lines))
+    shell = f"swash plot {read.named(start, stop)} --channels {channel} --spectrum --out spectrum.pdf {read.words}"
+    return Code(f"Spectrum of {channel}", shell.strip(), "\n".join(lines))
 
 
 def tracked(read: Read, channels: Sequence[str], *, whole: bool) -> Code:

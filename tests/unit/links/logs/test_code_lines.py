@@ -75,10 +75,15 @@ def test_a_part_of_channels_drawn(desk: Desk, folder: Path) -> None:
     flight = python(code)["flight"]
     assert (flight.start, flight.stop) == pytest.approx((5.0, 10.0))
     assert (folder / "flight.pdf").stat().st_size > 1000
+    (folder / "flight.pdf").unlink()
+    shell(code)
+    assert (folder / "flight.pdf").stat().st_size > 1000
 
 
 def test_channels_of_two_logs_drawn(desk: Desk, folder: Path) -> None:
-    python(desk.plot_code([(1, "p"), (2, "p"), (2, "q")], None))
+    code = desk.plot_code([(1, "p"), (2, "p"), (2, "q")], None)
+    assert code["shell"] == "", "logs that were read differently are no one command"
+    python(code)
     assert {path.name for path in folder.glob("*.pdf")} == {"flight-1.pdf", "flight-2.pdf"}
 
 
@@ -93,6 +98,8 @@ def test_the_spectrum_of_a_channel(desk: Desk, capsys: pytest.CaptureFixture[str
     names = python(found["code"])
     assert names["density"].density[1:].tolist() == pytest.approx(found["density"].tolist())
     assert found["words"] in capsys.readouterr().out
+    shell(found["code"])
+    assert Path("spectrum.pdf").stat().st_size > 1000
     assert found["rotor"]["speed"] is None
     assert "no rotor speed" in found["rotor"]["words"]
 

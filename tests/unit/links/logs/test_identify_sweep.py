@@ -184,7 +184,11 @@ def test_work_is_stopped_and_nothing_of_it_is_kept(tmp_path: Path) -> None:
     until(job, "cancelled")
     job.start(lambda *_: Identified({"a": 1}, {}))
     assert until(job, "done")["result"] == {"a": 1}
-    assert ended == [True]
+    for _ in range(400):
+        if ended:
+            break
+        clock.sleep(0.01)
+    assert ended == [True], "the thread itself has ended"
     job.close()
 
 
