@@ -6,6 +6,7 @@ thousand errors.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -19,11 +20,22 @@ from swashplate.identification.time.innovations import FilterPlan, filter_record
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 
-def _traced(plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, starts: Any) -> Any:
+def _traced(
+    plan: FilterPlan, steps: tuple[int, ...], data: Mapping[str, jax.Array], row: jax.Array, starts: jax.Array
+) -> Any:
     """Measured less foretold after `steps` samples from each start, (records, starts, horizons, outputs)."""
     parameters, nuisances, noise = unpack(plan, data, row)
 
-    def one(y: Any, u: Any, voltage: Any, value: Any, rate: Any, velocity: Any, starts: Any, nuisance: Nuisance) -> Any:
+    def one(
+        y: jax.Array,
+        u: jax.Array,
+        voltage: jax.Array,
+        value: jax.Array,
+        rate: jax.Array,
+        velocity: jax.Array,
+        starts: jax.Array,
+        nuisance: Nuisance,
+    ) -> Any:
         _, _, states = filter_record(
             plan.model,
             y,
@@ -38,7 +50,7 @@ def _traced(plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, start
         )
         reaching = commands(plan.model.vehicle, plan.model.dt, u, nuisance)
 
-        def run(start: Any) -> Any:
+        def run(start: jax.Array) -> Any:
             foretold = _foretold(plan, steps, (states, reaching, voltage), parameters, noise, nuisance, start)
             return y[start + jnp.array(steps)] - foretold
 
@@ -49,15 +61,21 @@ def _traced(plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, start
 
 
 def _foretold(
-    plan: FilterPlan, steps: tuple[int, ...], along: Any, parameters: Any, noise: Noise, nuisance: Nuisance, start: Any
+    plan: FilterPlan,
+    steps: tuple[int, ...],
+    along: tuple[FilterState, jax.Array, jax.Array],
+    parameters: tuple[jax.Array, ...],
+    noise: Noise,
+    nuisance: Nuisance,
+    start: jax.Array,
 ) -> Any:
     """What is foretold to be measured after each of `steps` samples from one start (horizons, outputs)."""
     model, (states, reaching, voltage) = plan.model, along
 
-    def advance(x: Any, acting: Any, k: Any) -> Any:
+    def advance(x: jax.Array, acting: jax.Array, k: jax.Array) -> Any:
         return model.step(x, acting, reaching[k], parameters, voltage[k])
 
-    def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
+    def sample(state: FilterState, k: jax.Array) -> tuple[FilterState, Any]:
         following = model.predict(state, noise, advance, k)
         return following, model.measure(following.x, nuisance)
 
@@ -71,11 +89,16 @@ errors_ahead = jax.jit(_traced, static_argnums=(0, 1), compiler_options=QUICK_TO
 
 @partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
 def errors_ahead_moved(
-    plan: FilterPlan, steps: tuple[int, ...], data: Any, row: Any, starts: Any, directions: Any
+    plan: FilterPlan,
+    steps: tuple[int, ...],
+    data: Mapping[str, jax.Array],
+    row: jax.Array,
+    starts: jax.Array,
+    directions: jax.Array,
 ) -> tuple[Any, Any]:
     """The errors, and their slopes along directions of the row (directions, records, starts, horizons, outputs)."""
 
-    def errors(moved: Any) -> Any:
+    def errors(moved: jax.Array) -> Any:
         return _traced(plan, steps, data, moved, starts)
 
     return jax.vmap(lambda d: jax.jvp(errors, (row,), (d,)), out_axes=(None, 0))(directions)

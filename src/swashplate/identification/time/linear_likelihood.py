@@ -11,6 +11,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.filter_loop import filtered
@@ -22,6 +23,9 @@ from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.simulation.discretisation import first_order_hold
 from swashplate.simulation.dynamics import enable_double_precision
+
+Batch = NDArray[np.float64] | NDArray[np.complex128]
+"""Rows of numbers, complex where a step is in one of them."""
 
 STEP = 1e-30
 """Of the complex steps."""
@@ -80,7 +84,7 @@ class OutputErrors(TimeErrors):
         scale = self.row.scale[places][:, None, None, None]
         return [part[0].real for part in parts], [part[1:].imag / STEP * scale for part in parts]
 
-    def _ahead(self, batch: Any, ahead: Ahead) -> list[Any]:
+    def _ahead(self, batch: Batch, ahead: Ahead) -> list[Any]:
         """Errors ahead of every record for a batch of rows, (n_batch, starts, horizons, outputs) each."""
         steps = np.array(ahead.steps)
         found = []
@@ -121,7 +125,7 @@ class OutputErrors(TimeErrors):
         """Output errors of every record, one after the other, for a batch of rows: (n_batch, n_t, n_outputs)."""
         return np.concatenate([np.asarray(_recursion()(*loop)) for loop in self._loops(batch)], axis=1)
 
-    def _loops(self, batch: Any) -> Iterator[tuple[Any, ...]]:
+    def _loops(self, batch: Batch) -> Iterator[tuple[Any, ...]]:
         """Of every record, what `_recursion` takes."""
         n, m = len(self.model.states), len(self.model.inputs)
         a, b, c, d, h1 = self._systems(batch)
@@ -189,7 +193,7 @@ def _states() -> Any:
     return _compiled(lambda errors, states: states)
 
 
-def _compiled(chosen: Callable[[Any, Any], Any]) -> Any:
+def _compiled(chosen: Callable[[jax.Array, jax.Array], jax.Array]) -> Any:
     """The innovations' form along a record for a batch of models: what is chosen of errors and foretold states."""
     enable_double_precision()
 

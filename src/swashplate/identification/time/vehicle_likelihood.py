@@ -215,7 +215,7 @@ class _Filter:
     foretold: Callable[[Any, Any], Any]
 
 
-def _filter(plan: _Plan, given: Any, data: Any, numbers: Any) -> _Filter:
+def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.Array], numbers: jax.Array) -> _Filter:
     """The filter of one record."""
     vehicle = plan.equations.vehicle
     row = jnp.append(numbers, 0.0)
@@ -257,13 +257,20 @@ def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
     return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[0]
 
 
-def _traced_ahead(plan: _Plan, steps: tuple[int, ...], given: Any, data: Any, starts: Any, numbers: Any) -> Any:
+def _traced_ahead(
+    plan: _Plan,
+    steps: tuple[int, ...],
+    given: Mapping[str, jax.Array],
+    data: Mapping[str, jax.Array],
+    starts: jax.Array,
+    numbers: jax.Array,
+) -> Any:
     """Measured less foretold, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
     f = _filter(plan, given, data, numbers)
     states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
 
-    def run(start: Any) -> Any:
-        def sample(x: Any, k: Any) -> tuple[Any, Any]:
+    def run(start: jax.Array) -> Any:
+        def sample(x: jax.Array, k: jax.Array) -> tuple[Any, Any]:
             following = f.predict(x, jax.tree.map(lambda rows: rows[k], f.along))
             return following, f.foretold(following, f.along[1][k])
 
@@ -278,11 +285,17 @@ _ahead = jax.jit(_traced_ahead, static_argnums=(0, 1), compiler_options=QUICK_TO
 
 @partial(jax.jit, static_argnums=(0, 1), compiler_options=QUICK_TO_COMPILE)
 def _ahead_moved(
-    plan: _Plan, steps: tuple[int, ...], given: Any, data: Any, starts: Any, numbers: Any, directions: Any
+    plan: _Plan,
+    steps: tuple[int, ...],
+    given: Mapping[str, jax.Array],
+    data: Mapping[str, jax.Array],
+    starts: jax.Array,
+    numbers: jax.Array,
+    directions: jax.Array,
 ) -> tuple[Any, Any]:
     """The errors ahead and their slopes along directions of the row (directions, starts, horizons, outputs)."""
 
-    def errors(moved: Any) -> Any:
+    def errors(moved: jax.Array) -> Any:
         return _traced_ahead(plan, steps, given, data, starts, moved)
 
     return jax.vmap(lambda d: jax.jvp(errors, (numbers,), (d,)), out_axes=(None, 0))(directions)
