@@ -240,7 +240,10 @@ def test_a_bad_card_is_refused(case: str, simulated: Path, tmp_path: Path) -> No
         (("--free", "tau_f_uper"), ("tau_f_uper",)),
         (("--free", "mass,mass"), ("twice",)),
         (("--unit", "x"), ("--unit", "NAME=VALUE")),
-        (("--wind", "--method", "output-error"), ("wind", "'output-error' does not know it", "choose another method")),
+        (
+            ("--wind", "--method", "output-error"),
+            ("wind", "'output-error' does not know it", "prediction-error"),
+        ),
         (("--cutoff", "80"), ("80",)),
         (("--cutoff", "0.05"), ("simulated.nc", "10.000 s", "0.05 Hz", "20.000 s")),
     ],

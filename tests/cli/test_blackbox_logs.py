@@ -93,5 +93,5 @@ def test_export_as_mcap_and_what_it_refuses(tmp_path: Path) -> None:
     direct = write_mcap(sp.read(tmp_path / "a.bbl", log=2), tmp_path / "b.mcap")
     assert direct.read_bytes() == written
     assert "mcap takes a flight" in one_message(swash("export", "coax", "--format", "mcap", "--mass", "1"))
-    assert "no file's name" in one_message(swash("export", "coax", "--format", "mcap", "--name", "../x"))
+    assert "no file's name" in one_message(swash("export", tmp_path / "a.bbl", "--format", "mcap", "--name", "../x"))
     assert "coax" in one_message(swash("export", "coax", "--format", "mcap", "--out", tmp_path))

@@ -14,6 +14,7 @@ import pytest
 from commands import one_message, swash
 
 import swashplate as sp
+from swashplate.api import identification
 from swashplate.cli.console import as_json
 from swashplate.cli.outputs import folder_when_complete, place_of
 from swashplate.errors import SwashError
@@ -98,8 +99,12 @@ class Work:
 @pytest.fixture
 def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
     done = Work()
-    for verb in ("identify", "validate", "report"):
+    for verb in ("validate", "report"):
         monkeypatch.setitem(vars(sp), verb, getattr(done, verb))  # in the dictionary: nothing else is loaded
+    for verb in ("identify", "validate"):
+        monkeypatch.setattr(identification, verb, getattr(done, verb))
+    monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
+    monkeypatch.setattr(identification, "write_page", lambda path, results: done.report(*results, path=path))
     return done
 
 

@@ -89,7 +89,9 @@ def test_a_mirrored_helicopter_flies_the_mirrored_flight(seed: int) -> None:
     vehicle = catalogue.vehicle("coax")
     x, u, around, flown = random_case(vehicle, seed)
     odd = [
-        name for name in vehicle.parameter_names if name.startswith(("k_zeta", "o_zeta", "k_torque", "inertia_drive"))
+        name
+        for name in vehicle.parameter_names
+        if name.startswith(("k_zeta", "o_zeta", "k_torque", "inertia_drive", "phase_asymmetry"))
     ]
     odd += ["a_alpha_u", "a_beta_v", "a_alpha_u_linear", "a_beta_v_linear"]
     card = flown.card.values()

@@ -246,6 +246,9 @@ def decouple(
         step = command_for_speed(vehicle, papers, hover, speed=to_speed)
     if rule == "straight":
         made = _straight(vehicle, papers, hover, step)
+        if to_speed is not None:  # the straight law flies the step a little faster
+            step = command_for_speed(vehicle, made, hover, speed=to_speed)
+            made = _straight(vehicle, papers, hover, step)
     if drift is not None and step is not None:
         made = corrected_by_step(vehicle, made, hover, command=step, drift=drift)
     slowest = loop_modes(vehicle, made, hover)[0]

@@ -20,7 +20,6 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import is_state_space, structure
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.simulation.linearize import linearize
 from swashplate.validation.structure_reduction import reduce as reduced
 from swashplate.validation.verification import verify_inside
 
@@ -128,9 +127,16 @@ def _started(
 ) -> StateSpaceModel:
     """The model with start values from fitted transfer functions (files or their folders) or from a vehicle."""
     if isinstance(source, Vehicle):
-        return from_linear_model(model, linearize(source))
+        return _from_hover(model, source)
     given = (source,) if isinstance(source, str | Path) else tuple(source)
     places = [Path(name) / "model.toml" if Path(name).is_dir() else Path(name) for name in given]
     if places and all(is_state_space(str(place)) for place in places):
         return from_models(model, [structure(str(place)) for place in places], responses, seed=seed)
-    return from_linear_model(model, linearize(vehicle(",".join(map(str, given)))))
+    return _from_hover(model, vehicle(",".join(map(str, given))))
+
+
+def _from_hover(model: StateSpaceModel, source: Vehicle) -> StateSpaceModel:
+    """With the start values that a vehicle has, linearised in hover."""
+    from swashplate.simulation.linearize import linearize  # the rest of this verb needs no JAX
+
+    return from_linear_model(model, linearize(source))

@@ -9,11 +9,9 @@ from swashplate.api.linear_study import LinearStudy
 from swashplate.api.saying import Say, silent
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
-from swashplate.identification.time.linearised_model import model_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.simulation.linearize import linearize
 from swashplate.validation.verification import Verification, verify_inside
 
 
@@ -57,4 +55,7 @@ def _other(vehicle: Vehicle) -> StateSpaceModel:
     """What an identified model is compared with: another model, or a vehicle linearised in hover."""
     if vehicle.structure is not None:
         return vehicle.structure
+    from swashplate.identification.time.linearised_model import model_of  # the rest of this verb needs no JAX
+    from swashplate.simulation.linearize import linearize
+
     return model_of(linearize(vehicle), name=f"{vehicle.name}, linearised in hover")

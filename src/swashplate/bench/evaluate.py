@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import ModuleType
-from typing import ClassVar
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from swashplate.bench.refusals import (
     refuse_saturated,
     refuse_stalled,
 )
-from swashplate.bench.result import BenchCheck, BenchResult
+from swashplate.bench.result import Bench, BenchDetails, BenchResult
 from swashplate.bench.virtual_bench import RecordSchedule
 from swashplate.errors import BenchError
 from swashplate.identification.core.accuracy import blind_directions
@@ -87,30 +86,6 @@ MEASURED = (
 
 _WORTH_KEEPING = 1e-4
 """Smaller correlations are not written to the card."""
-
-
-@dataclass(frozen=True)
-class BenchDetails:
-    """What the bench adds to a result.
-
-    Attributes:
-        results: of each procedure that has records, in the order of `PROCEDURES`.
-        kept: parameters that the bench could measure and that no record was there for.
-        disagreements: where two procedures measure the same parameter, in words.
-    """
-
-    kind: ClassVar[str] = "bench"
-    results: tuple[BenchResult, ...]
-    kept: tuple[str, ...]
-    disagreements: tuple[BenchCheck, ...] = ()
-
-
-Bench = Result[Vehicle, BenchDetails]
-"""What `evaluate` returns: the vehicle with the measured card, and the joint covariance of what was measured.
-
-There are no bounds corrected for coloured errors: averaged points have no order in time, and the procedures take their
-scatter from the records themselves. None has failed: what contradicts itself ends in an error instead.
-"""
 
 
 def schedules(hover: Mapping[str, float]) -> list[RecordSchedule]:

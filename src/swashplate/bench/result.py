@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.core.result import Result
+from swashplate.models.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -119,3 +122,27 @@ class BenchResult:
         """Value and standard deviation of a parameter."""
         place = self.names.index(name)
         return float(self.values[place]), float(self.sigma[place])
+
+
+@dataclass(frozen=True)
+class BenchDetails:
+    """What the bench adds to a result.
+
+    Attributes:
+        results: of each procedure that has records, in the order of `PROCEDURES`.
+        kept: parameters that the bench could measure and that no record was there for.
+        disagreements: where two procedures measure the same parameter, in words.
+    """
+
+    kind: ClassVar[str] = "bench"
+    results: tuple[BenchResult, ...]
+    kept: tuple[str, ...]
+    disagreements: tuple[BenchCheck, ...] = ()
+
+
+Bench = Result[Vehicle, BenchDetails]
+"""What `evaluate` returns: the vehicle with the measured card, and the joint covariance of what was measured.
+
+There are no bounds corrected for coloured errors: averaged points have no order in time, and the procedures take their
+scatter from the records themselves. None has failed: what contradicts itself ends in an error instead.
+"""

@@ -8,8 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from swashplate.bench.evaluate import Bench
-from swashplate.bench.result import BenchCheck, BenchResult, Curve
+from swashplate.bench.result import Bench, BenchCheck, BenchResult, Curve
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import BLACK, GREEN, GREY, MODEL, PUBLISHED, axis, base_layout, packed, unit_words

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from swashplate.bench.evaluate import BenchDetails
+from swashplate.bench.result import BenchDetails
 from swashplate.errors import SwashError
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse

@@ -31,7 +31,7 @@ PARTS: Registry[type] = Registry(
         "records in time": "swashplate.identification.core.time_fit:TimeDetails",
         "state-space responses": "swashplate.identification.frequency.state_space_result:StateSpaceDetails",
         "transfer functions": "swashplate.identification.frequency.transfer_function_fit:TransferFunctionDetails",
-        "bench": "swashplate.bench.evaluate:BenchDetails",
+        "bench": "swashplate.bench.result:BenchDetails",
     },
 )
 """Classes that stand for themselves in a document, by their `kind`: comparisons, and what only one method has."""
