@@ -121,8 +121,8 @@ def test_any_text_parses_or_is_explained(text: str) -> None:
 
 
 def test_a_multirotor_says_itself_which_motors_an_axis_moves() -> None:
-    x8 = sp.vehicle("x8")
-    moved = parse("step:heave,1s,0.1").offsets(np.array([0.1]), inputs=x8.input_names, axes=x8.stick_axes)
+    crazyflie = sp.vehicle("crazyflie")
+    moved = parse("step:heave,1s,0.1").offsets(np.array([0.1]), inputs=crazyflie.input_names, axes=crazyflie.stick_axes)
     assert all(values[0] == pytest.approx(0.1) for values in moved.values())
-    turned = parse("step:yaw,1s,0.1").offsets(np.array([0.1]), inputs=x8.input_names, axes=x8.stick_axes)
+    turned = parse("step:yaw,1s,0.1").offsets(np.array([0.1]), inputs=crazyflie.input_names, axes=crazyflie.stick_axes)
     assert {np.sign(values[0]) for values in turned.values()} == {1.0, -1.0}
