@@ -258,6 +258,7 @@ def test_the_papers_figure_as_a_report(tmp_path: Path) -> None:
     assert abs(found["with"]["drift"]) < 0.05 < 0.4 < found["by the paper"]["drift"]
 
 
+@pytest.mark.proof
 def test_aircraft_that_differ_by_more_than_a_fit_says(tmp_path: Path) -> None:
     controller, worst = tmp_path / "place.toml", tmp_path / "worst.nc"
     assert swash("decouple", "coax", "--mode", "place", "--out", controller, "--quiet").code == 0

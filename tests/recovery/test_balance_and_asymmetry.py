@@ -63,6 +63,7 @@ def test_a_symmetric_aircraft_is_found_symmetric() -> None:
         assert fit[name].sigma_corrected < 0.1
 
 
+@pytest.mark.proof
 def test_errors_ahead_find_them_too() -> None:
     fit = found(tuple(BENT.items()), (0.25, 1.0))
     assert fit.settings["horizon"] == [0.25, 1.0]

@@ -82,6 +82,7 @@ def truth() -> Callable[[np.ndarray], np.ndarray]:
     return response
 
 
+@pytest.mark.proof
 def test_the_linear_response_comes_back(
     responses: FrequencyResponse, truth: Callable[[np.ndarray], np.ndarray]
 ) -> None:

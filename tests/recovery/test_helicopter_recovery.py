@@ -52,6 +52,7 @@ def _fits(document: dict[str, Any]) -> dict[tuple[str, str], float]:
     return {(score["predictor"], score["channel"]): score["fit"] for score in document["scores"]}
 
 
+@pytest.mark.proof
 def test_hub_spring_blades_and_wake_distortion_come_back_by_output_error(tmp_path: Path) -> None:
     """A card with estimates becomes a card with identified values."""
     found = _recovered(tmp_path, "output-error", free="hub_stiffness,blade_inertia,wake_distortion", seconds=9)

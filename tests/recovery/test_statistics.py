@@ -19,6 +19,7 @@ def inside(recoveries: list[Recovery]) -> float:
     return float(np.mean([np.abs(r.distance) < 2.0 for r in recoveries]))
 
 
+@pytest.mark.proof
 def test_a_few_seeds_recover_the_truth() -> None:
     flight = flown()
     recoveries = [recover(flight, seed=seed, unbroken=True) for seed in range(3)]

@@ -59,6 +59,7 @@ def test_a_batch_is_the_single_flight_many_times(coax: Vehicle, hover: Trim) -> 
     assert alone.values("motor_lower")[0] == pytest.approx(hover.commands()["motor_lower"], rel=1e-3)
 
 
+@pytest.mark.proof
 def test_noise_has_its_size_its_seed_and_its_effect(coax: Vehicle, hover: Trim) -> None:
     controller = autopilot(coax, hover)
     ask = {"duration": 10.0, "size": 40, "keep": 5, "noise": {"p": 0.02, "z": 0.002}}

@@ -70,6 +70,7 @@ def test_figure_10(coax: Vehicle, hover: Trim) -> None:
         assert math.degrees(np.max(np.abs(flight.values("psi")))) < 1.1
 
 
+@pytest.mark.proof
 def test_a_law_wrong_by_three_degrees(coax: Vehicle) -> None:
     """An independent calculation without the bar's misalignment: +0.78 m and -0.74 m at 6 m for a lag 3 deg off."""
     aligned = coax.with_values({"k_zeta_upper": 0.0, "o_zeta_upper": 0.0})
