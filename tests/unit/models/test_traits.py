@@ -60,6 +60,8 @@ def test_a_model_that_says_nothing_may_free_what_its_card_is_uncertain_of() -> N
     assert uncertain_numbers(replace(card, parameters={"mass": known})) == {}
 
 
-@pytest.mark.parametrize(("name", "ready"), [("coax", {"flight", "full"}), ("raptor50", {"rotor", "full"})])
+@pytest.mark.parametrize(
+    ("name", "ready"), [("coax", {"flight", "full", "balanced", "asymmetric"}), ("raptor50", {"rotor", "full"})]
+)
 def test_the_ready_choices_are_the_models_own(name: str, ready: set[str]) -> None:
     assert set(vehicle(name).choices) == ready
