@@ -243,8 +243,10 @@ def test_what_a_killed_program_left_is_saved_and_what_a_living_one_writes_is_not
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as writer:
         try:
             assert writer.stdout is not None
-            while writer.stdout.readline().strip() != "here":
-                pass
+            for line in writer.stdout:  # ends where the writer does
+                if line.strip() == "here":
+                    break
+            assert writer.poll() is None, "it is alive"
             assert recover(file, said.append) == (), "it is alive"
             assert names(tmp_path) == ["f-2.growing", "f.nc"]
         finally:
