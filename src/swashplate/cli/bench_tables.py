@@ -14,7 +14,7 @@ from swashplate.cli.tables import table
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.bench.evaluate import Bench
+    from swashplate.bench.result import Bench
 
 
 def bench_tables(bench: Bench) -> Iterator[Table]:
