@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from swashplate.bench.evaluate import Bench, evaluate
+from swashplate.bench.evaluate import evaluate
 from swashplate.bench.plan import planned
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.record_files import read_records
+from swashplate.bench.result import Bench
 from swashplate.bench.virtual_bench import repeated, virtual_bench
 from swashplate.models.vehicle import Vehicle
 
