@@ -64,6 +64,8 @@ def machine() -> dict[str, str]:
 
 def compute(names: Sequence[str], *, environment: dict[str, str] | None = None) -> dict[str, dict[str, Any]]:
     """Runs cases in one process of their own: {name: {"values": ..., "seconds": ...}}; a failure is raised as text."""
+    if not names:
+        return {}
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "computed.json"
         command = [sys.executable, "-m", "tests.golden.freeze", "--compute", str(out), *names]
