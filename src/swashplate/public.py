@@ -64,6 +64,8 @@ _LIGHT: Mapping[str, str] = {
     "vehicle": "swashplate.models.catalogue:vehicle",
     "vehicles": "swashplate.models.catalogue:cards_by_name",
     "verify": "swashplate.validation.verification:verify",
+    "fit_ss": "swashplate.api.fit_ss:fit_ss",
+    "validate_linear": "swashplate.api.validate_linear:validate_linear",
 }
 _COMPUTING: Mapping[str, str] = {
     "QUIET": "swashplate.simulation.sensors:QUIET",
@@ -82,7 +84,6 @@ _COMPUTING: Mapping[str, str] = {
     "excitation": "swashplate.api.excitation:excitation",
     "export_model": "swashplate.api.export:export_model",
     "fit_in_time": "swashplate.identification.time.linear_time_fit:fit_in_time",
-    "fit_ss": "swashplate.api.fit_ss:fit_ss",
     "fit_time": "swashplate.api.fit_time:fit_time",
     "fit_vehicle": "swashplate.identification.time.vehicle_time_fit:fit_vehicle",
     "fly_maneuver": "swashplate.api.fly_maneuver:fly_maneuver",
@@ -119,7 +120,6 @@ _COMPUTING: Mapping[str, str] = {
     "trim": "swashplate.simulation.trim:trim",
     "trim_curve": "swashplate.simulation.trim_curve:trim_curve",
     "validate": "swashplate.validation.verb:validate",
-    "validate_linear": "swashplate.api.validate_linear:validate_linear",
     "write_ardupilot_parameters": "swashplate.api.link:write_ardupilot_parameters",
 }
 """Names that set JAX up when they are first used; the others leave it alone."""
