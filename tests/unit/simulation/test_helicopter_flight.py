@@ -257,5 +257,5 @@ def test_a_flight_far_out_of_reach_still_names_the_limit() -> None:
     """Where Newton's method finds no way from hover in one go, it walks: the limit that stops it is known."""
     with pytest.raises(TrimError, match=r"60 m/s ahead.* needs theta0 = 61.2 deg, but its limit is 15.0 deg"):
         trim(RAPTOR, speed=60.0)
-    with pytest.raises(TrimError, match=r"1000 m/s ahead.* is out of reach: 25% of the way there needs theta0 = "):
+    with pytest.raises(TrimError, match=r"1000 m/s ahead.* is out of reach: [0-9]+% of the way there needs theta0 = "):
         trim(RAPTOR, speed=1000.0)
