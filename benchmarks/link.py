@@ -28,7 +28,10 @@ def exchanges(name: str, *, count: int, repeats: int) -> Result:
     with subprocess.Popen([*command, "--idle-exit", "20"], stderr=subprocess.PIPE, text=True) as link:
         try:
             port = _port(link)
-            rates = [_run(port, count) for _ in range(repeats)]
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:  # a link belongs to its sender
+                client.settimeout(10.0)
+                client.connect(("127.0.0.1", port))
+                rates = [_run(client, range(k * count, (k + 1) * count)) for k in range(repeats)]
         finally:
             link.terminate()
             link.communicate()
@@ -44,16 +47,13 @@ def _port(link: subprocess.Popen[str]) -> int:
     raise RuntimeError("the link did not start")
 
 
-def _run(port: int, count: int) -> float:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-        client.settimeout(10.0)
-        client.connect(("127.0.0.1", port))
-        packets = [struct.pack("<HHI16H", 18458, _RATE, frame, *_RUNNING) for frame in range(count)]
-        begin = time.perf_counter()
-        for packet in packets:
-            client.send(packet)
-            client.recv(4096)
-        return count / (time.perf_counter() - begin)
+def _run(client: socket.socket, frames: range) -> float:
+    packets = [struct.pack("<HHI16H", 18458, _RATE, frame, *_RUNNING) for frame in frames]
+    begin = time.perf_counter()
+    for packet in packets:
+        client.send(packet)
+        client.recv(4096)
+    return len(frames) / (time.perf_counter() - begin)
 
 
 def measure(*, short: bool) -> list[Result]:
