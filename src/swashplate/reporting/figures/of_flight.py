@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.flights import spectrum as spectra
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection
 from swashplate.flights.schema import channel
@@ -42,8 +42,6 @@ _LONGEST = 14
 """Characters; longer lists of names stand in the key only."""
 _GAP = 5.0
 """Usual steps; a longer one is a gap, which no line bridges."""
-_SEGMENTS = 8
-"""Parts of an unbroken piece that a spectrum averages, half overlapping."""
 _COLUMNS, _ROWS = 300, 160
 """Points that a spectrogram has at most."""
 _TOGETHER = (
@@ -172,28 +170,8 @@ def _line(flight: Flight, name: str) -> tuple[Array, Array]:
 
 
 # ---- over frequency --------------------------------------------------------------------------------------------
-def _pieces(flight: Flight, name: str) -> tuple[list[Array], float, list[float]]:
-    """The unbroken pieces of a channel at its usual rate [Hz] (linear between its own stamps), and their starts [s]."""
-    time, values = flight.time(name), flight.values(name) * channel(name).shown_factor
-    good = np.isfinite(values)
-    time, values = time[good], values[good]
-    if time.size < 16:
-        raise FlightError("has too few samples for a spectrum.", where=flight.provenance.source or None, channel=name)
-    step = float(np.median(np.diff(time)))
-    cuts = np.flatnonzero(np.diff(time) > _GAP * step) + 1
-    pieces, starts = [], []
-    for t, v in zip(np.split(time, cuts), np.split(values, cuts), strict=True):
-        if t.size >= 16:
-            grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
-            pieces.append(np.asarray(np.interp(grid, t, v), dtype=np.float64))
-            starts.append(float(t[0]))
-    if not pieces:
-        raise FlightError("has no unbroken piece of 16 samples.", where=flight.provenance.source or None, channel=name)
-    return pieces, 1.0 / step, starts
-
-
 def spectrum(flights: Sequence[Flight], *, channels: Sequence[str] | None = None) -> Figure:
-    """Power spectral density of channels (Welch 1967: Hann windows, half overlapping, mean over the unbroken pieces).
+    """Power spectral density of channels, as `flights.spectrum` computes it.
 
     Raises:
         FlightError: a channel that no flight has, or one with too few samples.
@@ -210,21 +188,25 @@ def spectrum(flights: Sequence[Flight], *, channels: Sequence[str] | None = None
         for k, flight in enumerate(flights):
             if name not in flight:
                 continue
-            pieces, rate, _ = _pieces(flight, name)
-            size = max(16, min(max(piece.size for piece in pieces) // _SEGMENTS * 2, 8192))
-            long = [piece for piece in pieces if piece.size >= size] or [max(pieces, key=len)]
-            found = [signal.welch(piece, rate, nperseg=min(size, piece.size), detrend="linear") for piece in long]
-            hertz = found[0][0][1:]
-            power = np.average([p for _, p in found], axis=0, weights=[piece.size for piece in long])[1:]
+            found = spectra.spectrum(flight, name)
             key = Key(label(flight, k), _COLORS[k % len(_COLORS)])
             keys[key.words] = key
             hover = f"{name}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
-            traces.append(line(hertz, power, name=key.words, color=key.color, axis=_number(i), hover=hover))
+            traces.append(
+                line(
+                    found.frequency[1:],
+                    found.density[1:],
+                    name=key.words,
+                    color=key.color,
+                    axis=_number(i),
+                    hover=hover,
+                )
+            )
     return Figure(
         "spectrum",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        "Power spectral density, one-sided, after Welch.",
+        "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
         f"Power spectra of {', '.join(name for (name,) in panels)}.",
         keys=tuple(keys.values()) if len(flights) > 1 else (),
     )
@@ -241,23 +223,16 @@ def spectrogram(flight: Flight, *, channels: Sequence[str] | None = None) -> Fig
     layout["margin"] = {**layout["margin"], "r": 70}
     traces: list[dict[str, Any]] = []
     for i, name in enumerate(names):
-        pieces, rate, starts = _pieces(flight, name)
-        longest = max(range(len(pieces)), key=lambda k: len(pieces[k]))
-        piece, start = pieces[longest], starts[longest]
-        size = int(min(max(32, 2 ** round(np.log2(max(piece.size / 40.0, 32.0)))), piece.size))
-        step = max(size // 4, piece.size // _COLUMNS, 1)
-        hertz, time, power = signal.spectrogram(
-            piece, rate, nperseg=size, noverlap=max(size - step, 0), detrend="linear"
-        )
-        thin = max(1, -(-hertz.size // _ROWS))
-        rows = [power[k : k + thin].max(axis=0) for k in range(0, hertz.size, thin)]
+        found = spectra.spectrogram(flight, name, frames=_COLUMNS)
+        thin = max(1, -(-found.frequency.size // _ROWS))
+        rows = [found.density[k : k + thin].max(axis=0) for k in range(0, found.frequency.size, thin)]
         level = 10.0 * np.log10(np.maximum(np.array(rows), 1e-30))
         level -= level.max()
         traces.append(
             {
                 "type": "heatmap",
-                "x": numbers(start + time),
-                "y": numbers(hertz[::thin]),
+                "x": numbers(found.time),
+                "y": numbers(found.frequency[::thin]),
                 "z": [numbers(np.round(row, 1)) for row in level],
                 "zmin": -60,
                 "zmax": 0,
