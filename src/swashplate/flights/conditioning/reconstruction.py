@@ -30,12 +30,16 @@ from swashplate.text_table import text_table
 _FORCES = ("ax", "ay", "az")
 _DRIVES = (("servo_roll", "p"), ("servo_pitch", "q"), ("motor_lower", "r"), ("motor_upper", "r"))
 _SIGNIFICANT = 3.0
+_LEFT_OUT = (
+    "The standard errors leave out the noise of the attitude that turns the rates: a bias of only a few of them "
+    "may be none."
+)
 _HEAD = ("channel", "unit", "bias", "sigma", "scale - 1", "sigma", "significant")
 
 
 @dataclass(frozen=True)
 class SensorErrorEstimate:
-    """A number with its standard error."""
+    """A number with its standard error, in which the noise of the attitude is left out."""
 
     value: float
     sigma: float
@@ -96,7 +100,7 @@ class Reconstruction:
             told = [word for word, e in (("bias", b), ("scale", s)) if e.significant]
             numbers = [f"{b.value:+.4g}", f"{b.sigma:.2g}", f"{s.value:+.4g}", f"{s.sigma:.2g}"]
             rows.append([name, channel(name).unit, *numbers, " and ".join(told)])
-        lines = [text_table(_HEAD, rows, left=(0, 1, 6))] if rows else []
+        lines = [text_table(_HEAD, rows, left=(0, 1, 6)), _LEFT_OUT] if rows else []
         lines += [str(shift) for shift in self.time_shifts]
         if self.lever is not None:
             lines.append(str(self.lever))
