@@ -117,19 +117,20 @@ class Suggestion(Shown):
         """Numbers and words as JSON types."""
 
         def read(f: LoopFigures) -> dict[str, Any]:
-            margins = {name: [r.value, r.sigma] for name, r in vars(f.margins).items()}
-            return {**vars(f), "margins": margins}
+            return {name: value for name, value in vars(f).items() if name != "margins"}
 
-        told = {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
-        return {k: v for k, v in vars(self).items() if k != "loop"} | told
+        def margins(f: LoopFigures) -> dict[str, list[float]]:
+            return {name: [r.value, r.sigma] for name, r in vars(f.margins).items()}
+
+        told: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
+        told |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
+        return told | {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
 
     def table(self) -> list[tuple[str, str, str]]:
         """What the loop is worth: a name with its unit, suggested, flown."""
-        columns = [
-            [text for _, text in _told(f)] if np.isfinite(f.peak) else ["-"] * len(_told(f))
-            for f in (self.figures_suggested, self.figures_flown)
-        ]
-        return list(zip((name for name, _ in _told(self.figures_suggested)), *columns, strict=True))
+        told = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
+        coupled = any(np.isfinite(f.coupling) for f in (self.figures_suggested, self.figures_flown))
+        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*told, strict=True)][: 8 if coupled else 7]
 
     def __repr__(self) -> str:
         lines = [f"{self.axis}: {self.words}"]
@@ -146,7 +147,7 @@ class Suggestion(Shown):
 
 def _told(f: LoopFigures) -> list[tuple[str, str]]:
     def number(value: float, scale: float = 1.0) -> str:
-        return f"{scale * value:.3g}" if np.isfinite(value) else "none"
+        return f"{scale * value:.3g}" if np.isfinite(value) else "-"
 
     return [
         ("phase margin [deg]", f"{f.margins.phase_margin!r}"),
@@ -157,7 +158,7 @@ def _told(f: LoopFigures) -> list[tuple[str, str]]:
         ("disturbance rejection [rad/s]", number(f.rejection)),
         ("overshoot of a step [%]", number(f.overshoot, 100.0)),
         ("coupling into other rates", number(f.coupling)),
-    ][: 8 if np.isfinite(f.coupling) else 7]
+    ]
 
 
 def suggest_gains(
