@@ -83,13 +83,13 @@ def _rotor(
     blade = blade_element.span(par.tip_loss, par.root_cutout)
     mu_x, mu_y, mu_z, lam = across.x / tip, across.y / tip, -axial / tip, flow / tip
     root = pitch - 0.75 * par.rotor_twist
-    disc = blade_element.Disc(
-        mu_x, mu_y, mu_z, lam, 0.0, 0.0, 0.0, 0.0, root, par.rotor_twist, 0.0, 0.0, 0.0, 0.0, 0.0
-    )
+    disc = blade_element.Disc(mu_x, mu_y, mu_z, lam, 0.0, 0.0, 0.0, 0.0, root, par.rotor_twist, 0.0, 0.0, 0.0, 0.0, 0.0)
     CT = blade_element.thrust_coefficient(disc, solidity, par.rotor_lift_slope, blade)
     mu2 = mu_x * mu_x + mu_y * mu_y
     uneven = (par.induced_factor - 1.0) * own / tip
-    profile = 0.5 * solidity * drag * blade.d3 * (1.0 + 4.65 * mu2)  # with the in-plane drag's power, as for tail rotors
+    profile = (
+        0.5 * solidity * drag * blade.d3 * (1.0 + 4.65 * mu2)
+    )  # with the in-plane drag's power, as for tail rotors
     return CT, (lam - mu_z + uneven) * CT + profile
 
 
@@ -149,9 +149,7 @@ def rotor_pair(
         thrusts.append(pressure * CT)
         torques.append(pressure * radius * CQ)
         loading = tip * tip * turning * turning * CT
-        rates.append(
-            coaxial_wake.induced_rate(own[i], flows[i], axial[i], across2, loading, radius=radius, xp=xp)
-        )
+        rates.append(coaxial_wake.induced_rate(own[i], flows[i], axial[i], across2, loading, radius=radius, xp=xp))
     return RotorPair(thrusts[0], thrusts[1], torques[0], torques[1], Induced(rates[0], rates[1]), shares)
 
 
@@ -181,9 +179,7 @@ def balanced_hover(par: Any, options: InflowOptions, xp: Backend) -> BalancedHov
     def at(upper: float, lower: float) -> tuple[RotorPair, Induced]:
         induced = _settled_inflow(upper, lower, par, options, xp)
         omegas, far = (upper, lower), (_FAR, _FAR)
-        return rotor_pair(
-            still, (level, level), omegas, induced, far, par, par.air_density, free_air, xp
-        ), induced
+        return rotor_pair(still, (level, level), omegas, induced, far, par, par.air_density, free_air, xp), induced
 
     middle = 0.5 * par.k_drive_lower
     low, high = 0.25, 4.0

@@ -140,7 +140,7 @@ def rotor_factors(vehicle: Vehicle) -> dict[str, float]:
     density; in hover they hold for any weight, away from it they do not.
     """
     card = vehicle.card.values()
-    if vehicle.options is None:
+    if not isinstance(vehicle.options, InflowOptions):
         return {name: card[name] for name in _BALANCING}
     hovering = balanced_hover(vehicle.values(), vehicle.options, _XP)
     return {
@@ -175,8 +175,8 @@ def inflow_doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment
     low, high = (share * hover for share in _RING)
     if low < air.z < high and across < hover:
         found["vortex ring"] = (
-            f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({low:.1f} to {high:.1f} m/s below "
-            f"{hover:.1f} m/s of speed), where momentum theory is only a mean"
+            f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({low:.1f} to {high:.1f} m/s "
+            f"below {hover:.1f} m/s of speed), where momentum theory is only a mean"
         )
     solidity = par.rotor_blades * par.rotor_chord / (math.pi * par.rotor_radius)
     for side, lift in zip(("upper", "lower"), acting.lift, strict=True):

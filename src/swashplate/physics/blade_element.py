@@ -196,11 +196,7 @@ def disc_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar, blad
     )
     cos2, sin2 = k.m2 * i.c0 + k.m3 * i.c1, k.m2 * i.s0 + k.m3 * i.s1
     lean_x = i.up_m * mean1 + 0.5 * (
-        i.up_c0 * cos1
-        + i.up_c1 * cos2
-        + i.up_s0 * sin1
-        + i.up_s1 * sin2
-        + k.m1 * (i.up_c2 * i.c2 + i.up_s2 * i.s2)
+        i.up_c0 * cos1 + i.up_c1 * cos2 + i.up_s0 * sin1 + i.up_s1 * sin2 + k.m1 * (i.up_c2 * i.c2 + i.up_s2 * i.s2)
     )
 
     profile = drag / lift_slope
