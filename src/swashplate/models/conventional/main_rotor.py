@@ -123,10 +123,9 @@ def main_rotor(
         chord=par.rotor_chord,
         radius=par.rotor_radius,
     )
+    cone = par.precone
     if options.coning:
         cone = flapping.coning(_moments(seen, blade).mean, held, par.precone, free=1.0)
-    else:
-        cone = par.precone
     seen = seen._replace(a0=cone)
     still = _moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1), blade)
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
@@ -190,6 +189,4 @@ def _moments(seen: blade_element.Disc, blade: blade_element.Span) -> blade_eleme
 def _near_ground(
     height: Scalar, mu2: Scalar, lam0: Scalar, par: Any, options: HelicopterOptions, xp: Backend
 ) -> Scalar:
-    return ground_effect.induced_share(
-        height, mu2, lam0, radius=par.rotor_radius, form=options.ground_effect, xp=xp
-    )
+    return ground_effect.induced_share(height, mu2, lam0, radius=par.rotor_radius, form=options.ground_effect, xp=xp)
