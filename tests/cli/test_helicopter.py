@@ -332,7 +332,7 @@ def test_a_card_of_an_earlier_version_flies_and_says_what_it_lacks_where_that_co
     new_card: str, tmp_path: Path
 ) -> None:
     """Servo delay and engine lag came later: without their options nothing of them is needed."""
-    card, text = tmp_path / "old.toml", new_card
+    card, text = tmp_path / "old.toml", new_card + "\n"
     for name in ADDED:
         start = text.index(f"# {MEANING[name]}")
         text = text[:start] + text[text.index("\n\n", start) + 2 :]
