@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from scipy.optimize import brentq
 
@@ -43,16 +44,17 @@ def autorotations(
             where=vehicle.card.where,
             hint="Helicopters and rotors with inflow have one.",
         )
-    return tuple(
-        _at(
-            vehicle,
-            lambda climb, near, speed=float(speed): trim(
-                vehicle, speed=speed, lateral=lateral, climb=climb, environment=environment, near=near
-            ),
-            float(speed),
-        )
-        for speed in speeds
-    )
+    found = []
+    for speed in map(float, speeds):
+        flown = partial(_sinking, vehicle, speed, lateral, environment)
+        found.append(_at(vehicle, flown, speed))
+    return tuple(found)
+
+
+def _sinking(
+    vehicle: Vehicle, speed: float, lateral: float, environment: Environment | None, climb: float, near: Trim | None
+) -> Trim:
+    return trim(vehicle, speed=speed, lateral=lateral, climb=climb, environment=environment, near=near)
 
 
 def _at(vehicle: Vehicle, flown: Callable[[float, Trim | None], Trim], speed: float) -> Trim:
@@ -63,7 +65,10 @@ def _at(vehicle: Vehicle, flown: Callable[[float, Trim | None], Trim], speed: fl
         at = reached[-1]
         return float(shaft_power(vehicle, at.state, at.inputs, at.environment) or 0.0)
 
-    around = reached[-1].environment if power(0.0) and reached else Environment()
+    level = power(0.0)
+    around = reached[-1].environment
+    if level <= 0.0:
+        return reached[-1]
     card = vehicle.card.values()
     disc = math.pi * card["rotor_radius"] ** 2
     hover = math.sqrt(card["mass"] * around.gravity / (2.0 * around.air_density * disc))
