@@ -19,11 +19,13 @@ from swashplate.models.catalogue import from_card, vehicle
 from swashplate.models.coax_rotors import InflowOptions, RotorPair, balanced_hover, rotor_pair
 from swashplate.models.coax_vehicle import acting_at, rotor_factors
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import FloatBackend, JaxBackend
+from swashplate.physics.backend import CasadiBackend, FloatBackend, JaxBackend
 from swashplate.physics.coaxial_wake import Induced
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.physics.frames import Vector
+from swashplate.simulation.dynamics import enable_double_precision
 
+enable_double_precision()
 XP = FloatBackend()
 FROZEN = json.loads((Path(__file__).parent / "frozen_rates.json").read_text())
 
@@ -279,3 +281,40 @@ def test_a_saved_model_flies_again(coax: Vehicle, tmp_path: Path) -> None:
     again = vehicle(tmp_path / "model.toml")
     assert again.options == InflowOptions()
     assert again.values() == coax.values()
+
+
+ALL = {"tip_loss": True, "induced_factor": True, "ground_effect": "hayden"}
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("coax", {"rotor": "inflow", "ground_effect": "hayden"}),
+        ("coax", {"rotor": "inflow", "interference": "contracted-wake", "bar": False}),
+        ("raptor50", ALL),
+        ("raptor50", {"inflow": "pitt-peters", **ALL}),
+    ],
+)
+def test_floats_jax_and_casadi_compute_the_same(name: str, options: dict[str, object]) -> None:
+    casadi = pytest.importorskip("casadi")
+    flown, rng = vehicle(name, **options), np.random.default_rng(0)
+    x = 0.1 * rng.normal(size=len(flown.state_names))
+    x[2] = -0.2
+    for i, state in enumerate(flown.state_names):
+        x[i] += {"omega": 220.0, "induc": 2.0}.get(state[:5], 0.0)
+    u = [0.5 * (low + high) for low, high in flown.input_limits]
+    floats = flown.rates(x, u, flown.values())
+    with_jax = [float(rate) for rate in flown.rates(x, u, flown.values(), xp=JaxBackend())]
+    row = casadi.SX.sym("x", len(x))
+    traced = casadi.Function("f", [row], [casadi.vertcat(*flown.rates(row, u, flown.values(), xp=CasadiBackend()))])
+    np.testing.assert_allclose(with_jax, floats, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(np.array(traced(x)).ravel(), floats, rtol=1e-11, atol=1e-11)
+
+
+def test_slopes_are_finite_where_everything_stands_still() -> None:
+    flown = vehicle("coax", rotor="inflow", ground_effect="cheeseman-bennett")
+
+    def rates(x: jax.Array) -> jax.Array:
+        return jnp.stack([jnp.asarray(r, float) for r in flown.rates(x, (0.0,) * 4, flown.values(), xp=JaxBackend())])
+
+    assert np.all(np.isfinite(jax.jacfwd(rates)(jnp.zeros(len(flown.state_names)))))
