@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.oracle.test_helicopter_published import AIR, AT_SPEED, KNOT, ROTOR, lynx_published
 
 from swashplate.models.catalogue import vehicle
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.trim import trim
-from tests.oracle.test_helicopter_published import AIR, AT_SPEED, KNOT, ROTOR, lynx_published
 
 pytestmark = pytest.mark.proof
 
