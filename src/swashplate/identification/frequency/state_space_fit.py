@@ -13,6 +13,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
+from swashplate.identification.frequency.composed_start import from_core
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
 from swashplate.identification.frequency.response_cost import (
@@ -72,7 +73,9 @@ def fit_state_space(
     if not model.free:
         raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
     targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
-    others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
+    others = {}
+    if starts > 1:
+        others = other_starts(model, responses, targets, band=band) | from_core(model, responses, band=band)
     return fit_targets(
         model,
         targets,
