@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
 
+from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.responses.frequency_response import FrequencyResponse

@@ -16,6 +16,7 @@ from swashplate.identification.frequency.handling_readings import handling_lines
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
 from swashplate.identification.frequency.reading_accuracy import Fitted, answers, has_pair
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
+from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, TriedStructure
@@ -39,7 +40,8 @@ class ResponseMaterial:
 
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
-        fit: a state-space fit. verification: in time. rival: another model on the same records.
+        fit: a state-space fit. search: for its structure.
+        verification: in time. rival: another model on the same records.
         time_fit: a state-space model fitted to records in time.
         gains: suggested for the autopilot.
     """
@@ -48,6 +50,7 @@ class ResponseMaterial:
     transfer_functions: tuple[TransferFunctionFit, ...] = ()
     trials: tuple[TriedStructure, ...] = ()
     fit: StateSpaceFit | None = None
+    search: StructureSearch | None = None
     verification: Verification | None = None
     rival: Verification | None = None
     time_fit: Result[StateSpaceModel, TimeDetails] | None = None
@@ -217,6 +220,20 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "Responses, flight against model", tuple(blocks))
+
+
+def search_section(search: StructureSearch) -> Section:
+    """The structures that were tried, and why one was picked."""
+    head, *rows = search.rows()
+    cells = tuple(
+        tuple(
+            Cell(text, number=k > 0 and k < len(row) - 1, strong=c is search.pick and k == 0)
+            for k, text in enumerate(row)
+        )
+        for c, row in zip(search.tried, rows, strict=True)
+    )
+    why = Points(tuple(text.strip() for text in search.reasons), title="Why this one")
+    return Section("structures", "Structures that were tried", (why, Table("Structures", tuple(head), cells)))
 
 
 def transfer_functions_section(m: ResponseMaterial) -> Section:

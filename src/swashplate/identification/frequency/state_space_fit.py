@@ -14,6 +14,7 @@ from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.frequency.composed_start import from_core
+from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
 from swashplate.identification.frequency.response_cost import (
@@ -23,9 +24,7 @@ from swashplate.identification.frequency.response_cost import (
     Target,
     accuracy_of,
     accuracy_of_fit,
-    ceiling,
     followed,
-    target,
 )
 from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
 from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
@@ -47,6 +46,7 @@ def fit_state_space(
     *,
     band: tuple[float, float] | None = None,
     bands: Mapping[str, tuple[float, float]] | None = None,
+    without: Sequence[str] = (),
     least_coherence: float = LEAST_COHERENCE,
     starts: int = STARTED,
     iterations: int = 100,
@@ -58,7 +58,8 @@ def fit_state_space(
     Args:
         model: structure and start values: a vehicle of `swashplate.structure`, or what it is made of.
         responses: from `respond`, with channels named as in the model.
-        band: limits [Hz] for all pairs. bands: by "output/input" or input.
+        band: limits [Hz] for all pairs. bands: for some, by "output/input", input or output.
+        without: pairs that are not used, by the same names.
         least_coherence: from which a response is used.
         starts: how many of the screened starting points are followed (1: the given start alone).
         iterations: at most this many for the best of them.
@@ -66,13 +67,15 @@ def fit_state_space(
         progress: called with the iteration and the cost.
 
     Raises:
-        IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
+        IdentificationError: channels that do not meet, no coherent response, parameters without a trace, a band for
+            a pair that is none.
     """
     began = time.perf_counter()
     model = structure_of(model)
     if not model.free:
         raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
-    targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
+    choice = PairChoice(band, bands or {}, tuple(without), least_coherence)
+    targets, ceilings, left_out = choice.targets(model, responses)
     others = {}
     if starts > 1:
         others = other_starts(model, responses, targets, band=band) | from_core(model, responses, band=band)
@@ -91,48 +94,11 @@ def fit_state_space(
         settings={
             "sources": list(responses.sources),
             "method": responses.method,
-            "least_coherence": least_coherence,
-            "band_hz": list(band) if band else None,
+            **choice.settings(),
             "starts": starts,
             "seed": seed,
         },
     )
-
-
-def _targets(
-    model: StateSpaceModel,
-    responses: FrequencyResponse,
-    band: tuple[float, float] | None,
-    bands: Mapping[str, tuple[float, float]],
-    least: float,
-) -> tuple[list[Target], list[Target], tuple[str, ...]]:
-    shared_in = [name for name in model.inputs if name in responses.inputs]
-    shared_out = [name for name in model.outputs if name in responses.outputs]
-    if not shared_in or not shared_out:
-        raise IdentificationError(
-            f"the model has inputs {', '.join(model.inputs)} and outputs {', '.join(model.outputs)}; the responses "
-            f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
-            where=f"model '{model.name}'"
-            + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
-            hint="Name the channels as the model does (swash respond --inputs NAME=CHANNEL), or take another model.",
-        )
-    found, ceilings, missing = [], [], []
-    for output in shared_out:
-        for name in shared_in:
-            own = bands.get(f"{output}/{name}", bands.get(name, band))
-            one = target(responses, output, name, band=own, least=least)
-            if one is None:
-                missing.append(f"{output} / {name}")
-                limit = ceiling(responses, output, name, band=own)
-                ceilings += [] if limit is None else [limit]
-            else:
-                found.append(one)
-    if not found:
-        raise IdentificationError(
-            f"no response keeps a coherence of {least:g} over a band: {', '.join(missing)}.",
-            hint="Nothing can be fitted; look at the responses and fly a better sweep.",
-        )
-    return found, ceilings, tuple(missing)
 
 
 def fit_targets(

@@ -144,7 +144,7 @@ def best_end(
         before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
         if best.cost > _HOPE * before.cost:
             break
-    if starts > 1 and iterations > _ROUGH:
+    if iterations > _ROUGH:
         best = _freed(model, cost, best)
     final = _down(
         cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
