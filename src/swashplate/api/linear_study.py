@@ -70,7 +70,7 @@ class LinearStudy:
         document = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
         if self.material.time_fit is not None:
             return document
-        tried = [{"form": t.form.text, "J": t.cost} for t in self.material.trials]
+        tried = [{"form": t.form.text, "J": t.cost, "unsound": t.unsound} for t in self.material.trials]
         gains = [suggestion.as_dict() for suggestion in self.material.gains]
         if self.material.search is not None:
             document["search"] = self.material.search.as_dict()
@@ -100,7 +100,10 @@ class LinearStudy:
         m, parts = self.material, []
         parts += [repr(m.search)] if m.search is not None else []
         if m.trials:
-            rows = [f"  {t.form.text:<10}{t.parameters:>3} parameters   J = {t.cost:8.1f}" for t in m.trials]
+            rows = [
+                f"  {t.form.text:<14}{t.parameters:>3} parameters   J = {t.cost:8.1f}   {t.unsound}".rstrip()
+                for t in m.trials
+            ]
             parts.append("\n".join(["Structures tried (zeros/poles):", *rows]))
         if self.fit is not None:
             parts.append("\n".join([repr(self.fit), *map(repr, self.margins)]))

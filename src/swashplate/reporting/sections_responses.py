@@ -19,7 +19,8 @@ from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDIST
 from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, TriedStructure
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
+from swashplate.identification.frequency.transfer_function_forms import TriedStructure
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -251,16 +252,17 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks.append(
             Table(
                 "Structures tried",
-                ("zeros / poles (+ integrators)", "parameters", "J"),
+                ("zeros / poles (+ integrators)", "parameters", "J", "why not"),
                 tuple(
                     (
                         Cell(t.form.text, tone="good" if t.form == chosen else "plain"),
                         Cell(str(t.parameters), number=True),
                         Cell(f"{t.cost:.1f}", number=True, tone=tone(t.cost), strong=t.form == chosen),
+                        Cell(t.unsound, tone="quiet"),
                     )
                     for t in m.trials
                 ),
-                note="The suggestion is the one with the fewest parameters that costs hardly more than the best.",
+                note="Suggested: of those whose parameters are told, the fewest that cost hardly more than the best.",
             )
         )
     return Section("transfer-functions", "Transfer functions", tuple(blocks))

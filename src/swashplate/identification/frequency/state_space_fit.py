@@ -119,7 +119,13 @@ def fit_targets(
     """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
     began = time.perf_counter() if began is None else began
     warnings, problems = [], _start_problems(model)
-    traceless = _traceless(model, targets)
+    traceless, silent = _traceless(model, targets)
+    if silent:
+        raise IdentificationError(
+            f"the structure '{model.name}' answers nothing at all at {', '.join(silent)}, which the flight shows.",
+            hint="Take a structure that joins them, or leave them out: "
+            + " ".join(f"--without {name.replace(' ', '')}" for name in silent),
+        )
     if traceless:
         warnings.append(f"no fitted response sees {', '.join(traceless)}: held at the start values.")
         model = model.with_values({n: model.parameters[n].value for n in traceless}, free=False)
@@ -214,16 +220,21 @@ def fit_targets(
     )
 
 
-def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, ...]:
-    """Free parameters that leave no trace in any fitted response, at the start and at a shaken one."""
+def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Free parameters without a trace in any fitted response, and responses that are zero, at the start and a shaken
+    one."""
     random = np.random.default_rng(1)
-    seen = np.zeros(len(model.free))
+    seen, heard = np.zeros(len(model.free)), np.zeros(len(targets))
     for shake in (0.0, 0.1):
         values = np.array([model.parameters[n].value for n in model.free])
         values = values * (1.0 + shake * random.standard_normal(values.size)) + (values == 0.0) * shake * 0.1
-        _, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
+        answers, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
+        heard += [np.nan_to_num(np.abs(h), nan=1.0).max() for h in answers]
         seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
-    return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12)
+    return (
+        tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12),
+        tuple(t.name for t, size in zip(targets, heard, strict=True) if size == 0.0),
+    )
 
 
 def _start_problems(model: StateSpaceModel) -> list[str]:

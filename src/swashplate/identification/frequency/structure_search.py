@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from swashplate.errors import IdentificationError
 from swashplate.identification.frequency.composed_start import from_core
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.lacking_parts import parts_in
@@ -52,6 +53,17 @@ class _Search:
     say: Callable[[str], None]
     seed: int
     tried: dict[str, Contender] = field(default_factory=dict)
+    refused: dict[str, IdentificationError] = field(default_factory=dict)
+
+    def looks(self, models: Sequence[StateSpaceModel], *, like: Contender | None, iterations: int) -> list[Contender]:
+        """A fit of each that can answer to what was measured."""
+        found = []
+        for one in models:
+            try:
+                found.append(self.look(one, like=like, iterations=iterations))
+            except IdentificationError as error:
+                self.refused[one.name] = error
+        return found
 
     def look(self, model: StateSpaceModel, *, like: Contender | None, iterations: int) -> Contender:
         """A fit of a model from the better of its own start and what a relative of it has found."""
@@ -98,13 +110,15 @@ class _Search:
 
     def round(self, models: Sequence[StateSpaceModel], *, like: Contender | None = None) -> list[Contender]:
         """A first look at each; those that are not hopeless are followed."""
-        seen = [self.look(one, like=like, iterations=LOOK) for one in models]
+        seen = self.looks(models, like=like, iterations=LOOK)
+        if not seen:
+            raise next(iter(self.refused.values()))
         least = min(one.misfit for one in seen)
         for one in seen:
             if one.misfit > HOPELESS * least:
                 self.tried[one.name] = replace(one, abandoned=True)
         return [
-            self.look(one.fit.model, like=None, iterations=FOLLOW) for one in seen if one.misfit <= HOPELESS * least
+            self.look(one.fit.start, like=None, iterations=FOLLOW) for one in seen if one.misfit <= HOPELESS * least
         ]
 
 
@@ -142,7 +156,8 @@ def search_structures(
     pick, words = _judged(search, best, judge)
     pick = _finished(search, pick)
     tried = sorted(search.tried.values(), key=lambda one: (one is not pick, one.abandoned, search.score(one, pick)))
-    told = [*reasons(pick, [c for c in tried if c is not pick], leaner), *words]
+    refused = [f"  not fitted: {error.problem}" for error in search.refused.values()]
+    told = [*reasons(pick, [c for c in tried if c is not pick], leaner), *refused, *words]
     return StructureSearch(tuple(tried), pick, tuple(told), time.perf_counter() - began)
 
 
@@ -160,18 +175,16 @@ def _grown(search: _Search) -> tuple[Contender, dict[str, Contender]]:
         missed = bool(misfits(best.fit.model, best.fit.targets))
         better: list[str] = []
         for group in additions(parts, search.responses, every=missed):
-            looks = {
-                n: search.look(_composed(search, [*parts, n]), like=best, iterations=LOOK)
-                for n in group
-                if n not in idle
-            }
+            named = {"+".join(p for p in PARTS if p in (*parts, n)): n for n in group if n not in idle}
+            seen = search.looks([_composed(search, name.split("+")) for name in named], like=best, iterations=LOOK)
+            looks = {named[one.name]: one for one in seen}
             idle |= {n for n, one in looks.items() if not _hopeful(search, one, best)}
             first = search.best([best, *looks.values()])
             better += [n for n, one in looks.items() if one is first]
         if not better:
             break
         several = [[n] for n in better] if len(better) < 2 else [better, *([n] for n in better)]
-        grown = [search.look(_composed(search, [*parts, *more]), like=best, iterations=FOLLOW) for more in several]
+        grown = search.looks([_composed(search, [*parts, *more]) for more in several], like=best, iterations=FOLLOW)
         following = search.best([best, *grown])
         if following is best:
             break
@@ -191,13 +204,12 @@ def _settled(search: _Search, best: Contender) -> tuple[Contender, dict[str, Con
     while True:
         parts = best.name.split("+")
         leaner = {
-            name: search.look(_composed(search, kept), like=best, iterations=FOLLOW)
-            for name, kept in without(parts).items()
+            part: one
+            for part, kept in without(parts).items()
+            for one in search.looks([_composed(search, kept)], like=best, iterations=FOLLOW)
         }
-        exchanged = [
-            search.look(_composed(search, other), like=best, iterations=FOLLOW)
-            for other in exchanges(parts, search.responses)
-        ]
+        others = [_composed(search, other) for other in exchanges(parts, search.responses)]
+        exchanged = search.looks(others, like=best, iterations=FOLLOW)
         following = search.best([best, *leaner.values(), *exchanged])
         if following is best:
             return best, leaner
