@@ -45,6 +45,7 @@ def test_the_right_parts_find_the_helicopter_from_the_start_values_of_the_packag
     assert not any("not all of the aircraft" in text for text in found.warnings)
 
 
+@pytest.mark.proof
 def test_a_structure_without_the_engine_is_told_to_lack_something(responses: FrequencyResponse) -> None:
     fit = fit_state_space(structure("compose:body+flap+inflow"), responses, starts=2)
     (words,) = (text for text in fit.warnings if "not all of the aircraft" in text)

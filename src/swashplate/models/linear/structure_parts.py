@@ -295,7 +295,7 @@ NUMBERS: Mapping[str, StartNumber] = {
     "Kq": StartNumber(5.0, "rad/s^3", _ORDER), "rate_q": StartNumber(3.0, "1/s", _ORDER, 0.05, 50.0),
     "Nomega": StartNumber(0.0, "rad/s^2", _ZERO), "Komega": StartNumber(-0.3, "1/s", _ORDER),
     "rate_omega": StartNumber(1.0, "1/s", _ORDER, 0.05, 50.0),
-    "Nrfb": StartNumber(-50.0, "1/s^2", _R50), "Krfb": StartNumber(8.0, "1/s", _R50, lower=0.01),
+    "Nrfb": StartNumber(-50.0, "1/s^2", _ORDER), "Krfb": StartNumber(8.0, "1/s", _ORDER, lower=0.01),
     "tau_servo": StartNumber(0.04, "s", "a usual servo", 0.002, 0.5),
     "tau_tail": StartNumber(0.03, "s", "a usual servo", 0.002, 0.5),
     **{f"tau_{short}": StartNumber(0.02, "s", "links and computers", 0.0, 0.5) for short in SHORT.values()},
