@@ -132,6 +132,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
                 ),
             )
         )
+    if fit.details.reduced_modes:
+        blocks.append(Text(f"What all of the reduction did to the {fit.details.reduced_modes}."))
     modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
     blocks += [_mode_table(fit.details.modes), eigenvalues(modes)] if fit.details.modes else [eigenvalues(modes)]
     if len(fit.names) > 1:
@@ -221,20 +223,6 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "Responses, flight against model", tuple(blocks))
-
-
-def search_section(search: StructureSearch) -> Section:
-    """The structures that were tried, and why one was picked."""
-    head, *rows = search.rows()
-    cells = tuple(
-        tuple(
-            Cell(text, number=k > 0 and k < len(row) - 1, strong=c is search.pick and k == 0)
-            for k, text in enumerate(row)
-        )
-        for c, row in zip(search.tried, rows, strict=True)
-    )
-    why = Points(tuple(text.strip() for text in search.reasons), title="Why this one")
-    return Section("structures", "Structures that were tried", (why, Table("Structures", tuple(head), cells)))
 
 
 def transfer_functions_section(m: ResponseMaterial) -> Section:

@@ -48,8 +48,11 @@ def cores(responses: FrequencyResponse) -> list[tuple[str, ...]]:
     found: list[tuple[str, ...]] = []
     if cyclic:
         found.append(("body",))
-        if not outputs & _MOVING:
-            found.append(("cyclic", *heave, *yaw))
+        axes = ("cyclic", *heave, *yaw)
+        seen = {state for part in axes for state in PARTS[part].states} | {"az"}
+        moved = _CYCLIC | ({"collective"} if heave or yaw else set()) | ({"pedal"} if yaw else set())
+        if outputs <= seen and inputs <= moved:  # compared on the same responses
+            found.append(axes)
     elif heave or yaw:
         found.append((*heave, *yaw))
     if not found:

@@ -26,6 +26,9 @@ def reasons(pick: Contender, others: Sequence[Contender], leaner: Mapping[str, C
     for part, one in leaner.items():
         name, before, after = _worst_loss(pick, one)
         lines.append(f"  without '{part}': J_ave {one.cost:.1f}; {name} from {before:.0f} to {after:.0f}.")
+    for one in [c for c in others if not leaner and not c.abandoned][:_NAMED]:
+        name, before, after = _worst_loss(pick, one)
+        lines.append(f"  {one.name}: J_ave {one.cost:.1f}; {name} {after:.0f} instead of {before:.0f}.")
     own = set(pick.name.split("+"))
     vain = [(c, set(c.name.split("+")) - own) for c in others if own < set(c.name.split("+"))]
     added = list(dict.fromkeys(name for _, more in vain for name in sorted(more) if len(more) == 1))
@@ -46,5 +49,6 @@ def reasons(pick: Contender, others: Sequence[Contender], leaner: Mapping[str, C
 def _worst_loss(pick: Contender, one: Contender) -> tuple[str, float, float]:
     """The response that loses most, with its J in both."""
     other = dict(zip((t.name for t in one.fit.targets), one.fit.costs, strict=True))
-    pairs = [(t.name, own, other[t.name]) for t, own in zip(pick.fit.targets, pick.fit.costs, strict=True)]
+    both = zip(pick.fit.targets, pick.fit.costs, strict=True)
+    pairs = [(t.name, own, other[t.name]) for t, own in both if t.name in other] or [("nothing shared", 0.0, 0.0)]
     return max(pairs, key=lambda pair: pair[2] - pair[1])

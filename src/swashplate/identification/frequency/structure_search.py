@@ -149,16 +149,40 @@ def search_structures(
     began = time.perf_counter()
     search = _Search(responses, choice or PairChoice(), prepare or (lambda m: m), say or (lambda _: None), seed)
     leaner: dict[str, Contender] = {}
+    apart: tuple[str, ...] = ()
     if structures:
-        best = search.best(search.round([search.prepare(one) for one in structures]))
+        prepared = [search.prepare(one) for one in structures]
+        search.choice, apart = _in_common(search.choice, prepared, responses)
+        best = search.best(search.round(prepared))
     else:
         best, leaner = _grown(search)
     pick, words = _judged(search, best, judge)
     pick = _finished(search, pick)
     tried = sorted(search.tried.values(), key=lambda one: (one is not pick, one.abandoned, search.score(one, pick)))
     refused = [f"  not fitted: {error.problem}" for error in search.refused.values()]
+    if apart:
+        words = [f"Compared on what all of them answer to, without {', '.join(apart)}.", *words]
     told = [*reasons(pick, [c for c in tried if c is not pick], leaner), *refused, *words]
     return StructureSearch(tuple(tried), pick, tuple(told), time.perf_counter() - began)
+
+
+def _in_common(
+    choice: PairChoice, structures: Sequence[StateSpaceModel], responses: FrequencyResponse
+) -> tuple[PairChoice, tuple[str, ...]]:
+    """The choice without the pairs that only some structures have, and these: misfits of different pairs are no rivals.
+
+    Raises:
+        IdentificationError: where the structures have no pair in common.
+    """
+    pairs = [[f"{t.output}/{t.input}" for t in choice.targets(one, responses)[0]] for one in structures]
+    everywhere = set.intersection(*map(set, pairs))
+    apart = tuple(dict.fromkeys(name for own in pairs for name in own if name not in everywhere))
+    if not everywhere:
+        raise IdentificationError(
+            f"the structures {', '.join(one.name for one in structures)} answer to no response in common.",
+            hint="Compare structures of the same inputs and outputs.",
+        )
+    return (replace(choice, without=(*choice.without, *apart)) if apart else choice), apart
 
 
 def _composed(search: _Search, parts: Sequence[str]) -> StateSpaceModel:

@@ -71,6 +71,7 @@ def test_a_hold_out_decides_where_the_responses_do_not() -> None:
     assert "held-out J_rms" in found.rows()[0]
     agreed = search_structures(heave_and_yaw(), structures=NEAR, judge=lambda model: 1.0)
     assert agreed.pick.name == "heave+yaw+inflow+torque"
+    assert any(text.strip().startswith("heave+yaw+lead+torque: J_ave") for text in agreed.reasons)
     assert "hold-out agrees" in agreed.reasons[-1]
 
 
@@ -83,11 +84,22 @@ def test_that_all_are_wrong_is_said() -> None:
     assert any("none of these is all of the aircraft" in text for text in found.reasons)
 
 
+def test_a_structure_that_answers_to_less_has_no_advantage() -> None:
+    """Heave alone misses nothing of the yaw that it does not have: only what both answer to is compared."""
+    both = [structure("compose:heave+inflow"), NEAR[0]]
+    found = search_structures(heave_and_yaw(), structures=both)
+    assert {t.name for c in found.tried for t in c.fit.targets} == {"w / collective", "az / collective"}
+    assert "without r/pedal, r/collective" in found.reasons[-1]
+    with pytest.raises(IdentificationError, match="no response in common"):
+        search_structures(heave_and_yaw(), structures=[structure("compose:heave"), structure("compose:yaw")])
+
+
 def test_candidates_are_what_the_channels_allow() -> None:
     whole = measured(*matrices())
     assert cores(whole) == [("body",), ("body", "flap_decoupled"), ("body", "flap")]
     rates = whole.select(("p", "q", "r"), INPUTS)
     assert ("cyclic", "yaw", "flap") in cores(rates)
+    assert not any("cyclic" in core for core in cores(replace(rates, outputs=("p", "q", "phi"))))
     assert cores(whole.select(("w",), ("collective",))) == [("heave",)]
     with pytest.raises(IdentificationError, match="no composed structure has these responses"):
         cores(replace(whole, inputs=("a", "b", "c", "d")))
