@@ -151,19 +151,28 @@ def search_structures(
     leaner: dict[str, Contender] = {}
     apart: tuple[str, ...] = ()
     if structures:
-        prepared = [search.prepare(one) for one in structures]
+        prepared = [search.prepare(one) for one in _by_name(structures)]
         search.choice, apart = _in_common(search.choice, prepared, responses)
         best = search.best(search.round(prepared))
     else:
         best, leaner = _grown(search)
     pick, words = _judged(search, best, judge)
-    pick = _finished(search, pick)
+    pick = _finished(search, pick, pick.fit.start if structures else _composed(search, pick.name.split("+")))
     tried = sorted(search.tried.values(), key=lambda one: (one is not pick, one.abandoned, search.score(one, pick)))
     refused = [f"  not fitted: {error.problem}" for error in search.refused.values()]
     if apart:
         words = [f"Compared on what all of them answer to, without {', '.join(apart)}.", *words]
     told = [*reasons(pick, [c for c in tried if c is not pick], leaner), *refused, *words]
     return StructureSearch(tuple(tried), pick, tuple(told), time.perf_counter() - began)
+
+
+def _by_name(structures: Sequence[StateSpaceModel]) -> list[StateSpaceModel]:
+    """The structures, with a number behind names that several have."""
+    names = [one.name for one in structures]
+    return [
+        replace(one, name=f"{one.name} #{names[:k].count(one.name) + 1}") if names.count(one.name) > 1 else one
+        for k, one in enumerate(structures)
+    ]
 
 
 def _in_common(
@@ -267,10 +276,9 @@ def _others(near: Sequence[Contender], own: Contender) -> list[float]:
     return [c.held_out for c in near if c.name != own.name]
 
 
-def _finished(search: _Search, pick: Contender) -> Contender:
-    """The pick with a fit from several starts, where that is better."""
+def _finished(search: _Search, pick: Contender, model: StateSpaceModel) -> Contender:
+    """The pick with a fit of its model from several starts, where that is better."""
     search.say(f"{pick.name} to its end")
-    model = search.prepare(structure(PREFIX + pick.name)) if pick.fit.model.document.get("composed") else pick.fit.start
     targets, ceilings, left_out = search.choice.targets(model, search.responses)
     fit = fit_targets(
         model, targets, others={"the search": model.with_values({n: pick.fit[n].value for n in model.free})},

@@ -94,6 +94,15 @@ def test_a_structure_that_answers_to_less_has_no_advantage() -> None:
         search_structures(heave_and_yaw(), structures=[structure("compose:heave"), structure("compose:yaw")])
 
 
+def test_an_edited_structure_stays_as_edited_and_namesakes_stay_apart() -> None:
+    held = NEAR[0].with_values({"tau_ped": 0.2}, free=False)
+    found = search_structures(heave_and_yaw(), structures=[held, NEAR[0]])
+    assert {c.name for c in found.tried} == {"heave+yaw+inflow+torque #1", "heave+yaw+inflow+torque #2"}
+    assert found.pick.name.endswith("#2"), "a delay of 0.2 s is wrong"
+    alone = search_structures(heave_and_yaw(), structures=[held])
+    assert alone.pick.fit.model.parameters["tau_ped"].value == 0.2
+
+
 def test_candidates_are_what_the_channels_allow() -> None:
     whole = measured(*matrices())
     assert cores(whole) == [("body",), ("body", "flap_decoupled"), ("body", "flap")]
