@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
+    from swashplate.api.structures import show_structure, structures
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
@@ -188,6 +189,7 @@ __all__ = [
     "respond",
     "rotor_speed",
     "show_replay",
+    "show_structure",
     "simulate",
     "simulate_adaptive",
     "simulate_bench",
@@ -201,6 +203,7 @@ __all__ = [
     "static_decoupling",
     "stepwise",
     "structure",
+    "structures",
     "suggest_gains",
     "synchronise",
     "trim",

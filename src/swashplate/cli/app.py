@@ -32,6 +32,7 @@ from swashplate.cli import (
     respond,
     rotor_speed,
     simulate,
+    structures,
     trim,
     validate,
     vehicles,
@@ -98,6 +99,7 @@ app.add_typer(bench.app, name="bench")
 app.add_typer(link.app, name="link")
 app.add_typer(control.app, name="control")
 app.add_typer(vehicles.app, name="vehicles")
+app.add_typer(structures.app, name="structures")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)
 

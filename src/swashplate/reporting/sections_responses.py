@@ -16,9 +16,11 @@ from swashplate.identification.frequency.handling_readings import handling_lines
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
 from swashplate.identification.frequency.reading_accuracy import Fitted, answers, has_pair
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
+from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, TriedStructure
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
+from swashplate.identification.frequency.transfer_function_forms import TriedStructure
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -39,7 +41,8 @@ class ResponseMaterial:
 
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
-        fit: a state-space fit. verification: in time. rival: another model on the same records.
+        fit: a state-space fit. search: for its structure.
+        verification: in time. rival: another model on the same records.
         time_fit: a state-space model fitted to records in time.
         gains: suggested for the autopilot.
     """
@@ -48,6 +51,7 @@ class ResponseMaterial:
     transfer_functions: tuple[TransferFunctionFit, ...] = ()
     trials: tuple[TriedStructure, ...] = ()
     fit: StateSpaceFit | None = None
+    search: StructureSearch | None = None
     verification: Verification | None = None
     rival: Verification | None = None
     time_fit: Result[StateSpaceModel, TimeDetails] | None = None
@@ -128,6 +132,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
                 ),
             )
         )
+    if fit.details.reduced_modes:
+        blocks.append(Text(f"What all of the reduction did to the {fit.details.reduced_modes}."))
     modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
     blocks += [_mode_table(fit.details.modes), eigenvalues(modes)] if fit.details.modes else [eigenvalues(modes)]
     if len(fit.names) > 1:
@@ -234,16 +240,17 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks.append(
             Table(
                 "Structures tried",
-                ("zeros / poles (+ integrators)", "parameters", "J"),
+                ("zeros / poles (+ integrators)", "parameters", "J", "why not"),
                 tuple(
                     (
                         Cell(t.form.text, tone="good" if t.form == chosen else "plain"),
                         Cell(str(t.parameters), number=True),
                         Cell(f"{t.cost:.1f}", number=True, tone=tone(t.cost), strong=t.form == chosen),
+                        Cell(t.unsound, tone="quiet"),
                     )
                     for t in m.trials
                 ),
-                note="The suggestion is the one with the fewest parameters that costs hardly more than the best.",
+                note="Suggested: of those whose parameters are told, the fewest that cost hardly more than the best.",
             )
         )
     return Section("transfer-functions", "Transfer functions", tuple(blocks))
