@@ -336,3 +336,10 @@ def test_an_output_folder_that_is_a_file_is_refused(simulated: Path, tmp_path: P
     message = one_message(swash("identify", "--vehicle", "coax", "--flight", simulated, "--out", out))
     assert "expected a folder" in message
     assert out.read_text(encoding="utf-8") == "mine"
+
+
+def test_an_option_of_one_value_is_not_given_twice() -> None:
+    """Only the last would count, and nobody would be told."""
+    assert "--speed: is given more than once" in one_message(swash("trim", "coax", "--speed", "1", "--speed=2"))
+    twice = ("fit-ss", "--search", "responses", "--rename", "lateral=a", "--rename", "longitudinal=b")
+    assert "--rename: is given more than once. Give its values once, by commas." in one_message(swash(*twice))

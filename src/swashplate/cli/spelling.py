@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import typer
+
 _VEHICLE, _OUT = "--vehicle", "--out"
 
 
@@ -19,6 +21,7 @@ def spelled(command: Any, given: Sequence[str]) -> list[str]:
     verbs = getattr(command, "commands", None)
     if verbs is not None:
         return [words[0], *spelled(verbs[words[0]], words[1:])] if words and words[0] in verbs else words
+    _refuse_repeated(command, words)
     options = {name for parameter in command.params for name in parameter.opts if name.startswith("-")}
     arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
     if _OUT in options and "-o" not in options:
@@ -29,6 +32,22 @@ def spelled(command: Any, given: Sequence[str]) -> list[str]:
     if _VEHICLE in options and not arguments and words and not words[0].startswith("-"):
         return [_VEHICLE, *words]
     return words
+
+
+def _refuse_repeated(command: Any, words: Sequence[str]) -> None:
+    """An option that takes one value and is given twice: only the last would count, and nobody would be told.
+
+    Raises:
+        typer.BadParameter: naming it.
+    """
+    typed = [word.partition("=")[0] for word in words if word.startswith("-")]
+    for parameter in command.params:
+        if parameter.param_type_name != "option" or parameter.multiple or parameter.is_flag or parameter.count:
+            continue
+        if sum(name in parameter.opts for name in typed) > 1:
+            lists = "by commas" in (parameter.help or "")
+            hint = " Give its values once, by commas." if lists else " It takes one value."
+            raise typer.BadParameter(f"is given more than once.{hint}", param_hint=parameter.opts[0])
 
 
 def _as_argument(words: list[str]) -> list[str]:

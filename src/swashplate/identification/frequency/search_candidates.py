@@ -59,10 +59,19 @@ def cores(responses: FrequencyResponse) -> list[tuple[str, ...]]:
         raise IdentificationError(
             f"no composed structure has these responses: inputs {', '.join(responses.inputs)}, outputs "
             f"{', '.join(responses.outputs)}; it has inputs {', '.join(INPUTS)} and rates, speeds, angles, ax, ay, az.",
-            hint="Name the channels so (--rename lateral=CHANNEL), or name the structures to compare.",
+            hint=f"Name the channels so ({_renaming(responses.inputs)}), or name the structures to compare.",
         )
     rotors: tuple[tuple[str, ...], ...] = ((), ("flap_decoupled",), ("flap",)) if cyclic else ((),)
     return [(*core, *rotor) for core in found for rotor in rotors]
+
+
+_LIKELY = {"roll": "lateral", "pitch": "longitudinal", "yaw": "pedal", "collective": "collective"}
+
+
+def _renaming(inputs: Sequence[str]) -> str:
+    """`--rename` for channels whose names tell their axis, such as `mixer_roll`; otherwise its form."""
+    told = {ours: name for name in inputs for axis, ours in _LIKELY.items() if name.endswith(axis) and name != ours}
+    return f"--rename {','.join(f'{ours}={name}' for ours, name in told.items()) or 'lateral=CHANNEL'}"
 
 
 def additions(parts: Sequence[str], responses: FrequencyResponse, *, every: bool) -> list[list[str]]:
