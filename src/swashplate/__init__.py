@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
+    from swashplate.api.stitch import stitch
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
@@ -200,6 +201,7 @@ __all__ = [
     "state_hold",
     "static_decoupling",
     "stepwise",
+    "stitch",
     "structure",
     "suggest_gains",
     "synchronise",

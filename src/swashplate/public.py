@@ -117,6 +117,7 @@ _COMPUTING: Mapping[str, str] = {
     "speed_schedule": "swashplate.simulation.lpv:schedule",
     "state_hold": "swashplate.control.laws.state_hold:state_hold",
     "static_decoupling": "swashplate.control.laws.linear_decoupling:static_decoupling",
+    "stitch": "swashplate.api.stitch:stitch",
     "trim": "swashplate.simulation.trim:trim",
     "trim_curve": "swashplate.simulation.trim_curve:trim_curve",
     "validate": "swashplate.validation.verb:validate",

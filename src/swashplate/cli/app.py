@@ -32,6 +32,7 @@ from swashplate.cli import (
     respond,
     rotor_speed,
     simulate,
+    stitch,
     trim,
     validate,
     vehicles,
@@ -92,6 +93,7 @@ app.command("reconstruct", short_help="Find biases and scale factors of a flight
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
+app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")

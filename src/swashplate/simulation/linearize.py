@@ -171,9 +171,7 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
         trim=about,
         delays=known_delays(vehicle),
         units=dict(
-            zip(
-                (*vehicle.state_names, *vehicle.input_names), (*vehicle.state_units, *vehicle.input_units), strict=True
-            )
+            zip((*vehicle.state_names, *vehicle.input_names), (*vehicle.state_units, *vehicle.input_units), strict=True)
         ),
         limits=dict(zip(vehicle.input_names, vehicle.input_limits, strict=True)),
     )

@@ -132,7 +132,8 @@ def outside(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> M
     density = float(vehicle.card.options["air_density"])
     if abs(environment.air_density / density - 1.0) > _DENSER:
         told["density"] = (
-            f"the air has {environment.air_density:.3g} kg/m^3, the points {density:.3g}: their derivatives are not scaled"
+            f"the air has {environment.air_density:.3g} kg/m^3, the points {density:.3g}, "
+            "and their derivatives are not scaled"
         )
     return told
 
@@ -167,7 +168,7 @@ class Between(NamedTuple):
 
 
 def between(speed: Scalar, par: Any, n: int, xp: Backend) -> Between:
-    """Shares of cubic Hermite interpolation (trims) and of linear interpolation (derivatives) at a speed of theirs [m/s]."""
+    """Shares of cubic Hermite (trims) and linear interpolation (derivatives) at a speed between the points' [m/s]."""
     knots = [getattr(par, f"trim_u_{k}") for k in range(n)]
     values: list[Scalar] = [1.0] + [0.0] * (n - 1)
     gradients: list[Scalar] = [0.0] * n
@@ -221,6 +222,8 @@ def derivatives(
     return LinearState(body, inner)
 
 
-def specific_force(state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, own: Stitches) -> Vector:
+def specific_force(
+    state: LinearState, inputs: Any, par: Any, env: Environment, xp: Backend, *, own: Stitches
+) -> Vector:
     """What accelerometers at the centre of gravity read [m/s^2]."""
     return _acting(state, inputs, par, env, xp, own)[0]

@@ -115,7 +115,9 @@ class StitchedVehicle(Vehicle):
     def __repr__(self) -> str:
         points = self.points()
         inputs = points[0].inputs
-        angles = [f"{name} [deg]" if unit == "rad" else name for name, unit in zip(inputs, self.input_units, strict=True)]
+        angles = [
+            f"{name} [deg]" if unit == "rad" else name for name, unit in zip(inputs, self.input_units, strict=True)
+        ]
         scale = [np.degrees(1.0) if unit == "rad" else 1.0 for unit in self.input_units]
         rows = []
         for p in points:
@@ -124,8 +126,6 @@ class StitchedVehicle(Vehicle):
         head = ["u [m/s]", "phi [deg]", "theta [deg]", *angles]
         lines = [super().__repr__(), "Trims:", text_table(head, rows, left=())]
         names = list(disagreement(points[0]))
-        rows = [
-            [f"{p.speed:.2f}", *(f"{a:.3g}/{b:.3g}" for a, b in disagreement(p).values())] for p in points
-        ]
+        rows = [[f"{p.speed:.2f}", *(f"{a:.3g}/{b:.3g}" for a, b in disagreement(p).values())] for p in points]
         lines.append("Derivatives by speed, the points' own / what the trims' gradients imply (these fly):")
         return "\n".join([*lines, text_table(["u [m/s]", *names], rows, left=()), self.card.trust])

@@ -167,7 +167,7 @@ def _trimmed(
             f"says nothing of {', '.join(lost)}.",
             where=name,
             channel="trim",
-            hint="Add them to [trim], as `swash linearize --out` does, or give the flight whose means they are: --trim.",
+            hint="Add them to [trim], as `swash linearize --out` does, or give the flight with such means: --trim.",
         )
     if turning := [rate for rate in STILL if abs(trim.get(rate, 0.0)) > _NOTHING]:
         raise CardError("is not zero, expected a straight flight.", where=name, channel=f"trim.{turning[0]}")
@@ -192,7 +192,10 @@ def _limits(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], 
     ends: dict[str, Any] = {"low": [], "high": []}
     assumed = []
     for name in made[0].inputs:
-        ranges = [(model.document.get("limits", {}).get(name), one.trim[name]) for model, one in zip(models, made, strict=True)]
+        ranges = [
+            (model.document.get("limits", {}).get(name), one.trim[name])
+            for model, one in zip(models, made, strict=True)
+        ]
         known = [(at + low, at + high) for (low, high), at in ((r, at) for r, at in ranges if r is not None)]
         if not known:
             usual = USUAL_RANGE.get(models[0].units.get(name, "1") or "1", 1.0)

@@ -89,8 +89,8 @@ def without_kinematics(point: TrimmedMatrices) -> Array:
     if np.max(np.abs(rest)) > _GRAVITY_OFF:
         row, column = np.unravel_index(int(np.argmax(np.abs(rest))), rest.shape)
         raise CardError(
-            f"d{RATES[row]}/dt by {('phi', 'theta')[column]} differs by {abs(rest[row, column]):.3g} m/s^2 per rad from "
-            "the gravity at its trim's attitude.",
+            f"d{RATES[row]}/dt by {('phi', 'theta')[column]} differs by {abs(rest[row, column]):.3g} m/s^2 per rad "
+            "from the gravity at its trim's attitude.",
             where=point.name,
             channel="trim",
             hint="Is the attitude in rad, and of the flight that the model was made of?",
