@@ -7,6 +7,7 @@ At air speed s ahead, between the slowest and the fastest point,
 and the angular accelerations and inner states likewise, without gravity. Trims x_t and u_t are cubic between points and
 have given gradients there; derivatives are linear. X are the points' matrices without their gravity and Coriolis
 terms, which act nonlinearly; gyroscopic moments stay in the matrices, where they are zero to first order.
+An effect of attitude on forces that is left beside gravity (of a bar that keeps its own) stays in X.
 
 The speed s is that of the instant, so that the deviation of u from its trim is zero and the points' speed derivatives
 X_u, M_u act nowhere between the points: what speed does comes from the trims alone. Along the trims A x_t' + B u_t' is

@@ -75,7 +75,7 @@ def stitch_points(
     free = [i for i in points[0].inputs if np.ptp([one.trim[i] for one in made]) > 0.0]
     slopes = differences(made) if how == "trims" else [own_gradients(one, free) for one in made]
     stitched = [
-        SpeedPoint(m.name, inner, m.inputs, m.trim, without_kinematics(m), m.B[m.rows], slope)
+        SpeedPoint(m.name, inner, m.inputs, m.trim, without_kinematics(m, fitted=fitted), m.B[m.rows], slope)
         for m, slope in zip(made, slopes, strict=True)
     ]
     told.append(

@@ -18,6 +18,7 @@ TRIMMED = tuple(name for name in NEEDED if name not in STILL)
 """States of the rigid body that a trim tells."""
 _GRAVITY_OFF = 0.5
 """m/s^2 per rad by which a point's gravity terms may miss those of its attitude."""
+_ROUNDING = 1e-6
 _KINEMATIC_OFF = 0.1
 """By which the rows of roll and pitch may miss kinematics, beside what small angles leave out."""
 _FLOATS = FloatBackend()
@@ -61,12 +62,16 @@ class TrimmedMatrices:
         return body_to_local(Vector(*(self.trim[s] for s in ("u", "v", "w"))), self.attitude, _FLOATS)
 
 
-def without_kinematics(point: TrimmedMatrices) -> Array:
+def without_kinematics(point: TrimmedMatrices, *, fitted: bool) -> Array:
     """The rows of RATES and inner states by (NEEDED, inner), without gravity and Coriolis terms.
 
+    Args:
+        point: the model.
+        fitted: its gravity terms are those of a structure for small angles: what differs little from gravity is it.
+
     Raises:
-        CardError: where the gravity that goes out is not that of the trim's attitude, or the rows of roll and pitch
-            are not those of kinematics.
+        CardError: where the gravity that goes out is not that of the trim's attitude, and no inner state that keeps
+            its own makes the difference; or the rows of roll and pitch are not those of kinematics.
     """
     tan, (sf, cf) = np.tan(point.attitude.theta), (np.sin(point.attitude.phi), np.cos(point.attitude.phi))
     turned = np.zeros((2, point.A.shape[1]))
@@ -86,8 +91,11 @@ def without_kinematics(point: TrimmedMatrices) -> Array:
     left[np.ix_(range(3), [_AT[s] for s in STILL])] -= np.array([[0.0, -w, v], [w, 0.0, -u], [-v, u, 0.0]])
     angles = [_AT["phi"], _AT["theta"]]
     rest = left[np.ix_(range(3), angles)] - gravity_slope(point.trim)
-    if np.max(np.abs(rest)) > _GRAVITY_OFF:
-        row, column = np.unravel_index(int(np.argmax(np.abs(rest))), rest.shape)
+    # A bar that keeps its own attitude leaves two equal effects with opposite signs: of the attitude and of the bar's.
+    own = left[:3, None, len(NEEDED) :] + rest[:, :, None]
+    unexplained = np.min(np.abs(np.concatenate([rest[:, :, None], own], axis=2)), axis=2)
+    if np.max(unexplained) > _GRAVITY_OFF:
+        row, column = np.unravel_index(int(np.argmax(unexplained)), rest.shape)
         raise CardError(
             f"d{RATES[row]}/dt by {('phi', 'theta')[column]} differs by {abs(rest[row, column]):.3g} m/s^2 per rad "
             "from the gravity at its trim's attitude.",
@@ -95,7 +103,8 @@ def without_kinematics(point: TrimmedMatrices) -> Array:
             channel="trim",
             hint="Is the attitude in rad, and of the flight that the model was made of?",
         )
-    left[np.ix_(range(3), angles)] = 0.0
+    small = _GRAVITY_OFF if fitted else _ROUNDING
+    left[np.ix_(range(3), angles)] = 0.0 if np.max(np.abs(rest)) <= small else rest
     return left
 
 
