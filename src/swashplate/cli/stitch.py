@@ -18,7 +18,7 @@ class Gradients(StrEnum):
 
 
 def stitch(
-    points: Annotated[list[str], typer.Argument(metavar="POINT...", help="Model files, one a speed, with trims.")],
+    points: Annotated[list[str], typer.Argument(metavar="POINT...", help="Model files, one a speed, or their folder.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="The model to write.")],
     trim: Annotated[
         list[str] | None,
@@ -49,10 +49,21 @@ def stitch(
     if out.suffix != ".toml":
         raise SwashError(f"ends in '{out.suffix}', expected .toml.", where=out, channel="--out")
     flights = read_all(trim, how=asked(mapping, unit, drop_bad_stamps))
-    if flights and len(flights) != len(points):
-        raise SwashError(f"{len(flights)} logs for {len(points)} points, expected one each.", channel="--trim")
-    made = sp.stitch(points, trims=flights or None, gradients=gradients and gradients.value, title=title)
+    files = [file for point in points for file in _files(Path(point))]
+    if flights and len(flights) != len(files):
+        raise SwashError(f"{len(flights)} logs for {len(files)} points, expected one each.", channel="--trim")
+    made = sp.stitch(files, trims=flights or None, gradients=gradients and gradients.value, title=title)
     made.save(out)
     if not quiet:
         typer.echo(repr(made))
         typer.echo(f"Written: {out}")
+
+
+def _files(place: Path) -> list[Path]:
+    """A point's file, or those of a folder."""
+    if not place.is_dir():
+        return [place]
+    found = sorted(place.glob("*.toml"))
+    if not found:
+        raise SwashError("has no .toml file in it.", where=place, channel="POINT")
+    return found

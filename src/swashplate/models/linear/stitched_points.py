@@ -126,6 +126,10 @@ class StitchedVehicle(Vehicle):
         head = ["u [m/s]", "phi [deg]", "theta [deg]", *angles]
         lines = [super().__repr__(), "Trims:", text_table(head, rows, left=())]
         names = list(disagreement(points[0]))
-        rows = [[f"{p.speed:.2f}", *(f"{a:.3g}/{b:.3g}" for a, b in disagreement(p).values())] for p in points]
-        lines.append("Derivatives by speed, the points' own / what the trims' gradients imply (these fly):")
-        return "\n".join([*lines, text_table(["u [m/s]", *names], rows, left=()), self.card.trust])
+        rows = []
+        for p in points:
+            own, implied = zip(*disagreement(p).values(), strict=True)
+            rows.append([f"{p.speed:.2f}", "point", *(f"{value:.3g}" for value in own)])
+            rows.append(["", "trims", *(f"{value:.3g}" for value in implied)])
+        lines.append("Derivatives by speed as the point has them, and as its trims' gradients imply, which fly:")
+        return "\n".join([*lines, text_table(["u [m/s]", "of", *names], rows, left=(1,)), self.card.trust])

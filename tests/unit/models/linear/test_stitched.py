@@ -169,7 +169,9 @@ def test_it_says_where_speed_derivatives_and_trims_disagree(stitched: StitchedVe
     given, implied = disagreement(wrong.points()[1])["M_u"]
     assert given == pytest.approx(0.3)
     assert abs(implied - agreed["M_u"][0]) < 0.01
-    assert "0.3/" in repr(wrong)
+    rows = [line.split() for line in repr(wrong).splitlines()]
+    told = [row for row in rows if {"point", "trims"} & set(row[:2])]
+    assert (told[2][-2], told[3][-2]) == ("0.3", f"{implied:.3g}")
 
 
 def test_identified_points_take_the_gradients_of_their_trims(points: list[StateSpaceModel]) -> None:
