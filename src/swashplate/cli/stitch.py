@@ -52,7 +52,8 @@ def stitch(
     files = [file for point in points for file in _files(Path(point))]
     if flights and len(flights) != len(files):
         raise SwashError(f"{len(flights)} logs for {len(files)} points, expected one each.", channel="--trim")
-    made = sp.stitch(files, trims=flights or None, gradients=gradients and gradients.value, title=title)
+    how = None if gradients is None else gradients.value
+    made = sp.stitch(files, trims=flights or None, gradients=how, title=title)  # type: ignore[arg-type]  # one of two
     made.save(out)
     if not quiet:
         typer.echo(repr(made))

@@ -85,7 +85,7 @@ def stitched(card: Card) -> Vehicle:
     rows, columns = (*RATES, *inner), (*NEEDED, *inner, *inputs)
     entries = tuple((row, column) for row, by, column in found if by and row in rows and column in columns)
     own = Stitches(n, inner, inputs, entries)
-    expected = {}
+    expected: dict[str, str] = {}
     for k in range(n):
         expected |= {f"{entry_name(*e)}_{k}": entry_unit(units[e[0]], units[e[1]]) for e in entries}
         expected |= {f"trim_{name}_{k}": units[name] for name in own.trimmed}

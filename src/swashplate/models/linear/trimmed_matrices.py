@@ -95,9 +95,9 @@ def without_kinematics(point: TrimmedMatrices, *, fitted: bool) -> Array:
     own = left[:3, None, len(NEEDED) :] + rest[:, :, None]
     unexplained = np.min(np.abs(np.concatenate([rest[:, :, None], own], axis=2)), axis=2)
     if np.max(unexplained) > _GRAVITY_OFF:
-        row, column = np.unravel_index(int(np.argmax(unexplained)), rest.shape)
+        row, k = divmod(int(np.argmax(unexplained)), 2)
         raise CardError(
-            f"d{RATES[row]}/dt by {('phi', 'theta')[column]} differs by {abs(rest[row, column]):.3g} m/s^2 per rad "
+            f"d{RATES[row]}/dt by {('phi', 'theta')[k]} differs by {abs(rest[row, k]):.3g} m/s^2 per rad "
             "from the gravity at its trim's attitude.",
             where=point.name,
             channel="trim",
@@ -156,5 +156,5 @@ def differences(points: Sequence[TrimmedMatrices]) -> list[dict[str, float]]:
     speeds = np.array([point.speed for point in points])
     names = [name for name in points[0].trim if name != "u"]
     values = np.array([[point.trim[name] for name in names] for point in points])
-    slopes = np.gradient(values, speeds, axis=0, edge_order=min(2, len(points) - 1))
+    slopes = np.asarray(np.gradient(values, speeds, axis=0, edge_order=1 if len(points) == 2 else 2))
     return [dict(zip(names, map(float, row), strict=True)) for row in slopes]
