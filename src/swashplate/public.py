@@ -73,7 +73,7 @@ _COMPUTING: Mapping[str, str] = {
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",
     "compare_derivatives": "swashplate.simulation.published:compare_derivatives",
-    "compare": "swashplate.validation.compare:compare",
+    "compare": "swashplate.api.compare:compare",
     "coupling": "swashplate.control.laws.linear_decoupling:coupling",
     "decouple": "swashplate.api.decouple:decouple",
     "decouple_axes": "swashplate.api.decouple_axes:decouple_axes",
