@@ -46,8 +46,8 @@ def compare_modes(cases: Mapping[str, Linear]) -> CaseParts:
         for j in sorted(set(range(len(found[name]))) - {j for j in matched[name] if j is not None}):
             value = found[name][j]
             cells = [Cell("-")]
-            for other in names[1:]:
-                cells += [Cell(_shown(value)), Cell("")] if other == name else [Cell("-"), Cell("-")]
+            for column in names[1:]:
+                cells += [Cell(_shown(value)), Cell("")] if column == name else [Cell("-"), Cell("-")]
             rows.append((*cells,))
             entries.append({n: [float(value.real), float(value.imag)] if n == name else None for n in names})
     head = (names[0], *(title for name in names[1:] for title in (name, "away [%]")))
@@ -124,12 +124,12 @@ def response(model: Linear, outputs: Sequence[str], inputs: Sequence[str]) -> Co
     """H(j omega) over BAND with delays, shape (n, n_outputs, n_inputs)."""
     o, i = ([every.index(n) for n in names] for every, names in ((_outputs(model), outputs), (model.inputs, inputs)))
     if isinstance(model, StateSpaceModel):
-        h = model.response(BAND)
+        h: Complex = model.response(BAND)
     else:
         s: Complex = np.asarray(1j * BAND[:, None, None])
-        h = model.C @ np.linalg.solve(s * np.eye(len(model.states)) - model.A, model.B[None] + 0j) + model.D
-        h = h * np.exp(-s * _late(model))
-    return np.asarray(h[:, o][:, :, i])
+        x = np.linalg.solve(s * np.eye(len(model.states)) - model.A, model.B[None] + 0j)
+        h = np.asarray((model.C @ x + model.D) * np.exp(-s * _late(model)), dtype=np.complex128)
+    return np.asarray(h[:, o][:, :, i], dtype=np.complex128)
 
 
 def _late(model: LinearModel) -> Array:

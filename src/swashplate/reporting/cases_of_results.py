@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
@@ -59,8 +60,8 @@ def distance(first: Estimate | None, other: Estimate | None) -> float:
     """Difference in standard deviations; NaN where one is not there, has another unit, or both know no deviation."""
     if first is None or other is None or first.unit != other.unit:
         return float("nan")
-    spread = np.hypot(*(e.best_sigma if e.free and np.isfinite(e.best_sigma) else 0.0 for e in (first, other)))
-    return float((other.value - first.value) / spread) if spread > 0.0 else float("nan")
+    spread = math.hypot(*(e.best_sigma if e.free and np.isfinite(e.best_sigma) else 0.0 for e in (first, other)))
+    return (other.value - first.value) / spread if spread > 0.0 else float("nan")
 
 
 def _of(e: Estimate | None) -> list[Cell]:
