@@ -138,7 +138,7 @@ def test_logs_between_the_points_are_predicted() -> None:
             "title": "A stitched model from logs alone, at speeds between them",
             "text": "Sweeps of a simulated R-MAX under a hold at 5, 10, 15 and 20 m/s, in gusts (0.2 to 0.4 m/s) and "
             "with noise; each speed's responses give a six-degree-of-freedom model with delays, the four are stitched. "
-            "Logs at other speeds: J of the responses (mean, how many up to 100, the worst; also with gradients from the "
+            "Logs at other speeds: J of the responses (mean, how many up to 100, the worst; also with gradients of the "
             f"identified derivatives), Theil's coefficient of {WINDOW:g} s predictions on the swept axis, in brackets "
             "that of the equations that made the logs, which are not told the gusts either. Asked: a mean J up to 100; "
             "0.25 of Theil's coefficient wherever those equations reach it.",
