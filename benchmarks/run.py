@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import closed_loops, export, frequency, helicopter, identifying, link, live, many, peers, single
+from benchmarks.rotor_options import rotor_options
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
 
@@ -40,6 +41,7 @@ def measure(*, short: bool) -> list[Result]:
         helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),
         helicopter.speeds(repeats=repeats),
         helicopter.lpv(steps=1_000 * scale, repeats=repeats),
+        *rotor_options(steps=20_000 * scale, repeats=repeats),
         *link.measure(short=short),
     ]
     jsbsim, scan = results[0], results[1]

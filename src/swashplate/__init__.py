@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.stitch import stitch
+    from swashplate.api.structures import show_structure, structures
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
@@ -189,6 +190,7 @@ __all__ = [
     "respond",
     "rotor_speed",
     "show_replay",
+    "show_structure",
     "simulate",
     "simulate_adaptive",
     "simulate_bench",
@@ -203,6 +205,7 @@ __all__ = [
     "stepwise",
     "stitch",
     "structure",
+    "structures",
     "suggest_gains",
     "synchronise",
     "trim",

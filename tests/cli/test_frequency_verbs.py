@@ -230,6 +230,47 @@ def test_a_unit_that_is_none_is_named(folder: Path, answered: Path, old: str, ne
     assert words in one_message(swash("fit-ss", bad, answered))
 
 
+def test_single_pairs_have_bands_of_their_own_or_are_left_out(answered: Path) -> None:
+    ask = ("fit-ss", "rotor_body", answered, "--starts", "1", "--json")
+    done = swash(*ask, "--band", "0.3-10", "--band", "p/mixer_roll=0.5,8", "--without", "q/mixer_roll")
+    assert done.code == 0, done.err
+    fit = json.loads(done.out)["fit"]
+    assert set(fit["costs"]) == {"p / mixer_roll", "p / mixer_pitch", "q / mixer_pitch"}
+    assert fit["settings"]["bands_hz"] == {"p/mixer_roll": [0.5, 8.0]}
+    assert "Did you mean 'p/mixer_roll'?" in one_message(swash(*ask, "--band", "p/mixer_rol=1-2"))
+    assert "Did you mean 'q/mixer_roll'?" in one_message(swash(*ask, "--without", "q/mixerroll"))
+    assert "two bands are given for all pairs" in one_message(swash(*ask, "--band", "1-2", "--band", "1-3"))
+    assert "is not LOW-HIGH" in one_message(swash(*ask, "--band", "p/mixer_roll=5"))
+
+
+def test_structures_are_listed_shown_composed_and_searched(folder: Path, answered: Path) -> None:
+    listed = swash("structures", "list")
+    assert listed.code == 0
+    assert "rotor_body" in listed.out
+    assert "Pitt-Peters" in listed.out
+    assert json.loads(swash("structures", "--json").out)["parts"]["torque"].startswith("engine")
+    out = folder / "composed.toml"
+    shown = swash("structures", "show", "compose:cyclic+flap", "--out", out)
+    assert shown.code == 0, shown.err
+    assert "tau_f db/dt = -tau_f p + Ba a - b + Blat lateral + Blon longitudinal" in shown.out
+    assert structure(str(out)).name == "cyclic+flap"
+    assert "exists already" in one_message(swash("structures", "show", "compose:cyclic+flap", "--out", out))
+    assert "Did you mean 'flap'?" in one_message(swash("structures", "show", "compose:cyclic+flapp"))
+    names = ("--rename", "lateral=mixer_roll,longitudinal=mixer_pitch")
+    fitted = swash("fit-ss", out, answered, *names, "--json")
+    assert fitted.code == 0, fitted.err
+    found = {p["name"]: p["value"] for p in json.loads(fitted.out)["fit"]["estimates"]}
+    assert found["Lb"] == pytest.approx(3000.0, rel=0.05)
+    assert "Say --rename lateral=mixer_roll" in one_message(swash("fit-ss", out, answered))
+    some = "compose:cyclic,compose:cyclic+flap_decoupled,compose:cyclic+flap"
+    searched = swash("fit-ss", some, answered, "--search", *names, "--out", folder / "searched")
+    assert searched.code == 0, searched.err
+    assert "*cyclic+flap " in searched.out
+    assert "Picked cyclic+flap" in searched.out
+    assert "Structures that were tried" in (folder / "searched" / "report.html").read_text(encoding="utf-8")
+    assert "a structure and responses are needed" in one_message(swash("fit-ss", answered))
+
+
 def test_an_unstable_start_is_named_and_the_fit_is_kept(folder: Path, answered: Path) -> None:
     text = folder / "unstable.toml"
     from importlib import resources

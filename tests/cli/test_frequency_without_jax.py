@@ -29,9 +29,10 @@ def test_from_a_log_to_a_verified_model_without_jax(tmp_path: Path) -> None:
         ["respond", flown, "--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.2-12"],
         ["fit-tf", answers, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "--band", "0.5-8"],
         ["fit-ss", "rotor_body", answers, "--starts", "1"],
+        ["fit-ss", "rotor_body,rotor_body", answers, "--search"],
         ["validate", "--model", model / "model.toml", "--flight", unseen],
     ]
-    outs = [answers, tmp_path / "tf", model, tmp_path / "validation"]
+    outs = [answers, tmp_path / "tf", model, tmp_path / "search", tmp_path / "validation"]
     words = [[*map(str, verb), "--out", str(out), "--quiet"] for verb, out in zip(verbs, outs, strict=True)]
     ran = subprocess.run(
         [sys.executable, "-c", RUN, json.dumps(words)], capture_output=True, text=True, check=False, timeout=300

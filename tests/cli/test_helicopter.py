@@ -332,7 +332,7 @@ def test_a_card_of_an_earlier_version_flies_and_says_what_it_lacks_where_that_co
     new_card: str, tmp_path: Path
 ) -> None:
     """Servo delay and engine lag came later: without their options nothing of them is needed."""
-    card, text = tmp_path / "old.toml", new_card
+    card, text = tmp_path / "old.toml", new_card + "\n"
     for name in ADDED:
         start = text.index(f"# {MEANING[name]}")
         text = text[:start] + text[text.index("\n\n", start) + 2 :]
@@ -410,3 +410,19 @@ def test_a_card_beside_published_matrices() -> None:
     assert "small" in shown
     for bad in (("--turn", "5"), ("--imperial",), ("--speed", "0-8/4")):
         assert "--published" in one_message(swash("derivatives", "lynx", "--published", report, *bad))
+
+
+def test_a_number_that_nothing_uses_is_refused() -> None:
+    """The paper's rotors have no chord; those with inflow have."""
+    message = one_message(swash("trim", "coax", "--set", "rotor_chord=0.04"))
+    assert "coax.toml: rotor_chord: is on the card, but no equation with these options uses it" in message
+    assert swash("trim", "coax", "--option", "rotor=inflow", "--set", "rotor_chord=0.04").code == 0
+
+
+def test_autorotation_on_the_command_line() -> None:
+    outcome = swash("trim", "raptor50", "--autorotation", "--speed", "0-8/8")
+    assert outcome.code == 0
+    assert "climb [m/s]" in outcome.out
+    assert "has no shaft power" in one_message(swash("trim", "coax", "--autorotation"))
+    climbing = swash("trim", "raptor50", "--climb", "-12")
+    assert "the air drives the rotors with" in climbing.err

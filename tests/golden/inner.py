@@ -5,7 +5,8 @@ from __future__ import annotations
 from swashplate.control.analysis.ardupilot_gains import suggest_gains
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
-from swashplate.identification.frequency.transfer_function_fit import as_state_space, suggest
+from swashplate.identification.frequency.transfer_function_fit import as_state_space
+from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.time.equation_error import equation_error
 from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
 from swashplate.identification.time.linear_time_fit import fit_in_time

@@ -12,11 +12,10 @@ from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines
 from swashplate.identification.frequency.transfer_function_fit import (
-    TriedStructure,
     as_state_space,
     fit_transfer_function,
-    suggest,
 )
+from swashplate.identification.frequency.transfer_function_forms import TriedStructure, suggest
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form
 from swashplate.reporting.sections_responses import ResponseMaterial

@@ -31,7 +31,7 @@ class LinearStudy:
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:
-        material: responses, fits, trials, verification, rival and gains, as far as there are any.
+        material: responses, fits, trials, search, verification, rival and gains, as far as there are any.
         fitted: flights that the fit was made from, where it was made from flights.
         margins: read off the responses and the model.
         model: that can be flown and saved; None where there is none.
@@ -70,8 +70,10 @@ class LinearStudy:
         document = {"fit": self.fit.to_document(comparisons=False), "verification": verification}
         if self.material.time_fit is not None:
             return document
-        tried = [{"form": t.form.text, "J": t.cost} for t in self.material.trials]
+        tried = [{"form": t.form.text, "J": t.cost, "unsound": t.unsound} for t in self.material.trials]
         gains = [suggestion.as_dict() for suggestion in self.material.gains]
+        if self.material.search is not None:
+            document["search"] = self.material.search.as_dict()
         return document | {"margins": [line.as_dict() for line in self.margins], "gains": gains, "tried": tried}
 
     def page(self, *, title: str | None = None) -> Report:
@@ -96,8 +98,12 @@ class LinearStudy:
 
     def __repr__(self) -> str:
         m, parts = self.material, []
+        parts += [repr(m.search)] if m.search is not None else []
         if m.trials:
-            rows = [f"  {t.form.text:<10}{t.parameters:>3} parameters   J = {t.cost:8.1f}" for t in m.trials]
+            rows = [
+                f"  {t.form.text:<14}{t.parameters:>3} parameters   J = {t.cost:8.1f}   {t.unsound}".rstrip()
+                for t in m.trials
+            ]
             parts.append("\n".join(["Structures tried (zeros/poles):", *rows]))
         if self.fit is not None:
             parts.append("\n".join([repr(self.fit), *map(repr, self.margins)]))

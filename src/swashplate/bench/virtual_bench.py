@@ -18,7 +18,9 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
+from swashplate.errors import BenchError
 from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
+from swashplate.models.coax_rotors import InflowOptions
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
@@ -217,7 +219,17 @@ def virtual_bench(
         schedules: all at one rate.
         setup: what the bench is made of.
         seed: of everything random.
+
+    Raises:
+        BenchError: for rotors with inflow: the bench's procedures look for the paper's factors.
     """
+    if isinstance(vehicle.options, InflowOptions):
+        raise BenchError(
+            "has rotors with inflow, expected the paper's.",
+            where=vehicle.card.where,
+            channel="rotor",
+            hint='Give the card with rotor = "paper": the bench finds k_thrust and k_torque.',
+        )
     enable_double_precision()
     enable_compilation_cache()
     setup = setup or Setup()

@@ -34,6 +34,7 @@ from swashplate.cli import (
     rotor_speed,
     simulate,
     stitch,
+    structures,
     trim,
     validate,
     vehicles,
@@ -102,6 +103,7 @@ app.add_typer(bench.app, name="bench")
 app.add_typer(link.app, name="link")
 app.add_typer(control.app, name="control")
 app.add_typer(vehicles.app, name="vehicles")
+app.add_typer(structures.app, name="structures")
 app.add_typer(data.app, name="data")
 app.command("demo", short_help="Run the main job on real or simulated flights.")(demo.demo)
 

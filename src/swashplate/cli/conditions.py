@@ -71,8 +71,8 @@ class Conditions:
     turn: float
     environment: Environment
 
-    def curve(self) -> TrimCurve:
-        """A trim at every speed."""
+    def curve(self, *, autorotation: bool = False) -> TrimCurve:
+        """A trim at every speed, or the descent there that needs no power."""
         from swashplate.simulation.trim_curve import trim_curve
 
         return trim_curve(
@@ -82,6 +82,7 @@ class Conditions:
             lateral=self.lateral,
             turn=self.turn,
             environment=self.environment,
+            autorotation=autorotation,
         )
 
     def trims(self) -> tuple[Trim, ...]:
@@ -89,7 +90,7 @@ class Conditions:
         return self.curve().trims
 
     def tell(self, curve: TrimCurve) -> tuple[str, ...]:
-        """Where the vehicle's equations do not hold; said on standard error."""
+        """Where the vehicle's equations or its engine do not hold; said on standard error."""
         for words in curve.remarks:
             typer.echo(f"Careful: {words}", err=True)
         return curve.remarks
@@ -149,6 +150,14 @@ def vehicle_of(
     if mass is not None:
         numbers["mass"] = mass
     how = {"source": "the command line", "status": "assumed"}
+    idle = [key for key in numbers if key in made.card.parameters and key not in made.parameter_names]
+    if idle and not made.traits.linear:
+        raise SwashError(
+            "is on the card, but no equation with these options uses it.",
+            where=made.card.where,
+            channel=", ".join(idle),
+            hint="Switch on what uses it with --option, or leave it out.",
+        )
     if whole:
         from swashplate.simulation.trim import need_whole_body
 

@@ -14,11 +14,14 @@ def fit_ss(
         str,
         typer.Argument(
             metavar="STRUCTURE",
-            help="A model file, or a ready structure: six_dof, six_dof_coupled, hybrid, eleven_state, "
-            "thirteen_state, coaxial, rotor_body, heave, yaw.",
+            help="compose:body+flap+..., a ready structure (swash structures list) or a model file; with --search "
+            "several by commas, or none.",
         ),
     ],
-    responses: flying.Responses,
+    responses: flying.ResponsesLast = None,
+    search: Annotated[
+        bool, typer.Option("--search", help="Try structures, drop the hopeless early, pick one and say why.")
+    ] = False,
     out: options.OutFolder = None,
     start: flying.Start = None,
     start_from: Annotated[
@@ -30,7 +33,8 @@ def fit_ss(
         ),
     ] = None,
     fix: flying.Fix = None,
-    band: flying.BandOption = None,
+    band: flying.BandsOption = None,
+    without: flying.Without = None,
     coherence: flying.Coherence = 0.6,
     reduce: Annotated[bool, typer.Option("--reduce", help="Take out what the responses do not tell.")] = False,
     starts: Annotated[int, typer.Option("--starts", help="Starting points that are followed.", min=1)] = 4,
@@ -53,17 +57,22 @@ def fit_ss(
     import swashplate as sp
     from swashplate.cli.reading import asked, read_all
 
-    begun, found, limits = sp.structure(structure), flying.load_responses(responses), flying.band(band)
+    named, place = flying.structures_and_responses(structure, responses, search=search)
+    begun, (limits, own) = [sp.structure(name) for name in named], flying.bands(band)
+    found = flying.load_responses(place)
     first, held = options.numbers_by_name(start, option="--start"), options.fixed_values(fix)
     names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps)
     flying.carried_out(
         lambda say: sp.fit_ss(
             begun,
             found,
+            search=search,
             start=first,
             start_from=flying.names(start_from) or None,
             fixed=held,
             band=limits,
+            bands=own,
+            without=tuple(without or ()),
             least_coherence=coherence,
             reduce=reduce,
             starts=starts,

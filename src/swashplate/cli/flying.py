@@ -18,8 +18,26 @@ if TYPE_CHECKING:
 RESPONSES = "responses.nc"
 
 BandOption = Annotated[str | None, typer.Option("--band", metavar="LOW-HIGH", help="Limits in Hz, for example 0.1-10.")]
+BandsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--band",
+        metavar="[PAIR=]LOW-HIGH",
+        help="Limits in Hz: 0.1-10 for all, p/lateral=0.5-12 for a pair, collective=0.3-5 for a channel. Repeatable.",
+    ),
+]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--without", metavar="PAIR", help="Do not fit r/collective, or all of a channel (collective). Repeatable."
+    ),
+]
 Responses = Annotated[
     Path, typer.Argument(metavar="RESPONSES", help="What `swash respond` wrote: the file responses.nc or its folder.")
+]
+ResponsesLast = Annotated[
+    Path | None,
+    typer.Argument(metavar="RESPONSES", help="What `swash respond` wrote: the file responses.nc or its folder."),
 ]
 Rename = Annotated[
     str,
@@ -37,12 +55,32 @@ def band(text: str | None, *, option: str = "--band") -> tuple[float, float] | N
     if text is None:
         return None
     try:
-        low, high = (float(part) for part in text.lower().removesuffix("hz").split("-"))
+        low, high = (float(part) for part in text.lower().removesuffix("hz").replace(",", "-").split("-"))
     except ValueError:
         low = high = float("nan")
     if not 0.0 < low < high < float("inf"):
         raise SwashError(f"'{text}' is not LOW-HIGH in Hz.", channel=option, hint=f"Example: {option} 0.1-10")
     return low, high
+
+
+def bands(texts: Sequence[str] | None) -> tuple[tuple[float, float] | None, dict[str, tuple[float, float]]]:
+    """Repeated `--band 0.1-10` and `--band p/lateral=0.5-12` as the band of all pairs and those of some."""
+    whole, some = [], {}
+    for text in texts or ():
+        name, equals, limits = text.rpartition("=")
+        found = band(limits)
+        assert found is not None
+        if not equals:
+            whole.append(found)
+        elif not name.strip() or name.strip() in some:
+            raise SwashError(f"'{text}' gives no pair, or one that is given twice.", channel="--band")
+        else:
+            some[name.strip()] = found
+    if len(whole) > 1:
+        raise SwashError(
+            "two bands are given for all pairs.", channel="--band", hint="Say which pair: --band p/lateral=0.5-12"
+        )
+    return (whole[0] if whole else None), some
 
 
 def names(text: str | None) -> tuple[str, ...]:
@@ -60,6 +98,19 @@ def renamed(text: str, *, option: str) -> dict[str, str]:
             raise SwashError(f"'{part}' is no new CHANNEL or NAME=CHANNEL.", channel=option)
         pairs[name] = source
     return pairs
+
+
+def structures_and_responses(structure: str, responses: Path | None, *, search: bool) -> tuple[tuple[str, ...], Path]:
+    """`STRUCTURE RESPONSES` as the structures and the place; a search may have the responses alone."""
+    if responses is not None:
+        return (names(structure) if search else (structure,)), responses
+    if not search:
+        raise SwashError(
+            "a structure and responses are needed.",
+            channel=structure,
+            hint="swash fit-ss compose:body+flap RESPONSES, or swash fit-ss --search RESPONSES.",
+        )
+    return (), Path(structure)
 
 
 def load_responses(path: Path) -> FrequencyResponse:

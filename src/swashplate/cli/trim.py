@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 @given.flown
 def trim(
     asked: given.Conditions,
+    autorotation: Annotated[
+        bool, typer.Option("--autorotation", help="Sink as fast as needs no power of the engine.")
+    ] = False,
     plot: given.Page = None,
     json: options.Json = False,
 ) -> None:
@@ -28,7 +31,7 @@ def trim(
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
 
-    found = asked.curve()
+    found = asked.curve(autorotation=autorotation)
     asked.tell(found)
     if plot is not None:
         import swashplate as sp

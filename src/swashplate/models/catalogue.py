@@ -12,6 +12,7 @@ from typing import Any
 from swashplate.errors import CardError, SwashError
 from swashplate.models.card import Card, packaged_cards, read_card
 from swashplate.models.linear import state_space_file
+from swashplate.models.linear.composition import is_composed
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry, nearest
@@ -100,7 +101,10 @@ _SEVERAL = ("conventional", "linear", "multirotor", "stitched")
 
 
 def structure(name_or_file: str | Path) -> Vehicle:
-    """The vehicle of a ready structure or of a state-space file; what it is made of is its `structure`.
+    """The vehicle of a ready structure, a composed one or a state-space file; what it is made of is its `structure`.
+
+    Args:
+        name_or_file: "hybrid", "compose:body+flap+inflow" (`sp.structures` lists names and parts) or a file.
 
     Raises:
         CardError, ExpressionError: naming the file, the entry, what was found and what was expected.
@@ -111,7 +115,7 @@ def structure(name_or_file: str | Path) -> Vehicle:
 def is_state_space(name_or_file: str | Path) -> bool:
     """Whether a name is that of a ready structure, or of a file that says that it is a state-space model."""
     text = str(name_or_file)
-    return text in state_space_file.structure_names() or state_space_file.is_state_space(text)
+    return is_composed(text) or text in state_space_file.structure_names() or state_space_file.is_state_space(text)
 
 
 def _card_of(path: Path) -> Card:

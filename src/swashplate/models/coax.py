@@ -2,22 +2,24 @@
 
 Fankhauser, Bouabdallah, Leutenegger and Siegwart, "Modeling and Decoupling Control of the CoaX Micro Helicopter",
 eqs 1 to 18 and Fig. 3. Every block of the figure is one function of `swashplate.physics`; this file only joins them.
+In place of the paper's thrust and torque (eqs 3, 4) a card may ask for rotors with inflow (`coax_rotors`, two states
+more).
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from swashplate.models.coax_rotors import SLOWEST, InflowOptions, rotor_pair
+from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
 from swashplate.physics import drive_train, fuselage, rotor, stabilizer_bar, swashplate
 from swashplate.physics.backend import Backend, Scalar
+from swashplate.physics.coaxial_wake import Induced
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, euler_rates, local_to_body
 from swashplate.physics.rigid_body import Inertia, RigidBody, gravity, rigid_body_rates
 from swashplate.physics.rotor import TipPathPlane
 from swashplate.physics.stabilizer_bar import StabilizerBar
-
-_SLOWEST = 0.1
-"""Share of the full speed below which a rotor's tilt fades with the speed squared, as what tilts it does."""
 
 SENSE_LOWER, SENSE_UPPER = +1.0, -1.0
 """Sense of rotation about body z (down): the lower rotor turns clockwise seen from above."""
@@ -83,15 +85,22 @@ UNITS: dict[str, str] = {
 """Every parameter and its unit, in the order of the equations' tuple."""
 
 CoaxParameters = NamedTuple("CoaxParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
+CoaxInflowParameters = NamedTuple(  # type: ignore[misc]
+    "CoaxInflowParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS)]
+)
 
 
 class CoaxState(NamedTuple):
-    """Rigid body, lower tip-path plane, stabilizer bar (None where it is taken off) and the two rotor speeds."""
+    """Rigid body, lower tip-path plane, stabilizer bar (None where it is taken off) and the two rotor speeds.
+
+    Rotors with inflow carry their induced velocities; None in the paper's form.
+    """
 
     body: RigidBody
     lower: TipPathPlane
     bar: StabilizerBar | None
     drive: Drive
+    inflow: Induced | None = None
 
 
 class Drive(NamedTuple):
@@ -111,13 +120,19 @@ class CoaxInputs(NamedTuple):
 
 
 class CoaxialLoads(NamedTuple):
-    """What acts on the fuselage, in body axes, and how the moving parts move."""
+    """What acts on the fuselage, in body axes, how the moving parts move, and thrust and torque of both rotors.
+
+    Upper first: `lift` [N] along its disc's normal, `torque` [N m] about it.
+    """
 
     force: Vector
     moment: Vector
     lower: TipPathPlane
     bar: StabilizerBar | None
     drive: Drive
+    inflow: Induced | None
+    lift: tuple[Scalar, Scalar]
+    torque: tuple[Scalar, Scalar]
 
 
 def _flap_response(par: Any) -> swashplate.FlapResponse:
@@ -126,18 +141,25 @@ def _flap_response(par: Any) -> swashplate.FlapResponse:
 
 def _turning(omega: Scalar, full: Scalar, xp: Backend) -> Scalar:
     """Share of a tilt that a rotor takes up: 1 in flight, 0 at rest, where swashplate, bar and wind tilt no disc."""
-    share = xp.minimum(1.0, xp.maximum(0.0, omega) / (_SLOWEST * full))  # eq. 22 is below zero for a motor off
+    share = xp.minimum(1.0, xp.maximum(0.0, omega) / (SLOWEST * full))  # eq. 22 is below zero for a motor off
     return share * share
 
 
 def loads(
-    state: CoaxState, inputs: CoaxInputs, par: Any, env: Environment, xp: Backend, *, mixing: str = "rotation"
+    state: CoaxState,
+    inputs: CoaxInputs,
+    par: Any,
+    env: Environment,
+    xp: Backend,
+    *,
+    mixing: str = "rotation",
+    rotors: InflowOptions | None = None,
 ) -> CoaxialLoads:
     """Force [N] and moment [N m] on the fuselage without gravity, and the rates of bar, lower rotor and drive trains.
 
     Bench and flight use this same function: the bench holds the body still.
     """
-    body, lower, bar, drive = state
+    body, lower, bar, drive, inflow = state
     density = env.air_density / par.air_density
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
 
@@ -204,28 +226,33 @@ def loads(
     )
 
     # Forces and torques (eqs 1 to 7)
-    thrust_upper = rotor.thrust_direction(upper, xp).scaled(
-        rotor.thrust(par.k_thrust_upper, drive.omega_upper, density)
-    )
-    thrust_lower = rotor.thrust_direction(lower, xp).scaled(
-        rotor.thrust(par.k_thrust_lower, drive.omega_lower, density)
-    )
+    normals = (rotor.thrust_direction(upper, xp), rotor.thrust_direction(lower, xp))
+    inflow_rates = None
+    if rotors is None or inflow is None:
+        lift_upper = rotor.thrust(par.k_thrust_upper, drive.omega_upper, density)
+        lift_lower = rotor.thrust(par.k_thrust_lower, drive.omega_lower, density)
+        torque_upper = rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density)
+        torque_lower = rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density)
+    else:
+        level = xp.cos(body.attitude.phi) * xp.cos(body.attitude.theta)
+        lift_upper, lift_lower, torque_upper, torque_lower, inflow_rates, _ = rotor_pair(
+            air,
+            normals,
+            (drive.omega_upper, drive.omega_lower),
+            inflow,
+            (par.hub_height_upper * level - body.z, par.hub_height_lower * level - body.z),
+            par,
+            env.air_density,
+            rotors,
+            xp,
+        )
+    thrust_upper, thrust_lower = normals[0].scaled(lift_upper), normals[1].scaled(lift_lower)
     drag = fuselage.drag_force(
         air, drag_x=par.drag_x, drag_y=par.drag_y, drag_z=par.drag_z, damping_w=par.damping_w, xp=xp
     ).scaled(density)
     moment = (
-        rotor.yaw_moment(
-            rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density),
-            par.inertia_drive_upper,
-            drive_rates.omega_upper,
-            SENSE_UPPER,
-        )
-        + rotor.yaw_moment(
-            rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density),
-            par.inertia_drive_lower,
-            drive_rates.omega_lower,
-            SENSE_LOWER,
-        )
+        rotor.yaw_moment(torque_upper, par.inertia_drive_upper, drive_rates.omega_upper, SENSE_UPPER)
+        + rotor.yaw_moment(torque_lower, par.inertia_drive_lower, drive_rates.omega_lower, SENSE_LOWER)
         + rotor.thrust_moment(thrust_upper, par.hub_height_upper)
         + rotor.thrust_moment(thrust_lower, par.hub_height_lower)
         + rotor.flapping_moment(par.hub_stiffness_upper, upper)
@@ -234,23 +261,50 @@ def loads(
         + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_upper, drive.omega_upper, SENSE_UPPER)
         + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_lower, drive.omega_lower, SENSE_LOWER)
     )
-    return CoaxialLoads(thrust_upper + thrust_lower + drag, moment, lower_rates, bar_rates, drive_rates)
+    return CoaxialLoads(
+        thrust_upper + thrust_lower + drag,
+        moment,
+        lower_rates,
+        bar_rates,
+        drive_rates,
+        inflow_rates,
+        (lift_upper, lift_lower),
+        (torque_upper, torque_lower),
+    )
 
 
 def derivatives(
-    state: CoaxState, inputs: CoaxInputs, par: Any, env: Environment, xp: Backend, *, mixing: str = "rotation"
+    state: CoaxState,
+    inputs: CoaxInputs,
+    par: Any,
+    env: Environment,
+    xp: Backend,
+    *,
+    mixing: str = "rotation",
+    rotors: InflowOptions | None = None,
 ) -> CoaxState:
     """Time derivative of the whole state (Fankhauser et al., eqs 1 to 17)."""
-    acting = loads(state, inputs, par, env, xp, mixing=mixing)
+    acting = loads(state, inputs, par, env, xp, mixing=mixing, rotors=rotors)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz)
     force = acting.force + gravity(par.mass, env.gravity, state.body.attitude, xp)
     return CoaxState(
-        rigid_body_rates(state.body, force, acting.moment, inertia, xp), acting.lower, acting.bar, acting.drive
+        rigid_body_rates(state.body, force, acting.moment, inertia, xp),
+        acting.lower,
+        acting.bar,
+        acting.drive,
+        acting.inflow,
     )
 
 
 def specific_force(
-    state: CoaxState, inputs: CoaxInputs, par: Any, env: Environment, xp: Backend, *, mixing: str = "rotation"
+    state: CoaxState,
+    inputs: CoaxInputs,
+    par: Any,
+    env: Environment,
+    xp: Backend,
+    *,
+    mixing: str = "rotation",
+    rotors: InflowOptions | None = None,
 ) -> Vector:
     """What an accelerometer at the CG reads [m/s^2]: every force but gravity, per mass."""
-    return loads(state, inputs, par, env, xp, mixing=mixing).force.scaled(1.0 / par.mass)
+    return loads(state, inputs, par, env, xp, mixing=mixing, rotors=rotors).force.scaled(1.0 / par.mass)

@@ -91,3 +91,12 @@ CHOICES: dict[str, Choice] = {
     ),
 }
 """The coaxial helicopter's ready choices, by name."""
+
+_INFLOW_FULL = tuple(free for free in _FULL if free.name != "damping_w")
+INFLOW_CHOICES: dict[str, Choice] = {
+    "flight": CHOICES["flight"],
+    "full": Choice(
+        "full", "as for the paper's rotors; heave damping follows from the rotors", _INFLOW_FULL, _TIES, _SET
+    ),
+}
+"""The same for rotors with inflow."""

@@ -1,8 +1,9 @@
 """A rotor disc by blade elements, integrated in closed form: thrust, in-plane forces, torque and flapping moments.
 
-Straight untapered blades with linear twist and lift slope a, no stall, no reversed flow, no tip loss, small angles; the
-inflow is uniform plus a gradient. Within that the integrals over radius and azimuth are exact (Bramwell 2001, ch. 3 and
-5; Padfield 2007, sec. 3.2.1), for any advance ratio and any direction of flight, and any sign of the thrust.
+Straight untapered blades with linear twist and lift slope a, no stall, no reversed flow, small angles; the inflow is
+uniform plus a gradient. Within that the integrals over radius and azimuth are exact (Bramwell 2001, ch. 3 and 5;
+Padfield 2007, sec. 3.2.1), for any advance ratio and any direction of flight, and any sign of the thrust. Blades lift
+over their whole length, or from a root cut-out to a tip loss factor (`Span`).
 
 Everything is dimensionless (lengths by R, speeds by Omega R, rates by Omega) and for a rotor that turns counter-
 clockwise from above; azimuth psi counts from aft. Pitch theta0 + twist x - A1 cos - B1 sin, flapping
@@ -14,6 +15,43 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from swashplate.physics.backend import Scalar
+
+
+class Span(NamedTuple):
+    """Integrals over the part of a blade that lifts, m_n of x^n, and over the part that drags, d_n."""
+
+    m0: Scalar
+    m1: Scalar
+    m2: Scalar
+    m3: Scalar
+    m4: Scalar
+    d1: Scalar
+    d3: Scalar
+
+
+WHOLE = Span(1.0, 0.5, 1.0 / 3.0, 0.25, 0.2, 0.5, 0.25)
+"""Blades that lift from the centre to the tip."""
+
+
+def span(tip_loss: Scalar, root_cutout: Scalar) -> Span:
+    """Blades that begin at a root cut-out and lift to B of the radius, dragging to the tip (Prandtl and Betz 1919).
+
+    Args:
+        tip_loss: B, 0.95 to 0.98, or 1 - sqrt(2 C_T) / blades (Leishman 2006, eq. 3.122); 1 for none.
+        root_cutout: radius of the first profile over that of the rotor; 0 for none.
+    """
+    b, e = tip_loss, root_cutout
+    b2, e2 = b * b, e * e
+    b4, e4 = b2 * b2, e2 * e2
+    return Span(
+        b - e,
+        (b2 - e2) / 2.0,
+        (b2 * b - e2 * e) / 3.0,
+        (b4 - e4) / 4.0,
+        (b4 * b - e4 * e) / 5.0,
+        (1.0 - e2) / 2.0,
+        (1.0 - e4) / 4.0,
+    )
 
 
 class Disc(NamedTuple):
@@ -105,59 +143,60 @@ def _incidence(d: Disc) -> _Incidence:
     )
 
 
-def thrust_coefficient(d: Disc, solidity: Scalar, lift_slope: Scalar) -> Scalar:
+def thrust_coefficient(d: Disc, solidity: Scalar, lift_slope: Scalar, blade: Span = WHOLE) -> Scalar:
     """C_T (Padfield 2007, eq. 3.90, with both components of the advance ratio)."""
     mu2 = d.mu_x * d.mu_x + d.mu_y * d.mu_y
     return (0.5 * lift_slope * solidity) * (
-        d.theta0 * (1.0 / 3.0 + 0.5 * mu2)
-        + 0.25 * d.twist * (1.0 + mu2)
-        - 0.5 * (d.mu_x * d.B1 + d.mu_y * d.A1)
-        + 0.5 * (d.mu_z - d.lam0)
-        + 0.25 * (d.mu_x * (d.p - d.lam_s) + d.mu_y * (d.q - d.lam_c))
+        d.theta0 * (blade.m2 + 0.5 * blade.m0 * mu2)
+        + d.twist * (blade.m3 + 0.5 * blade.m1 * mu2)
+        - blade.m1 * (d.mu_x * d.B1 + d.mu_y * d.A1)
+        + blade.m1 * (d.mu_z - d.lam0)
+        + 0.5 * blade.m1 * (d.mu_x * (d.p - d.lam_s) + d.mu_y * (d.q - d.lam_c))
     )
 
 
-def flap_moments(d: Disc) -> FlapMoments:
+def flap_moments(d: Disc, blade: Span = WHOLE) -> FlapMoments:
     """Moments of the lift about the flapping hinge at the centre (Bramwell 2001, sec. 3.4)."""
-    i = _incidence(d)
-    mean1 = 0.5 * i.m0 + d.theta0 / 3.0 + 0.25 * d.twist  # integral of x times the mean incidence
-    mean2 = i.m0 / 3.0 + 0.25 * d.theta0 + 0.2 * d.twist
-    cos1, sin1 = 0.5 * i.c0 + i.c1 / 3.0, 0.5 * i.s0 + i.s1 / 3.0
+    i, k = _incidence(d), blade
+    mean1 = k.m1 * i.m0 + k.m2 * d.theta0 + k.m3 * d.twist  # integral of x times the mean incidence
+    mean2 = k.m2 * i.m0 + k.m3 * d.theta0 + k.m4 * d.twist
+    cos1, sin1 = k.m1 * i.c0 + k.m2 * i.c1, k.m1 * i.s0 + k.m2 * i.s1
     return FlapMoments(
         mean2 + 0.5 * (d.mu_x * sin1 + d.mu_y * cos1),
-        i.c0 / 3.0 + 0.25 * i.c1 + d.mu_y * mean1 + 0.25 * (d.mu_x * i.s2 + d.mu_y * i.c2),
-        i.s0 / 3.0 + 0.25 * i.s1 + d.mu_x * mean1 + 0.25 * (d.mu_y * i.s2 - d.mu_x * i.c2),
+        k.m2 * i.c0 + k.m3 * i.c1 + d.mu_y * mean1 + 0.5 * k.m1 * (d.mu_x * i.s2 + d.mu_y * i.c2),
+        k.m2 * i.s0 + k.m3 * i.s1 + d.mu_x * mean1 + 0.5 * k.m1 * (d.mu_y * i.s2 - d.mu_x * i.c2),
     )
 
 
-def disc_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar) -> DiscLoads:
+def disc_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar, blade: Span = WHOLE) -> DiscLoads:
     """Thrust, in-plane forces and torque; `drag` is the blades' profile drag coefficient.
 
     Lift leans inwards with the blade's flapping and forwards or back with the inflow angle U_P / U_T.
     """
-    i = _incidence(d)
-    mean0 = i.m0 + 0.5 * d.theta0 + d.twist / 3.0
-    mean1 = 0.5 * i.m0 + d.theta0 / 3.0 + 0.25 * d.twist
-    cos0, sin0 = i.c0 + 0.5 * i.c1, i.s0 + 0.5 * i.s1
-    cos1, sin1 = 0.5 * i.c0 + i.c1 / 3.0, 0.5 * i.s0 + i.s1 / 3.0
+    i, k = _incidence(d), blade
+    mean0 = k.m0 * i.m0 + k.m1 * d.theta0 + k.m2 * d.twist
+    mean1 = k.m1 * i.m0 + k.m2 * d.theta0 + k.m3 * d.twist
+    cos0, sin0 = k.m0 * i.c0 + k.m1 * i.c1, k.m0 * i.s0 + k.m1 * i.s1
+    cos1, sin1 = k.m1 * i.c0 + k.m2 * i.c1, k.m1 * i.s0 + k.m2 * i.s1
+    up_c, up_s = k.m0 * i.up_c0 + k.m1 * i.up_c1, k.m0 * i.up_s0 + k.m1 * i.up_s1
 
     # Harmonics of the lift per length U_T (theta U_T + U_P), integrated over the blade.
     lift = mean1 + 0.5 * (d.mu_x * sin0 + d.mu_y * cos0)
-    lift_c = cos1 + d.mu_y * mean0 + 0.5 * (d.mu_x * i.s2 + d.mu_y * i.c2)
-    lift_s = sin1 + d.mu_x * mean0 + 0.5 * (d.mu_y * i.s2 - d.mu_x * i.c2)
-    lift_c2 = 0.5 * i.c2 + 0.5 * (d.mu_y * cos0 - d.mu_x * sin0)
-    lift_s2 = 0.5 * i.s2 + 0.5 * (d.mu_x * cos0 + d.mu_y * sin0)
+    lift_c = cos1 + d.mu_y * mean0 + 0.5 * k.m0 * (d.mu_x * i.s2 + d.mu_y * i.c2)
+    lift_s = sin1 + d.mu_x * mean0 + 0.5 * k.m0 * (d.mu_y * i.s2 - d.mu_x * i.c2)
+    lift_c2 = k.m1 * i.c2 + 0.5 * (d.mu_y * cos0 - d.mu_x * sin0)
+    lift_s2 = k.m1 * i.s2 + 0.5 * (d.mu_x * cos0 + d.mu_y * sin0)
 
     # The forward lean of the lift, U_P (theta U_T + U_P): its sine and cosine part, and its mean times x.
     lean_s = 0.5 * (i.up_m * sin0 + i.up_s0 * mean0 + i.up_s1 * mean1) + 0.25 * (
-        (i.up_c0 + 0.5 * i.up_c1) * i.s2 - (i.up_s0 + 0.5 * i.up_s1) * i.c2 + i.up_s2 * cos0 - i.up_c2 * sin0
+        up_c * i.s2 - up_s * i.c2 + i.up_s2 * cos0 - i.up_c2 * sin0
     )
     lean_c = 0.5 * (i.up_m * cos0 + i.up_c0 * mean0 + i.up_c1 * mean1) + 0.25 * (
-        (i.up_c0 + 0.5 * i.up_c1) * i.c2 + (i.up_s0 + 0.5 * i.up_s1) * i.s2 + i.up_c2 * cos0 + i.up_s2 * sin0
+        up_c * i.c2 + up_s * i.s2 + i.up_c2 * cos0 + i.up_s2 * sin0
     )
-    cos2, sin2 = i.c0 / 3.0 + 0.25 * i.c1, i.s0 / 3.0 + 0.25 * i.s1
+    cos2, sin2 = k.m2 * i.c0 + k.m3 * i.c1, k.m2 * i.s0 + k.m3 * i.s1
     lean_x = i.up_m * mean1 + 0.5 * (
-        i.up_c0 * cos1 + i.up_c1 * cos2 + i.up_s0 * sin1 + i.up_s1 * sin2 + 0.5 * (i.up_c2 * i.c2 + i.up_s2 * i.s2)
+        i.up_c0 * cos1 + i.up_c1 * cos2 + i.up_s0 * sin1 + i.up_s1 * sin2 + k.m1 * (i.up_c2 * i.c2 + i.up_s2 * i.s2)
     )
 
     profile = drag / lift_slope
@@ -168,27 +207,27 @@ def disc_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar) -> D
         scale
         * (
             lean_s
-            - 0.5 * profile * d.mu_x
+            - k.d1 * profile * d.mu_x
             + 0.5 * (d.a0 * lift_c - d.a1 * (lift + 0.5 * lift_c2))
             - 0.25 * d.b1 * lift_s2
         ),
         scale
         * (
             lean_c
-            - 0.5 * profile * d.mu_y
+            - k.d1 * profile * d.mu_y
             - 0.5 * (d.a0 * lift_s - d.b1 * (lift - 0.5 * lift_c2))
             + 0.25 * d.a1 * lift_s2
         ),
-        scale * (0.25 * profile * (1.0 + mu2) - lean_x),
+        scale * (profile * (k.d3 + 0.5 * k.d1 * mu2) - lean_x),
     )
 
 
-def thrust_tilt_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar) -> DiscLoads:
+def thrust_tilt_loads(d: Disc, solidity: Scalar, lift_slope: Scalar, drag: Scalar, blade: Span = WHOLE) -> DiscLoads:
     """The same with the thrust simply perpendicular to the tip-path plane, as classical derivative tables have it.
 
     A disc that turns in space carries its lift unevenly, and the lean of that lift takes up to half of the in-plane
     force away again; this form leaves that out (it is what reproduces the Lynx's published X_q and Y_p).
     """
-    full = disc_loads(d, solidity, lift_slope, drag)
-    side = 0.25 * solidity * drag
+    full = disc_loads(d, solidity, lift_slope, drag, blade)
+    side = 0.5 * solidity * drag * blade.d1
     return DiscLoads(full.CT, -full.CT * d.a1 - side * d.mu_x, full.CT * d.b1 - side * d.mu_y, full.CQ)

@@ -10,6 +10,7 @@ from swashplate.identification.frequency.state_space_words import CR_TARGET, I_T
 from swashplate.reporting import sections_responses
 from swashplate.reporting.html import write_page
 from swashplate.reporting.sections_responses import ResponseMaterial
+from swashplate.reporting.sections_search import search_section
 from swashplate.reporting.sections_verification import verification_section
 from swashplate.reporting.structure import Report
 from swashplate.reporting.versions import date, versions
@@ -32,6 +33,7 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
         raise SwashError("there is nothing to report.")
     parts = [
         verification_section(m.verification, m.rival) if m.verification else None,
+        search_section(m.search) if m.search else None,
         sections_responses.fit_parameters_section(m.fit) if m.fit else None,
         sections_responses.time_fit_section(m.time_fit) if m.time_fit else None,
         sections_responses.fit_costs_section(m.fit) if m.fit else None,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from swashplate.arrays import Complex
-from swashplate.control.analysis.ardupilot_gains import PEAK, Suggestion
+from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.time_fit import TimeDetails
 from swashplate.identification.frequency.handling import Handling
@@ -16,15 +16,17 @@ from swashplate.identification.frequency.handling_readings import handling_lines
 from swashplate.identification.frequency.mode_accuracy import ModeAccuracy
 from swashplate.identification.frequency.reading_accuracy import Fitted, answers, has_pair
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, INDISTINGUISHABLE, Target
+from swashplate.identification.frequency.search_result import StructureSearch
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit, TriedStructure
+from swashplate.identification.frequency.transfer_function_fit import TransferFunctionFit
+from swashplate.identification.frequency.transfer_function_forms import TriedStructure
 from swashplate.identification.frequency.unnoticeable_dynamics import mismatch
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
-from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure
+from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure, rate_steps_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
@@ -39,7 +41,8 @@ class ResponseMaterial:
 
     Attributes:
         responses: measured. transfer_functions: fits to them. trials: structures that were tried.
-        fit: a state-space fit. verification: in time. rival: another model on the same records.
+        fit: a state-space fit. search: for its structure.
+        verification: in time. rival: another model on the same records.
         time_fit: a state-space model fitted to records in time.
         gains: suggested for the autopilot.
     """
@@ -48,6 +51,7 @@ class ResponseMaterial:
     transfer_functions: tuple[TransferFunctionFit, ...] = ()
     trials: tuple[TriedStructure, ...] = ()
     fit: StateSpaceFit | None = None
+    search: StructureSearch | None = None
     verification: Verification | None = None
     rival: Verification | None = None
     time_fit: Result[StateSpaceModel, TimeDetails] | None = None
@@ -128,6 +132,8 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
                 ),
             )
         )
+    if fit.details.reduced_modes:
+        blocks.append(Text(f"What all of the reduction did to the {fit.details.reduced_modes}."))
     modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
     blocks += [_mode_table(fit.details.modes), eigenvalues(modes)] if fit.details.modes else [eigenvalues(modes)]
     if len(fit.names) > 1:
@@ -234,16 +240,17 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks.append(
             Table(
                 "Structures tried",
-                ("zeros / poles (+ integrators)", "parameters", "J"),
+                ("zeros / poles (+ integrators)", "parameters", "J", "why not"),
                 tuple(
                     (
                         Cell(t.form.text, tone="good" if t.form == chosen else "plain"),
                         Cell(str(t.parameters), number=True),
                         Cell(f"{t.cost:.1f}", number=True, tone=tone(t.cost), strong=t.form == chosen),
+                        Cell(t.unsound, tone="quiet"),
                     )
                     for t in m.trials
                 ),
-                note="The suggestion is the one with the fewest parameters that costs hardly more than the best.",
+                note="Suggested: of those whose parameters are told, the fewest that cost hardly more than the best.",
             )
         )
     return Section("transfer-functions", "Transfer functions", tuple(blocks))
@@ -307,34 +314,33 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         for g in gains
         for name in g.parameters or g.flown
     )
-    judged = [
+    judged = tuple(
         (
             Cell(g.axis),
-            Cell(which),
-            *(Cell(repr(r).replace("+-", "±"), number=True) for r in (m.crossover, m.phase_margin, m.gain_margin)),
-            Cell(f"{peak:.2f}", number=True, tone="bad" if peak > 2.0 * PEAK else "plain"),
+            Cell(what),
+            *(Cell(text.replace("+-", "±"), number=True) for text in (suggested, flown)),
         )
         for g in gains
-        for which, m, peak in (("suggested", g.margins, g.peak), ("flown", g.flown_margins, g.flown_peak))
-        if np.isfinite(peak)
-    ]
-    heads = ("axis", "gains", "crossover [rad/s]", "phase margin [deg]", "gain margin [dB]", "peak sensitivity")
+        if np.isfinite(g.peak) or np.isfinite(g.flown_peak)
+        for what, suggested, flown in g.table()
+    )
+    said = dict.fromkeys(g.words for g in gains)
     return Section(
         "gains",
         "Suggested rate-loop gains (ArduPilot)",
         (
             Table("Gains", ("parameter", "suggested", "flown"), rows),
             Table(
-                "Margins of the rate loop on the identified model",
-                heads,
-                tuple(judged),
-                note="The least of each where the loop crosses several times. ± is what the Cramér-Rao bounds of the "
-                "model's parameters make of it. FLTE and FLTD are filters of the controller, and count.",
+                "The rate loop on the identified model",
+                ("axis", "", "suggested", "flown"),
+                judged,
+                note="Margins are the least of each where the loop crosses several times; ± is what the Cramér-Rao "
+                "bounds of the model's parameters make of them. FLTT, FLTE and FLTD are filters of the controller, and "
+                "count. The step of the demand is a sudden one; ArduPilot's own shaping is not in it.",
             ),
-            *(
-                Text(f"{', '.join(g.axis for g in gains if g.words == words)}: {words}", tone="caution")
-                for words in dict.fromkeys(g.words for g in gains)
-            ),
+            *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
+            *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),
+            *(Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="caution") for w in said),
         ),
     )
 

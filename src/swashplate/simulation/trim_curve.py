@@ -13,8 +13,13 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.public import resolve
 from swashplate.shown import Shown
+from swashplate.simulation.autorotation import autorotations
 from swashplate.simulation.speeds import trims_over_speed
 from swashplate.simulation.trim import Trim
+
+ENGINE = "engine_power"
+_IDLE = 1e-3
+"""Share of the engine's power that counts as none."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,12 +40,26 @@ class TrimCurve(Shown):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Where the vehicle's equations do not hold."""
+        """Where the vehicle's equations do not hold, and where the power is none that its engine gives."""
         return tuple(
             f"At {at.speed:g} m/s {words}."
             for at in self.trims
-            for words in doubts(self.vehicle, at.state, at.inputs, at.environment)
+            for words in (*doubts(self.vehicle, at.state, at.inputs, at.environment), *self._power_verdict(at))
         )
+
+    def _power_verdict(self, at: Trim) -> tuple[str, ...]:
+        """What of the shaft power a pilot must know: more than the engine has, or less than none."""
+        power, engine = self.power(at), self.vehicle.card.values().get(ENGINE)
+        if power is None:
+            return ()
+        if power < -_IDLE * (engine or abs(power)):
+            return (
+                f"the air drives the rotors with {-power:.0f} W: autorotation. Without a rotor that may turn faster no "
+                "engine holds this",
+            )
+        if engine is not None and ENGINE in self.vehicle.parameter_names and power > engine:
+            return (f"the rotors need {power:.0f} W, and {ENGINE} on the card is {engine:.0f} W: not to be held",)
+        return ()
 
     def units(self) -> dict[str, str]:
         """The unit of every input and state."""
@@ -66,6 +85,8 @@ class TrimCurve(Shown):
         first = self.trims[0]
         names = (*self.vehicle.input_names, *(n for n in ("phi", "theta", "a1", "b1") if n in first.state_names))
         found = {"speed [m/s]": [at.speed for at in self.trims]}
+        if any(at.climb != first.climb for at in self.trims):
+            found["climb [m/s]"] = [at.climb for at in self.trims]
         found |= {f"{name} [{self.shown_unit(name)}]": self.shown(name) for name in names}
         powers = [self.power(at) for at in self.trims]
         if all(power is not None for power in powers):
@@ -108,6 +129,7 @@ def trim_curve(
     lateral: float = 0.0,
     turn: float = 0.0,
     environment: Environment | None = None,
+    autorotation: bool = False,
 ) -> TrimCurve:
     """Steady flight over a range of speeds.
 
@@ -116,13 +138,22 @@ def trim_curve(
         speeds: ahead, ascending [m/s].
         climb: rate of climb [m/s]. lateral: speed to the right [m/s]. turn: rate of turn to the right [rad/s].
         environment: wind, air and voltage.
+        autorotation: sink as fast as needs no power of the engine (`autorotations`), instead of at a given climb.
 
     Raises:
-        SwashError: without any speed.
+        SwashError: without any speed; for autorotation with a climb or a turn.
         TrimError: at the first speed that cannot be flown, with the limit that stops it.
     """
     if not len(speeds):
         raise SwashError("a trim curve needs at least one speed.", channel="speeds")
+    if autorotation:
+        if climb or turn:
+            raise SwashError(
+                "finds the rate of descent of a straight flight itself.",
+                channel="autorotation",
+                hint="Leave out climb and turn.",
+            )
+        return TrimCurve(vehicle, autorotations(vehicle, speeds, lateral=lateral, environment=environment))
     return TrimCurve(
         vehicle,
         trims_over_speed(vehicle, speeds, climb=climb, lateral=lateral, turn=turn, environment=environment),

@@ -26,6 +26,12 @@ GROWTH, LEAST_GROWTH = 0.05, 0.5
 MOVED = 3.0
 """Cramér-Rao bounds by which a mode inside the band may move."""
 
+FAR = 0.3
+"""Share of its frequency by which a mode may move, however little its bounds tell (or one bound, if that is more)."""
+
+_HARDLY = 0.01
+"""Share of its frequency up to which a move of a mode is not worth a word."""
+
 HOPELESS = 100.0
 """Percent of Cramér-Rao bound above which a parameter that cannot be dropped is held at its start, if that does."""
 
@@ -63,7 +69,9 @@ def reduce(
             break
         name, reason = choice
         tried.add(name)
-        ways = [("", present.model.parameters[name].dropped)]
+        p = present.model.parameters[name]
+        # A time constant of zero, say, is no structure with one parameter less.
+        ways = [("", p.dropped)] if p.lower <= p.dropped <= p.upper else []
         if present[name].sigma_percent > HOPELESS:
             ways.append((", held at its start", fit[name].start))
         for remark, value in ways:
@@ -81,11 +89,12 @@ def reduce(
                 present = new
                 break
     estimates = tuple(replace(p, start=fit[p.name].start) for p in present.estimates)
+    total, _ = moved_modes(fit.details.modes, present.model.eigenvalues())
     return replace(
         present,
         start=fit.start,
         estimates=estimates,
-        details=replace(present.details, reduction=tuple(history), reduced=True),
+        details=replace(present.details, reduction=tuple(history), reduced=True, reduced_modes=total),
         settings={**present.settings, "reduced": True},
         problems=fit.problems,
         warnings=(*present.warnings, *(() if hold_out else (_NO_HOLD_OUT,))),
@@ -99,7 +108,7 @@ _NO_HOLD_OUT = "reduced without a hold-out: nothing but the fitted responses and
 def moved_modes(modes: Sequence[ModeAccuracy], eigenvalues: Complex) -> tuple[str, bool]:
     """Where the told modes inside the band have gone, in words; whether one is lost or moved beyond its bounds."""
     left = [v for v in map(complex, eigenvalues) if v.imag >= -1e-12]
-    told, lost = [], False
+    told, lost, same = [], False, 0
     for mode in modes:
         bound = float(np.hypot(mode.frequency_bound, mode.frequency * mode.damping_bound))
         if not mode.inside or not np.isfinite(bound):
@@ -108,10 +117,20 @@ def moved_modes(modes: Sequence[ModeAccuracy], eigenvalues: Complex) -> tuple[st
             return f"{mode.frequency:.3g} rad/s has gone", True
         near = min(left, key=lambda v: abs(v - mode.eigenvalue))
         left.remove(near)
-        far = abs(near - mode.eigenvalue) > MOVED * bound
+        moved = abs(near - mode.eigenvalue)
+        far = moved > min(MOVED * bound, max(FAR * mode.frequency, bound))
         lost = lost or far
-        told.append(f"{mode.eigenvalue:.3g} to {near:.3g}{' (beyond its bounds)' if far else ''}")
-    return "modes: " + ", ".join(told) if told else "", lost
+        if far or moved > _HARDLY * mode.frequency:
+            told.append(f"{_written(mode.eigenvalue)} to {_written(near)}{' (beyond its bounds)' if far else ''}")
+        else:
+            same += 1
+    rest = f"{same} within {100.0 * _HARDLY:g} %" if same else ""
+    return "modes: " + ", ".join([*told, rest] if rest else told) if told or rest else "", lost
+
+
+def _written(value: complex) -> str:
+    """A mode as a person writes it: the real part alone where it is real."""
+    return f"{value.real:.3g}" if value.imag == 0.0 else f"{value.real:.3g}{value.imag:+.3g}j"
 
 
 def _worse(before: Verification, after: Verification | None) -> str:

@@ -39,6 +39,8 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "replay": ("replay", "show_replay", "film_replay"),
     "respond": ("respond", "uniform_records"),
     "simulate": ("fly_maneuver", "monte_carlo"),
+    "structures list": ("structures",),
+    "structures show": ("show_structure", "structure"),
     "trim": ("trim", "trim_curve"),
     "validate": ("validate", "validate_linear"),
     "vehicles list": ("vehicles",),

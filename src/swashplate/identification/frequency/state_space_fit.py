@@ -13,6 +13,8 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.estimators import Data, Question
+from swashplate.identification.frequency.composed_start import from_core
+from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.linear_start import other_starts
 from swashplate.identification.frequency.mode_accuracy import mode_accuracy
 from swashplate.identification.frequency.response_cost import (
@@ -22,9 +24,7 @@ from swashplate.identification.frequency.response_cost import (
     Target,
     accuracy_of,
     accuracy_of_fit,
-    ceiling,
     followed,
-    target,
 )
 from swashplate.identification.frequency.state_space_result import StateSpaceDetails, StateSpaceFit
 from swashplate.identification.frequency.state_space_search import STARTED, best_below, better_start, pairs_of
@@ -46,6 +46,7 @@ def fit_state_space(
     *,
     band: tuple[float, float] | None = None,
     bands: Mapping[str, tuple[float, float]] | None = None,
+    without: Sequence[str] = (),
     least_coherence: float = LEAST_COHERENCE,
     starts: int = STARTED,
     iterations: int = 100,
@@ -57,7 +58,8 @@ def fit_state_space(
     Args:
         model: structure and start values: a vehicle of `swashplate.structure`, or what it is made of.
         responses: from `respond`, with channels named as in the model.
-        band: limits [Hz] for all pairs. bands: by "output/input" or input.
+        band: limits [Hz] for all pairs. bands: for some, by "output/input", input or output.
+        without: pairs that are not used, by the same names.
         least_coherence: from which a response is used.
         starts: how many of the screened starting points are followed (1: the given start alone).
         iterations: at most this many for the best of them.
@@ -65,14 +67,18 @@ def fit_state_space(
         progress: called with the iteration and the cost.
 
     Raises:
-        IdentificationError: channels that do not meet, no coherent response, parameters without a trace.
+        IdentificationError: channels that do not meet, no coherent response, parameters without a trace, a band for
+            a pair that is none.
     """
     began = time.perf_counter()
     model = structure_of(model)
     if not model.free:
         raise IdentificationError("every parameter is fixed or tied: there is nothing to fit.", channel=model.name)
-    targets, ceilings, left_out = _targets(model, responses, band, bands or {}, least_coherence)
-    others = {} if starts == 1 else other_starts(model, responses, targets, band=band)
+    choice = PairChoice(band, bands or {}, tuple(without), least_coherence)
+    targets, ceilings, left_out = choice.targets(model, responses)
+    others = {}
+    if starts > 1:
+        others = other_starts(model, responses, targets, band=band) | from_core(model, responses, band=band)
     return fit_targets(
         model,
         targets,
@@ -88,48 +94,11 @@ def fit_state_space(
         settings={
             "sources": list(responses.sources),
             "method": responses.method,
-            "least_coherence": least_coherence,
-            "band_hz": list(band) if band else None,
+            **choice.settings(),
             "starts": starts,
             "seed": seed,
         },
     )
-
-
-def _targets(
-    model: StateSpaceModel,
-    responses: FrequencyResponse,
-    band: tuple[float, float] | None,
-    bands: Mapping[str, tuple[float, float]],
-    least: float,
-) -> tuple[list[Target], list[Target], tuple[str, ...]]:
-    shared_in = [name for name in model.inputs if name in responses.inputs]
-    shared_out = [name for name in model.outputs if name in responses.outputs]
-    if not shared_in or not shared_out:
-        raise IdentificationError(
-            f"the model has inputs {', '.join(model.inputs)} and outputs {', '.join(model.outputs)}; the responses "
-            f"have {', '.join(responses.inputs)} and {', '.join(responses.outputs)}: they share nothing to fit.",
-            where=f"model '{model.name}'"
-            + (f", responses of {', '.join(responses.sources)}" if responses.sources else ""),
-            hint="Name the channels as the model does (swash respond --inputs NAME=CHANNEL), or take another model.",
-        )
-    found, ceilings, missing = [], [], []
-    for output in shared_out:
-        for name in shared_in:
-            own = bands.get(f"{output}/{name}", bands.get(name, band))
-            one = target(responses, output, name, band=own, least=least)
-            if one is None:
-                missing.append(f"{output} / {name}")
-                limit = ceiling(responses, output, name, band=own)
-                ceilings += [] if limit is None else [limit]
-            else:
-                found.append(one)
-    if not found:
-        raise IdentificationError(
-            f"no response keeps a coherence of {least:g} over a band: {', '.join(missing)}.",
-            hint="Nothing can be fitted; look at the responses and fly a better sweep.",
-        )
-    return found, ceilings, tuple(missing)
 
 
 def fit_targets(
@@ -150,7 +119,13 @@ def fit_targets(
     """Fit a model to given targets, below given ceilings, from the given start or a better one (`fit_state_space`)."""
     began = time.perf_counter() if began is None else began
     warnings, problems = [], _start_problems(model)
-    traceless = _traceless(model, targets)
+    traceless, silent = _traceless(model, targets)
+    if silent:
+        raise IdentificationError(
+            f"the structure '{model.name}' answers nothing at all at {', '.join(silent)}, which the flight shows.",
+            hint="Take a structure that joins them, or leave them out: "
+            + " ".join(f"--without {name.replace(' ', '')}" for name in silent),
+        )
     if traceless:
         warnings.append(f"no fitted response sees {', '.join(traceless)}: held at the start values.")
         model = model.with_values({n: model.parameters[n].value for n in traceless}, free=False)
@@ -245,16 +220,21 @@ def fit_targets(
     )
 
 
-def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[str, ...]:
-    """Free parameters that leave no trace in any fitted response, at the start and at a shaken one."""
+def _traceless(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Free parameters without a trace in any fitted response, and responses that are zero, at the start and a shaken
+    one."""
     random = np.random.default_rng(1)
-    seen = np.zeros(len(model.free))
+    seen, heard = np.zeros(len(model.free)), np.zeros(len(targets))
     for shake in (0.0, 0.1):
         values = np.array([model.parameters[n].value for n in model.free])
         values = values * (1.0 + shake * random.standard_normal(values.size)) + (values == 0.0) * shake * 0.1
-        _, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
+        answers, slopes = model.sensitivities(model.free, values, pairs_of(model, targets))
+        heard += [np.nan_to_num(np.abs(h), nan=1.0).max() for h in answers]
         seen += np.sum([np.nan_to_num(np.abs(s)).max(axis=0) for s in slopes], axis=0)
-    return tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12)
+    return (
+        tuple(name for name, trace in zip(model.free, seen, strict=True) if trace < 1e-12),
+        tuple(t.name for t, size in zip(targets, heard, strict=True) if size == 0.0),
+    )
 
 
 def _start_problems(model: StateSpaceModel) -> list[str]:

@@ -38,6 +38,7 @@ class StateSpaceDetails:
         left_out: pairs without a coherent band. ceilings: what their responses cannot exceed.
         modes: of the identified model, with what the bounds leave of them.
         reduction: what was dropped on the way. reduced: whether a reduction was asked for.
+        reduced_modes: what all of it did to the modes inside the band, in words.
     """
 
     kind: ClassVar[str] = "state-space responses"
@@ -46,6 +47,7 @@ class StateSpaceDetails:
     modes: tuple[ModeAccuracy, ...] = ()
     reduction: tuple[ReductionStep, ...] = ()
     reduced: bool = False
+    reduced_modes: str = ""
 
     @property
     def nothing_to_drop(self) -> bool:
@@ -60,6 +62,9 @@ class StateSpaceDetails:
             verdict = "dropped" if step.kept else "put back"
             lines.append(f"  {verdict} {step.dropped} ({step.reason}): J_ave {step.before:.1f} -> {step.after:.1f}")
             lines += [f"    {text}" for text in (step.veto, step.modes) if text]
+        kept = [step.dropped for step in self.reduction if step.kept]
+        if kept and self.reduced_modes:
+            lines.append(f"  taken out in all: {', '.join(kept)}; {self.reduced_modes}")
         if self.nothing_to_drop:
             lines.append("  nothing to take out: every parameter is within its targets")
         return lines

@@ -30,6 +30,9 @@ RESCUES, RESCUED, _HOPE = 4, 96, 0.99
 _HARD, _TURNED = 0.4, 0.08
 """Relative scatter of these points, and the share of parameters whose sign is turned."""
 
+FREED, _FEW = 3, 0.25
+"""Times that a few badly fitted responses are left out for a while, and the share of all that is a few."""
+
 _ENOUGH = 1e-4
 """Share of the cost that an iteration has to gain for it to go on."""
 
@@ -141,6 +144,8 @@ def best_end(
         before, best = best, _rescued(cost, best, seed=seed + 1 + turn)
         if best.cost > _HOPE * before.cost:
             break
+    if iterations > _ROUGH:
+        best = _freed(model, cost, best)
     final = _down(
         cost, start=best.row, tolerance=_ENOUGH * max(1.0, best.cost), iterations=iterations, progress=progress
     )
@@ -221,6 +226,25 @@ def _from_above(model: StateSpaceModel, cost: ResponseCost, best: Optimum, *, st
     if not np.isfinite(cost.cost(row)):
         return best
     return min((best, _down(cost, start=row, tolerance=1e-2, iterations=_ROUGH)), key=lambda one: one.cost)
+
+
+def _freed(model: StateSpaceModel, cost: ResponseCost, best: Optimum) -> Optimum:
+    """A better end than one that a few responses hold in a trap (a phase on the wrong side of half a turn): they are
+    left out until the others have settled."""
+    for _ in range(FREED):
+        each = list(zip(cost.each(best.row), cost.targets, strict=True))
+        poor = [t for j, t in each if j > ACCEPTABLE and not t.ceiling]
+        if not 0 < len(poor) <= _FEW * len(each):
+            break
+        others = cost_function(model, [t for _, t in each if not any(t is one for one in poor)], cost.row.scale)
+        rest = _down(others, start=best.row, tolerance=1.0, iterations=_ROUGH)
+        if not np.isfinite(cost.cost(rest.row)):
+            break
+        end = _down(cost, start=rest.row, tolerance=1.0, iterations=_ROUGH)
+        if end.cost > _HOPE * best.cost:
+            break
+        best = end
+    return best
 
 
 def _rescued(cost: ResponseCost, best: Optimum, *, seed: int) -> Optimum:

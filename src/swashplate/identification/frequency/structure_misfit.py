@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.frequency.lacking_parts import lacking_words
 from swashplate.identification.frequency.response_cost import Target, log_error
 from swashplate.identification.responses.frequency_response import TWO_PI
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -78,6 +79,7 @@ def misfit_words(model: StateSpaceModel, targets: Sequence[Target]) -> list[str]
         f"this structure is not all of the aircraft: {len(found)} of {len(targets)} responses are missed by more than "
         f"{MANY:g} times their scatter: {named}{_where(found)}. Do not trust modes or derivatives that rest on them."
     )
+    text += lacking_words(model, [one.name for one in found])
     speeds = [n for s, n in model.trim.items() if s in ("u", "v", "w")]
     if speeds and all(model.parameters[n].value == 0.0 for n in speeds):
         text += f" If this was not flown in hover, say so: --fix {speeds[0]}=..."
@@ -90,7 +92,7 @@ def _where(found: Sequence[Misfit]) -> str:
     total = sum(float(np.sum(one.squared)) for one in found)
     upper = sum(float(np.sum(one.squared[one.omega > middle])) for one in found) / total
     if upper > _ONE_END:
-        return f", mostly above {middle / TWO_PI:.2g} Hz, where a rotor, bar, actuator or gyro is missed first"
+        return f", mostly above {middle / TWO_PI:.2g} Hz"
     if upper < 1.0 - _ONE_END:
-        return f", mostly below {middle / TWO_PI:.2g} Hz, where speed derivatives, the trim's attitude or gusts are"
+        return f", mostly below {middle / TWO_PI:.2g} Hz"
     return ", all over the band"

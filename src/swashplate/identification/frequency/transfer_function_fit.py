@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -32,7 +32,7 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
-from swashplate.models.linear.transfer_function import USUAL, Form, TransferFunction
+from swashplate.models.linear.transfer_function import Form, TransferFunction
 from swashplate.models.vehicle import Vehicle
 
 _ROUGH, _FOLLOWED = 12, 3
@@ -65,16 +65,6 @@ TransferFunctionFit = Result[tuple[TransferFunction, ...], TransferFunctionDetai
 """What `fit_transfer_function` returns: one function per output, poles shared."""
 
 
-@dataclass(frozen=True)
-class TriedStructure:
-    """One structure that was tried: its form, number of parameters, mean J and the fit."""
-
-    form: Form
-    parameters: int
-    cost: float
-    fit: TransferFunctionFit
-
-
 def fit_transfer_function(
     responses: FrequencyResponse,
     form: Form | str,
@@ -103,7 +93,7 @@ def fit_transfer_function(
     """
     form = Form.parse(form) if isinstance(form, str) else form
     wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
-    return _as_told(_fit(wanted, form, fixed=dict(fixed or {}), seed=seed), responses)
+    return as_told(fit_form(wanted, form, fixed=dict(fixed or {}), seed=seed), responses)
 
 
 def targets_of(
@@ -134,39 +124,7 @@ def targets_of(
     return found
 
 
-def suggest(
-    responses: FrequencyResponse,
-    *,
-    input: str,
-    outputs: Sequence[str] | None = None,
-    band: tuple[float, float] | None = None,
-    forms: Sequence[Form] = USUAL,
-    least_coherence: float = 0.6,
-    seed: int = 0,
-    tell: Callable[[int, int], None] | None = None,
-) -> tuple[TriedStructure, tuple[TriedStructure, ...]]:
-    """The usual structures tried, and the one with the fewest parameters that costs hardly more than the best.
-
-    Hardly: J within 10 of, or within 1.5 times, the least J of all (the pair of Tischler and Remple's "acceptable" and
-    "indistinguishable" lies a factor of two apart). `tell` hears how many structures of how many are done.
-
-    Returns:
-        The suggestion, and all trials by number of parameters.
-    """
-    wanted = targets_of(responses, input=input, outputs=outputs, band=band, least=least_coherence)
-    trials = []
-    for k, form in enumerate(forms):
-        if tell is not None:
-            tell(k, len(forms))
-        fit = _as_told(_fit(wanted, form, fixed={}, seed=seed), responses)
-        trials.append(TriedStructure(form, len(fit.estimates), fit.cost, fit))
-    trials.sort(key=lambda trial: (trial.parameters, trial.cost))
-    least = min(trial.cost for trial in trials)
-    good = [trial for trial in trials if trial.cost <= max(1.5 * least, least + 10.0)]
-    return good[0], tuple(trials)
-
-
-def _as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
+def as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
     """The fit with its gains' units, and with what its responses were warned of: it is no better than they are."""
     pairs = tuple(f"{t.output} / {t.input}:" for t in fit.targets)
     heard = tuple(words for words in (*responses.warnings, *responses.problems) if words.startswith(pairs))
@@ -201,7 +159,7 @@ def _check_fixed(form: Form, values: Mapping[str, float]) -> None:
             )
 
 
-def _fit(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed: int) -> TransferFunctionFit:
+def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], seed: int) -> TransferFunctionFit:
     shared = form.pole_names
     several = len(targets) > 1
     owner = [{name: f"{name} {t.output}" if several else name for name in form.own_names} for t in targets]
@@ -314,6 +272,9 @@ def _words(
     vague = [p.name for p in parameters if not p.fixed and p.sigma_percent > 20.0]
     if vague:
         words.append(f"Cramér-Rao bound above 20 %: {', '.join(vague)}; fewer parameters may do.")
+    bound = [p.name for p in parameters if p.at_bound]
+    if bound:
+        words.append(f"ended on a bound: {', '.join(bound)}.")
     if any(pole.real > 1e-9 for pole in models[0].poles):
         words.append("the model is unstable.")
     return tuple(words)

@@ -173,8 +173,9 @@ def loads(
         A1, B1 = bell_hiller.mixed_cyclic(A1, B1, state.bar, par.bar_gain)
 
     # Main rotor.
+    height = par.hub_height * xp.cos(body.phi) * xp.cos(body.theta) - body.z
     rotor = main_rotor(
-        air, body.rates, state.disc, state.inflow, (sticks.theta0, A1, B1), omega, par, density, xp, options
+        air, body.rates, state.disc, state.inflow, (sticks.theta0, A1, B1), omega, par, density, xp, options, height
     )
     lifted = rotor.acting
     if state.rotor is not None:

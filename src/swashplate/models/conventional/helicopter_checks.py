@@ -8,7 +8,15 @@ from dataclasses import replace
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
-from swashplate.models.conventional.helicopter_parameters import ADDED, ANGLES, MEANING, NOT_NEGATIVE, POSITIVE, UNITS
+from swashplate.models.conventional.helicopter_parameters import (
+    ADDED,
+    ANGLES,
+    MEANING,
+    NOT_NEGATIVE,
+    POSITIVE,
+    UNITS,
+    USUAL,
+)
 
 _LARGEST_ANGLE = 1.0
 
@@ -21,7 +29,7 @@ def with_added(card: Card, options: HelicopterOptions) -> Card:
     """
     lacking = {name: entry for name, entry in ADDED.items() if name not in card.parameters}
     for name, (option, _) in lacking.items():
-        if option is not None and getattr(options, option):
+        if option is not None and name not in USUAL and getattr(options, option):
             raise CardError(
                 f"is missing, and option '{option}' needs it ({MEANING[name]}).",
                 where=card.path or card.vehicle,
@@ -37,6 +45,8 @@ def _stand_in(name: str, option: str | None, value: float | str, card: Card) -> 
     if isinstance(value, str):
         known = card.parameters.get(value)
         return Parameter(known.value if known else math.nan, UNITS[name], f"{source}{value} stands for it", "assumed")
+    if name in USUAL:
+        return Parameter(value, UNITS[name], f"{source}{USUAL[name]}; without option {option} no effect", "assumed")
     usual = "this leaves it out" if not value else "this is what was there before"
     meant = usual if option is None else "without its option it has no effect"
     return Parameter(value, UNITS[name], source + meant, "assumed")
@@ -89,6 +99,15 @@ def check_numbers(card: Card) -> None:
         )
     if not 0.0 <= value["hinge_offset"] < 0.5:
         refuse("hinge_offset", f"is {value['hinge_offset']:g}, expected 0 to 0.5 of the radius.")
+    if not value["rotor_root_cutout"] + 0.2 < value["rotor_tip_loss"] <= 1.0 or value["rotor_root_cutout"] < 0.0:
+        refuse(
+            "rotor_tip_loss",
+            f"is {value['rotor_tip_loss']:g} and rotor_root_cutout {value['rotor_root_cutout']:g}: blades lift between "
+            "them, at least over a fifth of the radius.",
+            "Usual are 0.97 and 0.15; 1 and 0 for the whole radius.",
+        )
+    if not 1.0 <= value["rotor_induced_factor"] <= 2.0:
+        refuse("rotor_induced_factor", f"is {value['rotor_induced_factor']:g}, expected 1 to 2.")
     for low, high in (("collective_low", "collective_high"), ("tail_low", "tail_high"), ("bar_inner", "bar_outer")):
         if not value[low] < value[high]:
             refuse(low, f"is {value[low]:g}, not below {high} = {value[high]:g}.")

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card
+from swashplate.physics.ground_effect import FORMS as GROUND_EFFECTS
 
 
 class HelicopterOptions(NamedTuple):
@@ -32,6 +33,9 @@ class HelicopterOptions(NamedTuple):
             sideways; Padfield (2007) and what follows him leave both out.
         precession_torque: the shaft carries the torque with which a tilted rotor answers pitch and roll rates
             (`flapping.precession_torque`); the packaged cards, whose tables leave it out, do too.
+        tip_loss: the main blades lift from `rotor_root_cutout` to `rotor_tip_loss` of the radius, not over all of it.
+        induced_factor: the main rotor's induced power is `rotor_induced_factor` times that of an even inflow.
+        ground_effect: "cheeseman-bennett" or "hayden" over ground at z = 0 (`ground_effect.induced_share`), or "none".
     """
 
     rotation: str = "ccw"
@@ -50,6 +54,9 @@ class HelicopterOptions(NamedTuple):
     yaw_at_blades: bool = False
     yaw_at_hub: bool = True
     precession_torque: bool = False
+    tip_loss: bool = False
+    induced_factor: bool = False
+    ground_effect: str = "none"
 
     @property
     def sense(self) -> float:
@@ -66,6 +73,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "inflow": ("glauert", "uniform", "pitt-peters-static", "pitt-peters"),
     "rotor_speed": ("fixed", "governed", "throttle"),
     "in_plane": ("blade-element", "thrust-tilt"),
+    "ground_effect": GROUND_EFFECTS,
     **dict.fromkeys(
         (
             "coning",
@@ -80,6 +88,8 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "yaw_at_blades",
             "yaw_at_hub",
             "precession_torque",
+            "tip_loss",
+            "induced_factor",
         ),
         (True, False),
     ),

@@ -108,6 +108,9 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("skid_stiffness", "N/m", "of one of the four ends"),
     ("skid_damping", "N s/m", "of one of the four ends"),
     ("skid_friction", "1", "coefficient of friction"),
+    ("rotor_tip_loss", "1", "share of the radius to which the main blades lift: 0.95 to 0.98; option tip_loss"),
+    ("rotor_root_cutout", "1", "radius of the first profile over the rotor's: 0.1 to 0.25; option tip_loss"),
+    ("rotor_induced_factor", "1", "induced power over that of an even inflow: 1.1 to 1.2; option induced_factor"),
 )
 
 UNITS: Mapping[str, str] = {name: unit for name, unit, _ in _TABLE}
@@ -131,8 +134,18 @@ ADDED: Mapping[str, tuple[str | None, float | str]] = {
     "fuselage_pitch_zero": (None, 0.0),
     "tailplane_wake": (None, 1.5),
     "fuselage_wake": (None, 1.0),
+    "rotor_tip_loss": ("tip_loss", 0.97),
+    "rotor_root_cutout": ("tip_loss", 0.15),
+    "rotor_induced_factor": ("induced_factor", 1.15),
 }
 """What the first cards lack: the option that needs it, and the number or parameter that stood for it before."""
+
+USUAL: Mapping[str, str] = {
+    "rotor_tip_loss": "the usual number, 0.95 to 0.98 (Leishman 2006, sec. 3.3.10)",
+    "rotor_root_cutout": "a usual number, 0.1 to 0.25",
+    "rotor_induced_factor": "the usual number, 1.1 to 1.2 (Leishman 2006, sec. 2.11)",
+}
+"""Of `ADDED`, what an option may take although no card says it, and where the number comes from."""
 
 POSITIVE = (
     "mass",
@@ -167,6 +180,8 @@ POSITIVE = (
     "skid_length",
     "skid_width",
     "skid_depth",
+    "rotor_tip_loss",
+    "rotor_induced_factor",
 )
 """What is greater than zero on every helicopter."""
 NOT_NEGATIVE = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
-from swashplate.physics import blade_element, flapping, inflow
+from swashplate.physics import blade_element, flapping, ground_effect, inflow
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.flapping import Flapping
 from swashplate.physics.frames import Vector
@@ -42,6 +42,7 @@ def main_rotor(
     density: Scalar,
     xp: Backend,
     options: HelicopterOptions,
+    height: Scalar,
 ) -> MainRotor:
     """The main rotor in body axes (blade elements, momentum theory, first-order tip-path plane).
 
@@ -53,6 +54,7 @@ def main_rotor(
         blades: theta0, A1, B1 at the blades [rad].
         omega: rotor speed against the fuselage [rad/s].
         par, density: the card's numbers, the air.
+        height: of the hub above the ground [m]; it counts with ground effect only.
     """
     sense = options.sense
     hub = Vector(par.hub_x, par.hub_y, -par.hub_height)
@@ -73,6 +75,11 @@ def main_rotor(
     slope = par.rotor_lift_slope
     mu2 = mu_x * mu_x + mu_y * mu_y
     own = Flapping(disc.a1, sense * disc.b1)
+    blade = blade_element.WHOLE
+    if options.tip_loss:
+        blade = blade_element.span(par.rotor_tip_loss, par.rotor_root_cutout)
+    # Moments of a shorter blade are those of a whole one with this lift slope (m3 is 1/4 there).
+    flap_slope = slope if blade is blade_element.WHOLE else slope * 4.0 * blade.m3
     seen = blade_element.Disc(
         mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, own.a1, own.b1
     )
@@ -80,8 +87,12 @@ def main_rotor(
     # Inflow: mean, gradient, and what a static gradient takes from the flap moments.
     deficiency = None
     if induced is None:
-        free = blade_element.thrust_coefficient(seen, solidity, slope)
-        lam0 = inflow.momentum_inflow(free, 0.25 * slope * solidity, mu_z, mu2, xp)
+        free = blade_element.thrust_coefficient(seen, solidity, slope, blade)
+        loss = 0.5 * slope * solidity * blade.m1
+        lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
+        if options.ground_effect != "none":
+            loss = loss * _near_ground(height, mu2, lam0, par, options, xp)
+            lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
         flow = Inflow(lam0, 0.0, 0.0)
     else:
         flow = Inflow(induced.lam0, induced.lam_c, sense * induced.lam_s)
@@ -92,8 +103,12 @@ def main_rotor(
         flow = inflow.glauert_gradient(flow.lam0, skew)
     elif options.inflow == "pitt-peters-static":
         flow, deficiency = inflow.pitt_peters_static(
-            flow.lam0, 2.0 * flow.lam0 * through, skew, gradient_through, solidity, slope
+            flow.lam0, 2.0 * flow.lam0 * through, skew, gradient_through, solidity, flap_slope
         )
+    momentum = flow
+    if options.ground_effect != "none":
+        near = _near_ground(height, mu2, flow.lam0, par, options, xp)
+        flow = Inflow(near * flow.lam0, near * flow.lam_c, near * flow.lam_s)
     seen = seen._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
 
     # Flapping: coning, then the tip-path plane's rates in space.
@@ -104,16 +119,15 @@ def main_rotor(
         hinge_offset=par.hinge_offset,
         omega=omega,
         density=density,
-        lift_slope=slope,
+        lift_slope=flap_slope,
         chord=par.rotor_chord,
         radius=par.rotor_radius,
     )
+    cone = par.precone
     if options.coning:
-        cone = flapping.coning(blade_element.flap_moments(seen).mean, held, par.precone, free=1.0)
-    else:
-        cone = par.precone
+        cone = flapping.coning(_moments(seen, blade).mean, held, par.precone, free=1.0)
     seen = seen._replace(a0=cone)
-    still = blade_element.flap_moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1))
+    still = _moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1), blade)
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
     # Dynamic inflow has the wake's lag in its states.
     kept = 0.0 if options.inflow == "pitt-peters" else bending * flapping.wake_follows(held.excess, through2, xp)
@@ -133,11 +147,11 @@ def main_rotor(
         lam_c, lam_s = lam_c + c - (cc * c + cs * s), lam_s + s - (cs * c + ss * s)
     moving = seen._replace(p=plane_p, q=plane_q, lam_c=lam_c, lam_s=lam_s)
     inflow_rates = None
-    CT = blade_element.thrust_coefficient(moving, solidity, slope)
+    CT = blade_element.thrust_coefficient(moving, solidity, slope, blade)
     if induced is not None:
         loading = blade_element.FlapMoments(still.mean, still.cos + 0.25 * plane_q, still.sin + 0.25 * plane_p)
         change = inflow.pitt_peters_rates(
-            flow,
+            momentum,
             CT,
             loading,
             (plane_p, plane_q),
@@ -145,14 +159,16 @@ def main_rotor(
             (through, gradient_through),
             wake_distortion=bending,
             solidity=solidity,
-            lift_slope=slope,
+            lift_slope=flap_slope,
         )
         inflow_rates = Inflow(omega * change.lam0, omega * change.lam_c, sense * omega * change.lam_s)
     form = blade_element.thrust_tilt_loads if options.in_plane == "thrust-tilt" else blade_element.disc_loads
-    coefficients = form(moving, solidity, slope, par.rotor_drag + par.rotor_drag_thrust * CT * CT)
+    coefficients = form(moving, solidity, slope, par.rotor_drag + par.rotor_drag_thrust * CT * CT, blade)
     pressure = density * _PI * par.rotor_radius * par.rotor_radius * tip * tip
     thrust, ahead = pressure * coefficients.CT, pressure * coefficients.CX
     torque = pressure * par.rotor_radius * coefficients.CQ
+    if options.induced_factor:
+        torque = torque + pressure * par.rotor_radius * (par.rotor_induced_factor - 1.0) * flow.lam0 * CT
     if options.precession_torque:
         polar = par.rotor_blades * par.blade_inertia
         torque = torque - flapping.precession_torque(own, p, q, inertia=polar, omega=omega)
@@ -160,3 +176,17 @@ def main_rotor(
     roll, yaw = held.moment * disc.b1, sense * torque
     moment = hub.cross(force) + Vector(roll * ct - yaw * st, held.moment * disc.a1, roll * st + yaw * ct)
     return MainRotor(Contribution(force, moment), torque, disc_rates, inflow_rates, flow.lam0 * tip)
+
+
+def _moments(seen: blade_element.Disc, blade: blade_element.Span) -> blade_element.FlapMoments:
+    """Flap moments over those of a whole blade at the same slope (`flap_slope` has the rest)."""
+    moments = blade_element.flap_moments(seen, blade)
+    if blade is blade_element.WHOLE:
+        return moments
+    return blade_element.FlapMoments(*(0.25 * part / blade.m3 for part in moments))
+
+
+def _near_ground(
+    height: Scalar, mu2: Scalar, lam0: Scalar, par: Any, options: HelicopterOptions, xp: Backend
+) -> Scalar:
+    return ground_effect.induced_share(height, mu2, lam0, radius=par.rotor_radius, form=options.ground_effect, xp=xp)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from swashplate.errors import CardError
-from swashplate.models.card import Card, packaged_cards
-from swashplate.models.conventional.helicopter_parameters import ADDED, MEANING
+from swashplate.models.card import Card, Parameter, packaged_cards
+from swashplate.models.conventional.helicopter_parameters import ADDED, MEANING, UNITS, USUAL
 
 _SCALE: Mapping[str, Callable[[float, float], float]] = {
     "m": lambda size, weight: size,
@@ -72,6 +72,9 @@ def new_card(title: str, *, mass: float, radius: float, rotation: str = "cw", li
             upper=None if parameter.upper is None else parameter.upper * max(factor, 1.0),
             note="",
         )
+    for name, source in USUAL.items():
+        value = float(ADDED[name][1])
+        parameters.setdefault(name, Parameter(value, UNITS[name], source, "assumed"))
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
     parts = {name: value for name, value in pattern.options.items() if name not in _TABLES}
     options = {**parts, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}

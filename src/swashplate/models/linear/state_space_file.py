@@ -4,6 +4,7 @@ kind = "state-space"
 name = "heave"
 title = "Vertical speed of a helicopter in hover"
 trust = "..."
+# composed = "compose:heave"                 what `compose:` made it of; a fit takes start values from its core
 
 [states]
 w = "m/s"
@@ -52,8 +53,10 @@ from swashplate.errors import CardError, ExpressionError
 from swashplate.flights.schema import channel
 from swashplate.models.linear import state_space_checks as checks
 from swashplate.models.linear.accelerometer import AXES, TRIM, specific_force
+from swashplate.models.linear.composition import PREFIX, document, is_composed
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import Element, ModelParameter, StateSpaceModel
+from swashplate.models.linear.structure_parts import PARTS
 from swashplate.registry import nearest
 
 SCHEMA = 1
@@ -74,6 +77,7 @@ _SECTIONS = {
     "shape",
     "trim",
     "fit",
+    "composed",
 }
 _PARAMETER = {
     "value",
@@ -98,12 +102,14 @@ def structure_names() -> tuple[str, ...]:
 
 
 def structure(name_or_file: str | Path) -> StateSpaceModel:
-    """A ready structure by name, or a model file.
+    """A ready structure by name, one composed of parts ("compose:body+flap"), or a model file.
 
     Raises:
         CardError, ExpressionError: naming the file, the entry, what was found and what was expected.
     """
     text = str(name_or_file)
+    if is_composed(text):
+        return parse(tomli_w.dumps(document(text)), path=text)
     if text in structure_names():
         file = resources.files("swashplate.models.linear") / "structures" / f"{text}.toml"
         return parse(file.read_text(encoding="utf-8"), path=f"{text}.toml")
@@ -113,9 +119,17 @@ def structure(name_or_file: str | Path) -> StateSpaceModel:
         raise CardError(
             f"is neither a ready structure nor a file that can be read: {error.problem}",
             where=text,
-            hint=f"{nearest(text, structure_names())} Ready structures are {', '.join(structure_names())}.".strip(),
+            hint=f"{_alike(text)} Ready structures are {', '.join(structure_names())}; {PREFIX}body+flap+... composes "
+            "one (swash structures list).",
         ) from None
     return parse(content, path=text)
+
+
+def _alike(text: str) -> str:
+    """What a name that is none may stand for: a ready structure, or parts without the word before them."""
+    if all(part.strip() in PARTS for part in text.split("+")):
+        return f"Did you mean '{PREFIX}{text}'?"
+    return nearest(text, structure_names())
 
 
 def is_state_space(path: str | Path) -> bool:

@@ -13,6 +13,9 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
 from swashplate.models.linear import python_control
 
+HIGHEST = 12
+"""Order of a polynomial up to which a form is taken."""
+
 
 @dataclass(frozen=True)
 class Form:
@@ -31,12 +34,6 @@ class Form:
     poles: int
     integrators: int = 0
     delay: bool = True
-
-    def __post_init__(self) -> None:
-        if self.zeros > self.poles + self.integrators and not (self.zeros == 0 and self.poles == 0):
-            raise IdentificationError(
-                f"a form with {self.zeros} zeros over {self.poles + self.integrators} poles is no model of a flight."
-            )
 
     @property
     def zero_names(self) -> tuple[str, ...]:
@@ -66,14 +63,20 @@ class Form:
     def parse(text: str) -> Form:
         """`"1/2"` (orders of zeros and poles), `"0/1+1s"` (one integrator), `"0/0"` (gain and delay), `"... no delay"`.
 
+        More zeros than poles ("2/1") is a form over a band; it has no states and cannot be flown.
+
         Raises:
             IdentificationError: with examples.
         """
-        found = re.fullmatch(r"(\d)/(\d)(?:([+-])(\d)s)?( no delay)?", text.strip())
+        found = re.fullmatch(r"(\d{1,2})/(\d{1,2})(?:([+-])(\d)s)?( no delay)?", text.strip())
         if found is None:
             raise IdentificationError(
                 f"'{text}' is no form of a transfer function.",
-                hint='Examples: "1/2" (one zero, two poles, delay), "0/1+1s" (with an integrator), "0/2 no delay".',
+                hint='Examples: "1/2" (one zero, two poles, delay), "0/1+1s" (an integrator), "0/2 no delay", "2/1".',
+            )
+        if max(int(found[1]), int(found[2])) > HIGHEST:
+            raise IdentificationError(
+                f"'{text}' is of an order above {HIGHEST}, which no response tells.", hint="Take a form of lower order."
             )
         origin = int(found[4] or 0) * (-1 if found[3] == "-" else 1)
         return Form(int(found[1]), int(found[2]), origin, not found[5])

@@ -309,6 +309,35 @@ def test_a_mode_that_goes_or_moves_beyond_its_bounds_vetoes_a_drop() -> None:
     assert moved_modes(fit.details.modes, values[:2])[1]
 
 
+def test_a_mode_that_is_hardly_told_may_still_not_go_elsewhere() -> None:
+    fit = fit_state_space(rotor(), exact(rotor(), noise=0.02))
+    vague = [replace(mode, frequency_bound=0.25 * mode.frequency) for mode in fit.details.modes]
+    values = fit.model.eigenvalues()
+    words, lost = moved_modes(vague, values)
+    assert (words, lost) == (f"modes: {len(vague)} within 1 %", False)
+    assert not moved_modes(vague, 1.2 * values)[1], "within its bounds"
+    assert moved_modes(vague, 1.5 * values)[1], "two bounds, and half its frequency"
+
+
+def test_a_reduction_drops_nothing_to_a_value_outside_its_bounds_and_sums_up() -> None:
+    """A lead-lag that is not there: its rate cannot be zero, its gain can."""
+    model = structure("compose:heave+lead").with_values({"Zlag": 0.0, "Zw": -0.8, "Zcol": -12.0})
+    started = model.with_values({"Zlag": 0.5, "rate_lag": 3.0})
+    fit = reduce(fit_state_space(started, exact(model, noise=0.01), starts=1))
+    dropped = {step.dropped: step for step in fit.details.reduction if step.kept}
+    assert "Zlag" in dropped
+    assert fit.model.parameters["rate_lag"].value >= 0.1
+    assert not any(s.dropped == "rate_lag" and s.reason.endswith("%") and s.kept for s in fit.details.reduction)
+    (total,) = (line for line in repr(fit).splitlines() if "taken out in all" in line)
+    assert "Zlag" in total
+
+
+def test_a_structure_that_answers_nothing_where_the_flight_does_is_named() -> None:
+    cyclic = structure("compose:cyclic+flap").with_values({"Ab": -0.4, "Ba": 0.3})
+    with pytest.raises(IdentificationError, match="answers nothing at all at p / longitudinal, q / lateral"):
+        fit_state_space(structure("compose:cyclic+flap_decoupled"), exact(cyclic))
+
+
 def test_what_no_response_sees_is_held_and_named() -> None:
     model = structure("rotor_body").with_values(ROTOR)
     responses = exact(model).select(("p", "q"), ("mixer_roll",))

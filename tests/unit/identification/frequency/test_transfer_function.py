@@ -13,7 +13,8 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.frequency.handling import attitude_of, handling_qualities, margins
 from swashplate.identification.frequency.response_cost import ResponseCost, cost_of, target
-from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function, suggest
+from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
+from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.frequency.unnoticeable_dynamics import envelopes, mismatch
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form, TransferFunction
@@ -65,7 +66,7 @@ def test_slopes_are_the_derivatives() -> None:
         np.testing.assert_allclose(slopes[name], np.log(up / down) / (2 * step), rtol=1e-5, atol=1e-8)
 
 
-@pytest.mark.parametrize("form", ["0/0", "1/2", "2/4", "0/1+1s", "1/2-1s", "0/2 no delay"])
+@pytest.mark.parametrize("form", ["0/0", "1/2", "2/4", "0/1+1s", "1/2-1s", "0/2 no delay", "2/1", "11/12"])
 def test_form_text_round_trip(form: str) -> None:
     assert Form.parse(form).text == form
 
@@ -73,8 +74,8 @@ def test_form_text_round_trip(form: str) -> None:
 def test_form_refuses() -> None:
     with pytest.raises(IdentificationError, match="Examples"):
         Form.parse("second order")
-    with pytest.raises(IdentificationError, match="no model of a flight"):
-        Form.parse("3/1")
+    with pytest.raises(IdentificationError, match="order above 12"):
+        Form.parse("3/14")
 
 
 def test_cost_by_hand() -> None:
@@ -118,6 +119,43 @@ def test_suggestion_is_the_true_structure() -> None:
     assert best.form == Form(1, 2)
     assert trials[0].parameters == 2
     assert trials[0].cost > 100.0
+
+
+def test_no_form_is_suggested_whose_parameters_are_not_told() -> None:
+    """A first-order lag: a pole and a zero that cancel fit it too, and are told by nothing."""
+    lag = TransferFunction(Form(0, 1), {"K": 6.0, "tau": 0.03, "pole": 3.0}, "rate", "stick")
+    responses = exact(lag, noise=0.02)
+    best, trials = suggest(responses, input="stick", forms=[Form(0, 0), Form(1, 2), Form(2, 3)])
+    assert best.form == Form(0, 0), "the two others cost a hundredth of it"
+    assert best.cost > 100.0
+    why = {trial.form.text: trial.unsound for trial in trials}
+    assert why["0/0"] == ""
+    assert "is not told (CR" in why["2/3"] or "is on its bound" in why["2/3"]
+    assert not any("no form that was tried" in text for text in best.fit.warnings)
+    only, _ = suggest(responses, input="stick", forms=[Form(2, 3)])
+    assert any("no form that was tried has all its parameters told" in text for text in only.fit.warnings)
+
+
+def test_a_delay_that_is_zero_is_left_out_of_a_form() -> None:
+    at_once = TransferFunction(Form(1, 2), {**SECOND.values, "tau": 0.0}, "rate", "stick")
+    best, _ = suggest(exact(at_once, noise=0.005), input="stick", forms=[Form(0, 1), Form(1, 2)])
+    assert best.form == Form(1, 2, delay=False)
+    assert best.unsound == ""
+
+
+@pytest.mark.parametrize("text", ["2/1", "1/1", "3/4"])
+def test_zeros_and_lead_lags_of_any_order(text: str) -> None:
+    form = Form.parse(text)
+    values = {"K": 2.0, "tau": 0.03, "zeta_zero": 0.4, "omega_zero": 5.0, "zero": 12.0, "pole": 1.5}
+    values |= {"zeta_pole1": 0.3, "omega_pole1": 9.0, "zeta_pole2": 1.3, "omega_pole2": 4.0}
+    true = TransferFunction(form, {name: values[name] for name in form.names}, "rate", "stick")
+    fit = fit_transfer_function(exact(true, noise=0.002), form, input="stick")
+    assert fit.cost < 0.1
+    found, known = np.sort_complex(fit.model[0].zeros), np.sort_complex(true.zeros)
+    np.testing.assert_allclose(found, known, rtol=0.1)
+    if text == "2/1":
+        with pytest.raises(IdentificationError, match="cannot be flown"):
+            as_state_space(fit)
 
 
 def test_gain_and_delay_of_the_paper() -> None:

@@ -18,7 +18,7 @@ from swashplate.api import fit_tf
 from swashplate.cli.app import app
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.maneuvers.sweeps import Sweep
-from swashplate.identification.frequency.transfer_function_fit import suggest
+from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.desk import Desk
 from swashplate.links.logs.hold_out import hold_out

@@ -1,0 +1,46 @@
+"""What options of the rotors cost: steps per second with each over those without, on and off by turns in one run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+
+from benchmarks.timing import Result, best_rate
+from swashplate.models.catalogue import vehicle
+from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
+from swashplate.simulation.integrate import trajectory
+from swashplate.simulation.trim import trim
+
+CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("coax", "rotor = inflow", {"rotor": "inflow"}),
+    ("raptor50", "tip_loss", {"tip_loss": True}),
+    ("raptor50", "induced_factor", {"induced_factor": True}),
+    ("raptor50", "ground_effect", {"ground_effect": "cheeseman-bennett"}),
+)
+
+
+def _loop(name: str, options: dict[str, Any], steps: int) -> Any:
+    flown = vehicle(name, **options)
+    hover = trim(flown)
+    row = np.array([*hover.inputs, *(getattr(hover.environment, each) for each in SURROUNDINGS)])
+    arguments = jax.device_put(
+        (np.array(hover.state), np.tile(row, (steps + 1, 1)), parameter_row(flown, hover.environment), 0.002)
+    )
+    return lambda: jax.block_until_ready(trajectory(equations_of(flown), *arguments, substeps=1, held=True))
+
+
+def rotor_options(*, steps: int, repeats: int) -> list[Result]:
+    """One result each: the rate with the option, and in its note the share of the rate without."""
+    plain = {name: _loop(name, {}, steps) for name in dict.fromkeys(name for name, _, _ in CASES)}
+    found = []
+    for name, said, options in CASES:
+        with_it = _loop(name, options, steps)
+        rates = [0.0, 0.0]
+        for _ in range(repeats):
+            for place, run in enumerate((plain[name], with_it)):
+                rates[place] = max(rates[place], best_rate(run, steps, repeats=1))
+        note = f"{rates[1] / rates[0]:.2f} of {rates[0]:,.0f} without"
+        found.append(Result(f"{name}, {said}", rates[1], None, note))
+    return found

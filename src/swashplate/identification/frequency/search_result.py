@@ -1,0 +1,153 @@
+"""What a search over structures found: every one that was tried, the pick, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swashplate.identification.core.result import percent
+from swashplate.identification.frequency.response_cost import Target, log_error
+from swashplate.identification.frequency.state_space_result import StateSpaceFit
+from swashplate.identification.frequency.structure_misfit import FLOOR
+from swashplate.models.linear.state_space import StateSpaceModel
+
+_LINEAR = 5.0
+"""Scatters from which a misfit counts linearly (Huber 1964): a notch is no wrong structure."""
+
+_TOGETHER = 2.0
+"""Times that a misfit is counted, because neighbouring lines err together."""
+
+_MODES = 5
+
+
+def squared_misfit(model: StateSpaceModel, targets: Sequence[Target]) -> float:
+    """Sum over all points of the squared misfit over the measurement's scatter; two degrees of freedom a point."""
+    total = 0.0
+    by_input = {name: k for k, name in enumerate(model.inputs)}
+    for t in targets:
+        h = model.response(t.omega)[:, model.outputs.index(t.output), by_input[t.input]]
+        spread = np.sqrt((0.0 if t.error is None else t.error) ** 2 + FLOOR**2)
+        times = np.abs(log_error(h, t.measured)) / spread
+        if not np.all(np.isfinite(times)):
+            return float("inf")
+        total += float(np.sum(np.where(times < _LINEAR, times**2, _LINEAR * (2.0 * times - _LINEAR))))
+    return total
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One structure that was tried.
+
+    Attributes:
+        name: of the structure, or its parts. fit: as far as it was followed.
+        misfit: `squared_misfit`. abandoned: whether it was dropped after the first look.
+        held_out: J_rms on records that no fit has seen; NaN where there are none, or it was not asked.
+    """
+
+    name: str
+    fit: StateSpaceFit
+    misfit: float
+    abandoned: bool = False
+    held_out: float = float("nan")
+
+    @property
+    def parameters(self) -> int:
+        """Numbers that were fitted."""
+        return len(self.fit.names)
+
+    @property
+    def cost(self) -> float:
+        """J_ave."""
+        return self.fit.cost
+
+    @property
+    def vaguest(self) -> tuple[str, float]:
+        """The parameter with the largest Cramér-Rao bound, and that bound [%]."""
+        moving = [p for p in self.fit.estimates if not p.fixed and not p.tie]
+        worst = max(moving, key=lambda p: p.sigma_percent if np.isfinite(p.sigma_percent) else np.inf)
+        return worst.name, worst.sigma_percent
+
+    @property
+    def modes(self) -> str:
+        """The fastest modes inside the band: rad/s, and the damping ratio of pairs."""
+        inside = [m for m in self.fit.details.modes if m.inside][:_MODES]
+        pairs = [f"{m.frequency:.3g}" + (f" ({m.damping:.2f})" if m.eigenvalue.imag else "") for m in inside]
+        return ", ".join(pairs)
+
+    def score(self, spread: float, points: int) -> float:
+        """Bayes' information criterion with overdispersion (Schwarz 1978; Burnham and Anderson 2002, sec. 2.5).
+
+        Args:
+            spread: variance of the scatter over what it should be, 1 and more. points: that were fitted.
+        """
+        return self.misfit / (_TOGETHER * spread) + self.parameters * float(np.log(2.0 * points / _TOGETHER))
+
+
+@dataclass(frozen=True)
+class StructureSearch:
+    """Structures that were tried on the same responses.
+
+    Attributes:
+        tried: the best first, those that were abandoned last.
+        pick: the one that is suggested. reasons: why, in words.
+        seconds: what the search took.
+    """
+
+    tried: tuple[Contender, ...]
+    pick: Contender
+    reasons: tuple[str, ...]
+    seconds: float = 0.0
+
+    @property
+    def judged(self) -> bool:
+        """Whether a record that no fit has seen was flown along."""
+        return any(np.isfinite(c.held_out) for c in self.tried)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Cells of the table, the head first."""
+        table: list[tuple[str, ...]] = [
+            ("structure", "J_ave", "worst J", "parameters", "worst CR %", "held-out J_rms", "modes [rad/s]")
+        ]
+        for c in self.tried:
+            name, bound = c.vaguest
+            vague = "" if c.abandoned else f"{percent(bound).strip()} ({name})"
+            seen = f"{c.held_out:.2f}" if np.isfinite(c.held_out) else ""
+            modes = "abandoned after the first look" if c.abandoned else c.modes
+            table.append((c.name, f"{c.cost:.1f}", f"{max(c.fit.costs):.0f}", str(c.parameters), vague, seen, modes))
+        return table if self.judged else [(*row[:5], *row[6:]) for row in table]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it as JSON types."""
+        return {
+            "picked": self.pick.name,
+            "reasons": list(self.reasons),
+            "seconds": self.seconds,
+            "tried": [
+                {
+                    "structure": c.name,
+                    "J_ave": c.cost,
+                    "J_worst": max(c.fit.costs),
+                    "parameters": c.parameters,
+                    "vaguest": c.vaguest[0],
+                    "cramer_rao_percent": c.vaguest[1],
+                    "held_out_J_rms": c.held_out,
+                    "misfit": c.misfit,
+                    "abandoned": c.abandoned,
+                    "modes": [mode.as_dict() for mode in c.fit.details.modes],
+                }
+                for c in self.tried
+            ],
+        }
+
+    def __repr__(self) -> str:
+        table = self.rows()
+        widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+        lines = [f"Structures tried ({len(self.tried)}, {self.seconds:.0f} s):"]
+        for n, row in enumerate(table):
+            mark = "*" if n and self.tried[n - 1] is self.pick else " "
+            cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:-1], widths[1:-1], strict=True))]
+            lines.append(f" {mark}{'  '.join([*cells, row[-1]])}".rstrip())
+        return "\n".join([*lines, *self.reasons])

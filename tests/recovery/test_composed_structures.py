@@ -1,0 +1,74 @@
+"""A coupled helicopter whose rotor, inflow and engine are hidden, found again by structures composed of parts."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
+from swashplate.identification.frequency.state_space_fit import fit_state_space
+from swashplate.identification.frequency.state_space_result import StateSpaceFit
+from swashplate.identification.frequency.structure_search import search_structures
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space_file import structure
+
+RIGHT = "compose:body+flap+inflow+torque"
+TOLD = 0.05
+"""Relative error of a mode that the responses tell; one that they tell less has three of its own bounds."""
+
+
+@pytest.fixture(scope="module")
+def responses() -> FrequencyResponse:
+    return measured(*matrices(), noise=0.02, averages=20.0)
+
+
+@pytest.fixture(scope="module")
+def found(responses: FrequencyResponse) -> StateSpaceFit:
+    return fit_state_space(structure(RIGHT), responses)
+
+
+def test_the_right_parts_find_the_helicopter_from_the_start_values_of_the_package(found: StateSpaceFit) -> None:
+    assert found.cost < 5.0
+    assert max(found.costs) < 50.0
+    known = np.linalg.eigvals(matrices()[0])
+    for mode in found.details.modes:
+        if mode.inside:
+            error = min(abs(known - mode.eigenvalue))
+            assert error < max(TOLD * mode.frequency, 3.0 * mode.frequency_bound), mode
+    values = {p.name: p.value for p in found.estimates}
+    assert values["Lb"] == pytest.approx(ROLL, rel=0.03)
+    assert values["Ma"] == pytest.approx(PITCH, rel=0.03)
+    assert values["tau_f"] == pytest.approx(LAG, rel=0.03)
+    assert values["Zw"] == pytest.approx(-THRUST_BY_W / 60.0, abs=3.0 * found["Zw"].sigma)
+    assert not any("not all of the aircraft" in text for text in found.warnings)
+
+
+@pytest.mark.proof
+def test_a_structure_without_the_engine_is_told_to_lack_something(responses: FrequencyResponse) -> None:
+    fit = fit_state_space(structure("compose:body+flap+inflow"), responses, starts=2)
+    (words,) = (text for text in fit.warnings if "not all of the aircraft" in text)
+    assert "r / collective" in words
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize(
+    ("kind", "parts"),
+    [
+        ({}, {"flap", "inflow", "torque"}),
+        ({"engine": False}, {"flap", "inflow"}),
+        ({"inflow": False}, {"flap", "torque"}),
+    ],
+)
+def test_the_search_picks_the_parts_that_are_there(kind: dict[str, bool], parts: set[str]) -> None:
+    """Level with it is only the lead-lag that stands for an inflow, and the search costs eight right fits at most."""
+    responses = measured(*matrices(**kind), noise=0.02, averages=20.0)
+    began = time.process_time()
+    fit_state_space(structure("compose:body+" + "+".join(sorted(parts))), responses)
+    right, began = time.process_time() - began, time.process_time()
+    found = search_structures(responses)
+    assert set(found.pick.name.split("+")) == {"body"} | parts, found
+    assert time.process_time() - began < 12.0 * right
+    assert {c.name for c in found.tried if c.abandoned} == {"body", "body+flap_decoupled"}
+    assert all(c.fit.seconds < 1.0 * found.seconds / 5.0 for c in found.tried if c.abandoned)
