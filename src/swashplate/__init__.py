@@ -20,6 +20,7 @@ from swashplate import public
 if TYPE_CHECKING:
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_controller import check_controller
+    from swashplate.api.compare import compare
     from swashplate.api.controllers import load_controller
     from swashplate.api.decouple import decouple
     from swashplate.api.decouple_axes import decouple_axes
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
+    from swashplate.api.stitch import stitch
     from swashplate.api.structures import show_structure, structures
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
@@ -99,7 +101,6 @@ if TYPE_CHECKING:
     from swashplate.simulation.sensors import QUIET, Sensors, observe
     from swashplate.simulation.trim import trim
     from swashplate.simulation.trim_curve import trim_curve
-    from swashplate.validation.compare import compare
     from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
@@ -202,6 +203,7 @@ __all__ = [
     "state_hold",
     "static_decoupling",
     "stepwise",
+    "stitch",
     "structure",
     "structures",
     "suggest_gains",

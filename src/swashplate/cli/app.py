@@ -11,6 +11,7 @@ import typer
 
 from swashplate.cli import (
     bench,
+    compare,
     control,
     data,
     decouple,
@@ -32,6 +33,7 @@ from swashplate.cli import (
     respond,
     rotor_speed,
     simulate,
+    stitch,
     structures,
     trim,
     validate,
@@ -93,6 +95,8 @@ app.command("reconstruct", short_help="Find biases and scale factors of a flight
 app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
+app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
+app.command("compare", short_help="Responses, models or fits side by side.")(compare.compare)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -77,6 +79,10 @@ def linearize(
         ),
     ] = "full",
     plot: given.Page = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="A model file for every speed, with its trim."),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Linear models about steady flight: modes with their states, matrices with --json, root locus with --plot."""
@@ -90,13 +96,26 @@ def linearize(
     remarks = asked.tell(curve)
     if plot is not None:
         sp.report(curve, path=plot)
+    if out is not None:
+        _save(models, out)
     if json:
         typer.echo(as_json({"vehicle": asked.name, "models": [_matrices(m) for m in models], "remarks": remarks}))
         return
     for at, model in zip(curve.trims, models, strict=True):
         typer.echo(f"At {at.speed:g} m/s\n{model!r}\n")
-    if plot is not None:
-        typer.echo(f"Written: {plot}")
+    for written in (plot, out):
+        if written is not None:
+            typer.echo(f"Written: {written}")
+
+
+def _save(models: Sequence[LinearModel], folder: Path) -> None:
+    """at-SPEED.toml for every model; those of an earlier run with other speeds do not stay beside them."""
+    from swashplate import atomic
+
+    old = [file.name for file in folder.glob("at-*.toml")]
+    with atomic.folder_when_complete(folder, ours=old) as place:
+        for model in models:
+            model.save(place / f"at-{model.trim.speed:g}.toml")
 
 
 def _matrices(model: LinearModel) -> dict[str, Any]:

@@ -25,6 +25,7 @@ EQUATIONS: Registry[Callable[[Card], Vehicle]] = Registry(
         "conventional": "swashplate.models.conventional.helicopter_vehicle:conventional",
         "linear": "swashplate.models.linear.card_vehicle:linear",
         "multirotor": "swashplate.models.multirotor_vehicle:multirotor",
+        "stitched": "swashplate.models.linear.stitched:stitched",
     },
 )
 """What makes a vehicle of a card, by the name that the card says: ours, and other packages' entry points."""
@@ -95,7 +96,7 @@ def cards_by_name() -> tuple[dict[str, Card], tuple[SwashError, ...]]:
     return cards, tuple(faults)
 
 
-_SEVERAL = ("conventional", "linear", "multirotor")
+_SEVERAL = ("conventional", "linear", "multirotor", "stitched")
 """Equations of ours that have no card of their own, but one for every aircraft."""
 
 

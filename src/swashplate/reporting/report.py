@@ -15,15 +15,18 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.bench import compose_bench
 from swashplate.reporting.compose import compose
+from swashplate.reporting.figures.of_comparison import section_of_comparison
 from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
+from swashplate.reporting.versions import date, versions
 from swashplate.simulation.modes import Mode
+from swashplate.validation.compare import ModelComparison
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse | ModelComparison
 
 
 @runtime_checkable
@@ -46,7 +49,8 @@ def report(
     The file needs no network: plotly.js and all data are in it. It appears by rename when it is complete.
 
     Args:
-        results: of any identification, a validation or a verification of it, measured responses; None is left out. A
+        results: of any identification, a validation or a verification of it, measured responses, models along a flight
+            (alone); None is left out. A
             page is about one vehicle's fit and validation, or about linear models, their responses and verification.
             Trims or derivatives over a range of speeds make a page of their own.
             One that knows its own page (`check_controller`, `decouple`, `monte_carlo` ...) goes alone.
@@ -72,6 +76,8 @@ def structure_of(
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []
     for one in asked:
+        if isinstance(one, ModelComparison) and len(asked) == 1:
+            return _along_flight(one, title)
         if not isinstance(one, HasPage):
             given.append(one)
         elif len(asked) > 1 or modes is not None:
@@ -92,6 +98,12 @@ def structure_of(
     validation = _only([one for one in given if isinstance(one, Validation)], "validation")
     verification = _only(checks, "verification")
     return compose(fit, validation, verification, title=title, modes=modes)
+
+
+def _along_flight(found: ModelComparison, title: str | None) -> Report:
+    summary = (("Models", ", ".join(found.found), "plain"),)
+    made = f"swashplate {versions()['swashplate']}, {date()}"
+    return Report(title or "Models along a flight", (), summary, None, (section_of_comparison(found),), made)
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:

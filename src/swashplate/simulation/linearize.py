@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 from scipy.linalg import eig, schur, solve_sylvester
 
+from swashplate import atomic
 from swashplate.arrays import Array
 from swashplate.models.delays import known_delays
 from swashplate.models.linear import python_control
+from swashplate.models.linear.matrices_file import state_space_of_matrices
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
@@ -46,6 +51,8 @@ class LinearModel(Shown):
         states, inputs, disturbances: names of the columns.
         trim: what the deviations are counted from.
         delays: identified ones of the inputs [s], which the matrices have not; empty where none is known.
+        units: of states and inputs.
+        limits: lower and upper of the inputs.
     """
 
     A: Array
@@ -58,6 +65,8 @@ class LinearModel(Shown):
     disturbances: tuple[str, ...]
     trim: Trim
     delays: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def modes(self) -> tuple[Mode, ...]:
         """Eigenvalues with damping and frequency, fastest first."""
@@ -106,6 +115,34 @@ class LinearModel(Shown):
             pade=pade,
             name="the linear model",
         )
+
+    def to_structure(self, *, name: str = "", title: str = "") -> StateSpaceModel:
+        """The model as one of named numbers with its [trim] and [limits], which a file can hold (`save`).
+
+        Place and heading are left out where nothing depends on them; kinematics give them.
+
+        Args:
+            name: of the model; "" for one made of the speed.
+            title: the same for people.
+
+        Raises:
+            CardError: where an input is trimmed at its limit or beyond, so that no range about it is left.
+        """
+        return state_space_of_matrices(
+            (self.A, self.B),
+            states=self.states,
+            inputs=self.inputs,
+            units=self.units,
+            trim=self.trim.states() | self.trim.commands() | {"air_density": float(self.trim.environment.air_density)},
+            limits=self.limits,
+            delays=self.delays,
+            name=name or f"at_{self.trim.speed:g}",
+            title=title or f"Linearised at {self.trim.speed:g} m/s",
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the model's file, which `swashplate.vehicle` and `swashplate.stitch` read."""
+        atomic.write_text(path, to_toml(self.to_structure(name=Path(path).stem)))
 
     def __repr__(self) -> str:
         lines = [f"LinearModel: {len(self.states)} states, inputs {', '.join(self.inputs)}"]
@@ -160,6 +197,10 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
         disturbances=SURROUNDINGS,
         trim=about,
         delays=known_delays(vehicle),
+        units=dict(
+            zip((*vehicle.state_names, *vehicle.input_names), (*vehicle.state_units, *vehicle.input_units), strict=True)
+        ),
+        limits=dict(zip(vehicle.input_names, vehicle.input_limits, strict=True)),
     )
 
 

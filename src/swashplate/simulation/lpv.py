@@ -7,8 +7,8 @@ All have the eight states of Bhandari et al. (2005), eq. 13, with flapping that 
   tangent at x touches f(x), and f(x) is not A(x) (x - x0) + B(x) (u - u0). At a steady flight at another speed, where
   nothing should move, it accelerates; the error grows with time.
 * "trim-term": dx/dt = A(rho) (x - x_trim(rho)) + B(rho) (u - u_trim(rho)) over a table of trims, rho the speed ahead.
-* "stitched": the same aerodynamics about the same trims, with the nonlinear gravity and rigid-body terms (Tobias and
-  Tischler 2016); the trims' gradients stand for the derivatives by speed.
+* "stitched": the model that `swashplate.stitch` makes of that table: nonlinear gravity and kinematics, and trims that
+  change with speed as the matrices say (`swashplate.models.linear.stitched`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,12 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
+from swashplate.models.catalogue import from_card
+from swashplate.models.linear.matrices_file import state_space_of_matrices
+from swashplate.models.linear.stitching import stitch_points
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
+from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -39,6 +43,7 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.simulation.integrate import simulate
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.reduction import PAPER_INPUTS, PAPER_STATES, paper_model
 from swashplate.simulation.runge_kutta import rk4_step
@@ -47,7 +52,7 @@ from swashplate.simulation.trim import Trim
 
 Scheme = Literal["as-printed", "trim-term", "stitched"]
 
-_U, _W, _Q, _THETA, _V, _P, _PHI, _R = range(8)
+_U = PAPER_STATES.index("u")
 
 
 @dataclass(frozen=True)
@@ -130,9 +135,19 @@ def simulate_lpv(
     elif scheme in ("trim-term", "stitched"):
         if over is None:
             raise SwashError(f"scheme '{scheme}' needs a schedule.", hint="Pass over=schedule(vehicle, speeds).")
-        tables = tuple(map(jnp.asarray, (over.speeds, over.x, over.u, over.A, over.B)))
-        g = float(surroundings.gravity)
-        states = _scheduled(tables, began, u, 1.0 / rate, g, stitched=scheme == "stitched")
+        if scheme == "stitched":
+            begins = start.states() | dict(zip(PAPER_STATES, began.tolist(), strict=True))
+            flown = _stitched(over)
+            states = simulate(
+                flown,
+                dict(zip(PAPER_INPUTS, u.T, strict=True)),
+                start={name: begins[name] for name in flown.state_names},
+                rate=rate,
+                environment=surroundings,
+            ).array(PAPER_STATES)
+        else:
+            tables = tuple(map(jnp.asarray, (over.speeds, over.x, over.u, over.A, over.B)))
+            states = _scheduled(tables, began, u, 1.0 / rate)
     else:
         raise SwashError(f"scheme is '{scheme}', expected 'as-printed', 'trim-term' or 'stitched'.")
     time = np.arange(len(u)) / rate
@@ -212,15 +227,32 @@ def _printed(
     return states.reshape(-1, len(PAPER_STATES))
 
 
-@partial(jax.jit, static_argnames=("stitched",))
+def _stitched(over: Schedule) -> Vehicle:
+    """The stitched model of a table."""
+    units = dict(zip(RigidBody._fields, BODY_UNITS, strict=True)) | dict.fromkeys(PAPER_INPUTS, "rad")
+    points = [
+        state_space_of_matrices(
+            (A, B),
+            states=PAPER_STATES,
+            inputs=PAPER_INPUTS,
+            units=units,
+            trim=dict(zip((*PAPER_STATES, *PAPER_INPUTS), (*x, *u), strict=True)),
+            limits={},
+            delays={},
+            name=f"at_{x[_U]:.3g}".replace("-", "minus_").replace(".", "_"),
+            title=f"{x[_U]:.3g} m/s",
+        )
+        for x, u, A, B in zip(over.x, over.u, over.A, over.B, strict=True)
+    ]
+    return from_card(stitch_points(points, names=[point.title for point in points]))
+
+
+@jax.jit
 def _scheduled(
     tables: tuple[Float[jax.Array, "speeds ..."], ...],
     x0: Float[jax.Array, " states"],
     u: Float[jax.Array, "samples inputs"],
     dt: Float[jax.Array, ""],
-    g: Float[jax.Array, ""],
-    *,
-    stitched: bool,
 ) -> Any:
     speeds = tables[0]
 
@@ -231,37 +263,10 @@ def _scheduled(
 
     def rates(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> Any:
         xt, ut, A, B = between(x[_U])
-        if not stitched:
-            return A @ (x - xt) + B @ (command - ut)
-        # What the linear model has of gravity and rigid-body terms goes out, the terms themselves come in.
-        linear = _kinematic_slope(xt, g)
-        aerodynamic = (A - linear) @ (x - xt) + B @ (command - ut)
-        return aerodynamic + _kinematics(x, g) - _kinematics(xt, g)
+        return A @ (x - xt) + B @ (command - ut)
 
     def step(x: Float[jax.Array, " states"], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
         return rk4_step(rates, x, lambda _: command, dt, looped=False), x
 
     _, states = jax.lax.scan(step, jnp.asarray(x0), jnp.asarray(u))
     return states
-
-
-def _kinematics(x: Float[jax.Array, " states"], g: Float[jax.Array, ""]) -> Any:
-    """Gravity, Coriolis and Euler-angle terms of the eight states (the products of inertia's rates are left linear)."""
-    u, w, q, theta, v, p, phi, r = (x[i] for i in range(8))
-    sf, cf, st, ct = jnp.sin(phi), jnp.cos(phi), jnp.sin(theta), jnp.cos(theta)
-    return jnp.stack(
-        [
-            -q * w + r * v - g * st,
-            -p * v + q * u + g * cf * ct,
-            jnp.zeros(()),
-            q * cf - r * sf,
-            -r * u + p * w + g * sf * ct,
-            jnp.zeros(()),
-            p + (q * sf + r * cf) * st / ct,
-            jnp.zeros(()),
-        ]
-    )
-
-
-def _kinematic_slope(x: Float[jax.Array, " states"], g: Float[jax.Array, ""]) -> Any:
-    return jax.jacfwd(_kinematics)(x, g)

@@ -66,9 +66,9 @@ def standing(vehicle: Vehicle) -> Vehicle:
 
 
 def no_ground(where: str) -> SwashError:
-    """That a linear model cannot stand, as an error to be raised."""
+    """That a linear or stitched model cannot stand, as an error to be raised."""
     return SwashError(
-        "is a linear model: deviations from one trim in flight, without ground, rotors or a battery, so it cannot "
+        "is a linear model of flight, or stitched from such, without ground, rotors or a battery, so it cannot "
         "start from the ground as an autopilot expects.",
         where=where,
         hint="Fly it with `swash live`, or give the autopilot a vehicle, e.g. raptor50. ArduPilot's own state-space "

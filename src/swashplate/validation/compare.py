@@ -1,11 +1,13 @@
-"""`compare`: several models flown along one flight, in one figure and one table."""
+"""Several models flown along one flight, in one figure and one table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swashplate import atomic
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.shown import Shown
@@ -38,6 +40,15 @@ class ModelComparison(Shown):
             for name in outputs
         }
 
+    def to_document(self) -> dict[str, Any]:
+        """Fits and warnings as JSON types."""
+        told = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
+        return {"what": "models along a flight", "fit": self.fits(), "warnings": told}
+
+    def save(self, path: str | Path) -> Path:
+        """Write the document as a JSON file."""
+        return atomic.write_json(path, self.to_document())
+
     def to_dataframe(self) -> pd.DataFrame:
         """Fit [%], one row an output and one column a model."""
         import pandas as pd
@@ -55,35 +66,15 @@ class ModelComparison(Shown):
         return "\n".join([*lines, *told])
 
 
-def compare(
-    models: Any, flights: Flight | Sequence[Flight], *, outputs: Sequence[str] | None = None
+def along_flights(
+    named: Mapping[str, Any], flights: Flight | Sequence[Flight], *, outputs: Sequence[str] | None = None
 ) -> ModelComparison:
-    """Fly models along recorded inputs and say how close each comes, as MATLAB's `compare` does.
-
-    Start states, constant shifts of the rates and biases of the outputs are solved for, for each model and stretch of
-    the flight alike; all else has to come from the model and the recorded inputs (`swashplate.validate` judges more).
-
-    Args:
-        models: a model, a list of them, or models by the name that they shall have. A model is a result, a vehicle or a
-            state-space model.
-        flights: conditioned.
-        outputs: channels to compare; all that a model and the flights share where None.
+    """Models by name flown along recorded inputs; see `swashplate.compare`.
 
     Raises:
         SwashError: without a model.
         FlightError: an input that the flights lack, or no output that both have.
     """
-    named = dict(models) if isinstance(models, Mapping) else _named(models)
     if not named:
         raise SwashError("there is no model to compare.", channel="models")
     return ModelComparison({name: along_inputs(model, flights, outputs=outputs) for name, model in named.items()})
-
-
-def _named(models: Any) -> dict[str, Any]:
-    """Models by their own names; a number behind those that two have."""
-    given = list(models) if isinstance(models, list | tuple) else [models]
-    names = [str(getattr(model, "name", f"model {k + 1}")) for k, model in enumerate(given)]
-    return {
-        name if names.count(name) == 1 else f"{name} {k + 1}": model
-        for k, (name, model) in enumerate(zip(names, given, strict=True))
-    }

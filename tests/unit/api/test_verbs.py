@@ -50,9 +50,9 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 """Names of `swashplate` by verb, where a verb has another name there or several; `fit-ss` is `sp.fit_ss`."""
 
 STUDIES = (
-    "check_controller", "decouple", "decouple_axes", "derivatives", "demo", "design_controller", "evaluate_bench",
-    "fit_ss", "fit_tf", "fit_time", "fly_maneuver", "identify_and_validate", "monte_carlo", "observability", "respond",
-    "trim_curve", "validate_linear",
+    "check_controller", "compare", "decouple", "decouple_axes", "derivatives", "demo", "design_controller",
+    "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver", "identify_and_validate", "monte_carlo",
+    "observability", "respond", "trim_curve", "validate_linear",
 )  # fmt: skip
 """Verbs whose result is worth a page."""
 UNSAVED = ("derivatives", "observability", "trim_curve", "check_controller")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,11 +90,17 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
 def at_flown_trim(model: StateSpaceModel, responses: FrequencyResponse) -> StateSpaceModel:
     """The model about the flights' mean speeds and angles, where the responses have them among their outputs.
 
-    Only held parameters of the model's [trim] that are zero change: what was given stays.
+    Only held parameters of the model's [trim] that are zero change: what was given stays. A [trim] that is there is
+    also told the inputs' means, which stitching needs.
     """
-    means = responses.settings.get("means", {})
+    means = {name: value for name, value in responses.settings.get("means", {}).items() if np.isfinite(value)}
     about = {name: means[state] for state, name in model.trim.items() if state in means}
-    return model.with_values({n: v for n, v in about.items() if model.parameters[n].value == 0.0 and np.isfinite(v)})
+    moved = model.with_values({n: v for n, v in about.items() if model.parameters[n].value == 0.0})
+    told = model.document.get("trim")
+    if not told:
+        return moved
+    inputs = {name: repr(float(means[name])) for name in model.inputs if name in means and name not in told}
+    return replace(moved, document={**moved.document, "trim": {**told, **inputs}})
 
 
 def _time_constants(model: StateSpaceModel, states: Sequence[str], a: Array) -> dict[str, float]:

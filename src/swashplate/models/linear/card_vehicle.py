@@ -75,7 +75,7 @@ def entry_unit(row: str, column: str) -> str:
 
 
 @cache
-def _tuple_type(name: str, fields: tuple[str, ...]) -> Any:
+def tuple_type(name: str, fields: tuple[str, ...]) -> Any:
     return namedtuple(name, fields)
 
 
@@ -111,14 +111,14 @@ def linear(card: Card) -> Vehicle:
     own = Structure(states, inputs, tuple(entries))
     body_names = () if grounded else RigidBody._fields
     inner = tuple(name for name in states if name not in body_names)
-    template = _tuple_type("Inner", inner)(*(0.0,) * len(inner)) if inner else None
+    template = tuple_type("Inner", inner)(*(0.0,) * len(inner)) if inner else None
     names = (*(entry_name(*e) for e in entries), *trims)
     limits = tuple(zip(map(float, card.options["low"]), map(float, card.options["high"]), strict=True))
     return Vehicle(
         card=card,
         state=LinearState(None if grounded else RigidBody(*(0.0,) * 12), template),
-        inputs=_tuple_type("Inputs", inputs),
-        parameters=_tuple_type("Parameters", names),
+        inputs=tuple_type("Inputs", inputs),
+        parameters=tuple_type("Parameters", names),
         state_names=(*body_names, *inner),
         state_units=(*BODY_UNITS[: len(body_names)], *(units[name] for name in inner)),
         input_names=inputs,
@@ -145,14 +145,14 @@ def _rest(card: Card) -> dict[str, float]:
     return {name: card.parameters[f"trim_{name}"].value for name in card.options["states"]}
 
 
-def _named(state: LinearState) -> dict[str, Any]:
+def named_states(state: LinearState) -> dict[str, Any]:
     parts = [part._asdict() for part in state if part is not None]
     return {name: value for part in parts for name, value in part.items()}
 
 
 def _rates(state: LinearState, inputs: Any, par: Any, structure: Structure) -> dict[str, Any]:
     """A (x - x0) + B (u - u0), by state."""
-    here = _named(state) | inputs._asdict()
+    here = named_states(state) | inputs._asdict()
     away = {name: here[name] - getattr(par, f"trim_{name}") for name in (*structure.states, *structure.inputs)}
     rates: dict[str, Any] = dict.fromkeys(structure.states, 0.0)
     for row, column in structure.entries:

@@ -17,7 +17,7 @@ from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.vehicle import Vehicle
 
-_USUAL_RANGE = {"1": 1.0, "rad": np.radians(20.0), "deg": 20.0}
+USUAL_RANGE = {"1": 1.0, "rad": np.radians(20.0), "deg": 20.0}
 """Either way of the trim, where a file does not say how far its inputs go."""
 
 
@@ -127,7 +127,7 @@ def _ranges(model: StateSpaceModel) -> dict[str, tuple[float, float]]:
     found = model.document.get("limits", {})
     ranges = {}
     for name in model.inputs:
-        usual = _USUAL_RANGE.get(model.units.get(name, "1") or "1", 1.0)
+        usual = USUAL_RANGE.get(model.units.get(name, "1") or "1", 1.0)
         low, high = found.get(name, (-usual, usual))
         if not low < 0.0 < high:
             raise CardError(

@@ -25,7 +25,8 @@ collective = "tau"                           # by input, or by "output/input"
 [limits]                                     # of inputs, from the trim; only a controller needs them
 collective = [-1.0, 1.0]
 [trim]                                       # where the model stands if not in hover: accelerometers need it
-# u = "U0", w = "W0", phi = "phi0"           m/s and rad, small angles; also v and theta
+# u = "U0", w = "W0", phi = "phi0"           m/s and rad; also v, theta; stitching needs all states and inputs, and
+# collective = 0.4, air_density = 1.2        takes the air's density
 [shape]
 rotor_radius = 1.535                         # m: how large pages draw it, 1 if not given
 
@@ -279,11 +280,12 @@ class _Reader:
 
     def _trim(self) -> dict[str, str]:
         """Expressions of the trim's speeds and angles."""
+        known = dict.fromkeys((*TRIM, *self.states, *self.inputs, "air_density"))
         for name, text in self._table("trim").items():
             entry = f"trim.{name}"
-            if name not in TRIM:
+            if name not in known:
                 raise CardError(
-                    "is no part of a trim.", where=self.path, channel=entry, hint=f"It has {', '.join(TRIM)}."
+                    "is no part of a trim.", where=self.path, channel=entry, hint=f"It has {', '.join(known)}."
                 )
             self.used |= self._expression(text, entry).names
         return {name: str(text) for name, text in self._table("trim").items()}
@@ -373,3 +375,9 @@ def to_toml(model: StateSpaceModel) -> str:
         parameters[name] = entry
     head = {"kind": "state-space", "schema": SCHEMA, "name": model.name, "title": model.title, "trust": model.trust}
     return tomli_w.dumps({**model.document, **head, "parameters": parameters})
+
+
+def trim_of(model: StateSpaceModel) -> dict[str, float]:
+    """What the model's [trim] says, in numbers; empty where it says nothing."""
+    numbers = model.numbers()
+    return {name: float(Expression(str(text))(numbers)) for name, text in model.document.get("trim", {}).items()}

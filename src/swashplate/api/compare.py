@@ -1,0 +1,135 @@
+"""The verb `compare`: several responses, models or fits side by side, or models along a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from swashplate.api.case_comparison import CaseComparison
+from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
+from swashplate.identification.core.result import Result
+from swashplate.identification.core.result_file import load
+from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.catalogue import vehicle
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.case_parts import CaseParts
+from swashplate.reporting.cases_of_models import Linear, compare_answers, compare_modes
+from swashplate.reporting.cases_of_responses import compare_responses
+from swashplate.reporting.cases_of_results import compare_estimates
+from swashplate.simulation.linearize import LinearModel, linearize
+from swashplate.validation.compare import ModelComparison, along_flights
+
+Case: TypeAlias = FrequencyResponse | Result[Any, Any] | Vehicle | StateSpaceModel | LinearModel | str | Path
+"""What can stand beside others: a response, a fit, a model, or its name, file or folder of results."""
+
+
+def compare(
+    cases: Any, flights: Flight | Sequence[Flight] | None = None, *, outputs: Sequence[str] | None = None
+) -> ModelComparison | CaseComparison:
+    """Put cases side by side, or fly models along one flight.
+
+    Without flights by what the cases are, each against the first: frequency responses (coherent bands, mismatch J,
+    difference in random errors), fits (parameters with Cramer-Rao bounds, difference in standard deviations, modes),
+    models (modes, responses over each other; vehicles in hover). Fits beside models are compared as models.
+
+    With flights models follow the recorded inputs, as with MATLAB's `compare`: start states, constant shifts of the
+    rates and biases of the outputs are solved for, for each model and stretch of the flight alike; all else has to
+    come from the model and the recorded inputs (`swashplate.validate` judges more).
+
+    Args:
+        cases: a list of them, cases by the name that they shall have, or with flights a single model. A case is what
+            `respond`, an identification, `vehicle` or `linearize` gives, or its file; a folder of `swash respond` or of
+            a fit stands for the file in it.
+        flights: conditioned; None for none.
+        outputs: channels to compare along the flights; all that a model and the flights share where None.
+
+    Raises:
+        SwashError: fewer than two cases (one model beside flights), responses beside something else, no common pair.
+        FlightError: an input that the flights lack, or no output that both have.
+    """
+    named = _named(cases)
+    if flights is not None:
+        return along_flights(named, flights, outputs=outputs)
+    if outputs is not None:
+        raise SwashError("are of models along flights.", channel="outputs", hint="Give flights too.")
+    if len(named) < 2:
+        raise SwashError(f"{len(named)} given, expected two or more.", channel="cases")
+    of = [isinstance(one, FrequencyResponse) for one in named.values()]
+    if any(of) and not all(of):
+        responses = ", ".join(name for name, one in zip(named, of, strict=True) if one)
+        raise SwashError(f"responses ({responses}) stand beside what is none.", channel="cases")
+    if all(of):
+        return CaseComparison("responses", tuple(named), compare_responses(named))
+    parts = CaseParts()
+    results = all(isinstance(one, Result) for one in named.values())
+    if results:
+        parts = compare_estimates(named)
+    return CaseComparison("results" if results else "models", tuple(named), parts + _of_models(named))
+
+
+def _of_models(named: Mapping[str, Any]) -> CaseParts:
+    """Modes and responses of what can be linearised; of what cannot, why."""
+    models: dict[str, Linear] = {}
+    told = []
+    for name, one in named.items():
+        try:
+            models[name] = _linear(one)
+        except SwashError as error:
+            told.append(f"{name} has no modes here: {error}")
+    if len(models) < 2:
+        return CaseParts(told=tuple(told))
+    return compare_modes(models) + compare_answers(models) + CaseParts(told=tuple(told))
+
+
+def _linear(one: Any) -> Linear:
+    made = one.vehicle if isinstance(one, Result) else one
+    if isinstance(made, Vehicle):
+        return linearize(made) if made.structure is None else made.structure
+    if isinstance(made, LinearModel | StateSpaceModel):
+        return made
+    raise SwashError(f"is a {type(made).__name__}, expected responses, fits or models.", channel="cases")
+
+
+# ---- names and files ---------------------------------------------------------------------------------------------
+_FILES = ("responses.nc", "fit.json", "model.toml")
+
+
+def _named(cases: Any) -> dict[str, Any]:
+    """Cases by name; files are read."""
+    if isinstance(cases, Mapping):
+        return {name: _read(one) for name, one in cases.items()}
+    given = list(cases) if isinstance(cases, list | tuple) else [cases]
+    paths = [Path(one) if isinstance(one, str | Path) else None for one in given]
+    names = [_called(one, path, paths, k) for k, (one, path) in enumerate(zip(given, paths, strict=True))]
+    twice = {name for name in names if names.count(name) > 1}
+    names = [f"{name} {k + 1}" if name in twice else name for k, name in enumerate(names)]
+    return {name: _read(one) for name, one in zip(names, given, strict=True)}
+
+
+def _called(one: Any, path: Path | None, paths: Sequence[Path | None], k: int) -> str:
+    """A file by its name, with its folder where others have the same; anything else by its own."""
+    if isinstance(one, Vehicle):
+        return one.card.called if one.structure is None else one.structure.name
+    if path is None:
+        return str(getattr(one, "name", "") or f"case {k + 1}")
+    alike = sum(other is not None and other.name == path.name for other in paths)
+    return "/".join(path.parts[-2:]) if alike > 1 else path.name
+
+
+def _read(one: Any) -> Any:
+    if not isinstance(one, str | Path):
+        return one
+    path = Path(one)
+    if path.is_dir():
+        found = next((path / name for name in _FILES if (path / name).is_file()), None)
+        if found is None:
+            raise SwashError(f"has none of {', '.join(_FILES)} in it.", where=path)
+        path = found
+    if path.suffix == ".nc":
+        return FrequencyResponse.load(path)
+    if path.suffix == ".json":
+        return load(path)
+    return vehicle(path)

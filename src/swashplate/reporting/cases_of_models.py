@@ -1,0 +1,137 @@
+"""Models of several cases side by side: modes, and responses over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from swashplate.arrays import Array, Complex
+from swashplate.identification.frequency.response_cost import Target, cost_of
+from swashplate.identification.responses.frequency_response import TWO_PI
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.usual_axes import usual_axes
+from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
+from swashplate.reporting.structure import Cell, Table
+from swashplate.simulation.linearize import LinearModel
+
+Linear = LinearModel | StateSpaceModel
+BAND = np.geomspace(0.1, 5.0, 60) * TWO_PI
+"""rad/s."""
+_SAME = 0.5
+"""Relative distance up to which two eigenvalues are taken for the same mode."""
+_RATES = {"roll": "p", "pitch": "q", "yaw": "r", "heave": "w"}
+_ORIGIN = 1e-5
+
+
+def compare_modes(cases: Mapping[str, Linear]) -> CaseParts:
+    """Eigenvalues [1/s], those of the first with the nearest of the others, and the difference in per cent."""
+    names = list(cases)
+    found = {name: eigenvalues(model) for name, model in cases.items()}
+    first = found[names[0]]
+    matched = {name: match(first, values) for name, values in found.items()}
+    rows, entries = [], []
+    for k, value in enumerate(first):
+        mine = {name: None if (j := places[k]) is None else found[name][j] for name, places in matched.items()}
+        cells = [Cell(_shown(value))]
+        for name in names[1:]:
+            other = mine[name]
+            cells += [Cell("-"), Cell("-")] if other is None else [
+                Cell(_shown(other)), Cell(f"{100.0 * abs(other - value) / abs(value):.1f}", number=True)
+            ]  # fmt: skip
+        rows.append((*cells,))
+        entries.append({name: None if v is None else [float(v.real), float(v.imag)] for name, v in mine.items()})
+    for name in names[1:]:
+        for j in sorted(set(range(len(found[name]))) - {j for j in matched[name] if j is not None}):
+            value = found[name][j]
+            cells = [Cell("-")]
+            for column in names[1:]:
+                cells += [Cell(_shown(value)), Cell("")] if column == name else [Cell("-"), Cell("-")]
+            rows.append((*cells,))
+            entries.append({n: [float(value.real), float(value.imag)] if n == name else None for n in names})
+    head = (names[0], *(title for name in names[1:] for title in (name, "away [%]")))
+    note = f"Eigenvalues [1/s] (natural frequency [rad/s], damping); the nearest within {100 * _SAME:.0f} %, '-' none."
+    return CaseParts((Table("Modes", head, tuple(rows), note=note),), document={"modes": entries})
+
+
+def eigenvalues(model: Linear) -> list[complex]:
+    """With imaginary part zero or more, slowest last; those at the origin are no modes."""
+    A = model.A if isinstance(model, LinearModel) else model.explicit()[0]
+    values = [complex(v) for v in np.linalg.eigvals(A) if v.imag >= 0.0 and abs(v) > _ORIGIN]
+    return sorted(values, key=lambda v: (-abs(v), v.imag))
+
+
+def match(first: Sequence[complex], other: Sequence[complex]) -> list[int | None]:
+    """For each eigenvalue of the first the other's that is it, None for none: nearest over all at once."""
+    if not (first and other):
+        return [None] * len(first)
+    a, b = np.array(first)[:, None], np.array(other)[None, :]
+    away = np.abs(a - b) / np.maximum(np.abs(a), np.abs(b))
+    rows, columns = linear_sum_assignment(np.minimum(away, 2.0 * _SAME))
+    found: list[int | None] = [None] * len(first)
+    for i, j in zip(rows, columns, strict=True):
+        found[int(i)] = int(j) if away[i, j] <= _SAME else None
+    return found
+
+
+def _shown(value: complex) -> str:
+    if abs(value.imag) < 1e-9:
+        return f"{value.real:+.3f}"
+    return f"{value.real:+.3f} +/- {value.imag:.3f}j ({abs(value):.2f}, {-value.real / abs(value):.2f})"
+
+
+def compare_answers(cases: Mapping[str, Linear]) -> CaseParts:
+    """Responses over each other from 0.1 to 5 Hz, delays included, and J of each against the first.
+
+    Pairs of an axis (p over roll ...) where inputs are named as usual; otherwise all that the models share.
+    """
+    every = list(cases.values())
+    inputs, outputs = common([m.inputs for m in every]), common([_outputs(m) for m in every])
+    axes = {axis.name: name for axis in usual_axes(inputs) for name in axis.inputs if len(axis.inputs) == 1}
+    pairs = [(_RATES[axis], name) for axis, name in axes.items() if _RATES[axis] in outputs]
+    pairs = pairs or [(o, i) for o in outputs for i in inputs]
+    if not pairs:
+        return CaseParts(told=("The models share no output and input: their responses are not compared.",))
+    names = list(cases)
+    answers = {name: response(model, outputs, inputs) for name, model in cases.items()}
+    curves, rows, document = {}, [], {}
+    for o, i in pairs:
+        mine = {n: h[:, outputs.index(o), inputs.index(i)] for n, h in answers.items()}
+        if not any(np.any(h != 0.0) for h in mine.values()):
+            continue
+        curves[o, i] = {n: (BAND, np.where(h == 0.0, np.nan, h)) for n, h in mine.items()}
+        wanted = Target(o, i, BAND, mine[names[0]], np.ones(BAND.size))
+        costs = {n: cost_of(mine[n], wanted) if np.all(mine[n] != 0.0) and np.all(wanted.measured != 0.0) else np.inf
+                 for n in names[1:]}  # fmt: skip
+        rows.append((Cell(f"{o} / {i}"), *(Cell(f"{c:.1f}", number=True) for c in costs.values())))
+        document[f"{o}/{i}"] = {n: c if np.isfinite(c) else None for n, c in costs.items()}
+    if not curves:
+        return CaseParts(told=("No output of the models answers an input.",))
+    caption, note = (
+        "Mismatch J of responses",
+        f"Against {names[0]}, from 0.1 to 5 Hz; a good model has 100 at most.",
+    )
+    table = Table(caption, ("output / input", *names[1:]), tuple(rows), note=note)
+    return CaseParts((table,), (bode_overlay(curves),), document={"responses": document})
+
+
+def _outputs(model: Linear) -> tuple[str, ...]:
+    return model.states if isinstance(model, LinearModel) else model.outputs
+
+
+def response(model: Linear, outputs: Sequence[str], inputs: Sequence[str]) -> Complex:
+    """H(j omega) over BAND with delays, shape (n, n_outputs, n_inputs)."""
+    o, i = ([every.index(n) for n in names] for every, names in ((_outputs(model), outputs), (model.inputs, inputs)))
+    if isinstance(model, StateSpaceModel):
+        h: Complex = model.response(BAND)
+    else:
+        s: Complex = np.asarray(1j * BAND[:, None, None])
+        x = np.linalg.solve(s * np.eye(len(model.states)) - model.A, model.B[None] + 0j)
+        h = np.asarray((model.C @ x + model.D) * np.exp(-s * _late(model)), dtype=np.complex128)
+    return np.asarray(h[:, o][:, :, i], dtype=np.complex128)
+
+
+def _late(model: LinearModel) -> Array:
+    known = model.delays
+    return np.array([[known.get(f"{o}/{i}", known.get(i, 0.0)) for i in model.inputs] for o in model.states])
