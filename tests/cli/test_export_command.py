@@ -87,7 +87,9 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
 
 def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
-    assert "extra 'export'" in one_message(swash("export", "coax", "--format", "c", "--out", tmp_path))
+    assert "pip install 'swashplate[export]'" in one_message(
+        swash("export", "coax", "--format", "c", "--out", tmp_path)
+    )
     assert swash("export", "coax", "--format", "control", "--out", tmp_path).code == 0
 
 

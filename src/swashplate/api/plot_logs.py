@@ -11,9 +11,9 @@ from typing import Literal
 
 from swashplate.atomic import make_folder, write_bytes
 from swashplate.errors import FlightError, SwashError
+from swashplate.extras import library
 from swashplate.flights.conditioning.synchronise import synchronise
 from swashplate.flights.flight import Flight
-from swashplate.reporting.figures.libraries import library
 from swashplate.reporting.figures.of_flight import label, over_time, spectrogram, spectrum
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.html import write_page
@@ -154,7 +154,7 @@ def _write(
         return
     stamp = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {"Software": None}}[path.suffix.lower()]
     made = io.BytesIO()
-    with library("matplotlib").rc_context({"svg.hashsalt": "swashplate"}):
+    with library("matplotlib", what="drawing").rc_context({"svg.hashsalt": "swashplate"}):
         figure = still([drawn], theme=theme, title=names)
         figure.savefig(made, format=path.suffix.lower()[1:], dpi=160, metadata=stamp)
     make_folder(path.parent)

@@ -12,8 +12,8 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight, did_you_mean
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
 
 POSE = (*POSITION, *ATTITUDE)
 """What motion capture measures."""
@@ -129,7 +129,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     wanted = (*vehicle.input_names, *outputs)
     time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
     source = flight.provenance.source or "flight"
-    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
+    nominal = float(environment_of(vehicle).voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
     return Record(
