@@ -14,6 +14,7 @@ from swashplate.errors import FlightError, SwashError
 from swashplate.extras import library
 from swashplate.flights.conditioning.synchronise import synchronise
 from swashplate.flights.flight import Flight
+from swashplate.registry import listed
 from swashplate.reporting.figures.of_flight import label, over_time, spectrogram, spectrum
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.html import write_page
@@ -117,7 +118,7 @@ def plot_logs(
                 "has none of the channels that were asked for.",
                 where=label(flight, k),
                 channel=", ".join(channels),
-                hint=f"It has {', '.join(flight.channels) or 'none'}.",
+                hint=f"It has {listed(flight.channels)}.",
             )
     aligned = Aligned((0.0,) * len(given), ())
     if kind == "spectrogram":

@@ -20,6 +20,7 @@ from swashplate.models.catalogue import vehicle as named_vehicle
 from swashplate.models.delays import input_delays
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.registry import listed
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
@@ -103,9 +104,10 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
     missing = [name for name in PREDICTED if name not in flight]
     if missing:
         raise FlightError(
-            f"lacks {', '.join(missing)}; it has {', '.join(flight.channels) or 'nothing'}.",
+            f"lacks {', '.join(missing)}.",
             where=flight.provenance.source,
-            hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least.",
+            hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least. "
+            f"It has {listed(flight.channels)}.",
         )
     notes: list[str] = []
     if model is not None:
@@ -165,8 +167,8 @@ def _driven(flight: Flight, model: Vehicle, *, hold_missing: bool) -> tuple[Flig
             f"lacks {', '.join(missing)}: {model.card.where or model.card.title} is driven by them, and without them "
             "there is no prediction.",
             where=flight.provenance.source,
-            hint=f"It has {', '.join(flight.channels)}. Map its columns to these names (--mapping), give a model of "
-            "the channels that it has, leave --model out, or hold what is missing at the hover's with --hold-missing.",
+            hint="Map its columns to these names (--mapping), give a model of its channels, leave --model out, "
+            f"or hold what is missing at the hover's with --hold-missing. It has {listed(flight.channels)}.",
         )
     hover = trim(model, voltage=nominal)
     held = {name: float(hover.inputs[model.input_names.index(name)]) for name in missing}
