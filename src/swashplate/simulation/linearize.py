@@ -9,6 +9,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from scipy.linalg import eig, schur, solve_sylvester
 
 from swashplate.arrays import Array
 from swashplate.models.delays import known_delays
@@ -30,6 +31,9 @@ from swashplate.simulation.trim import trim as find_trim
 
 _ORIGIN = 1e-6
 """1/s; chains of integrators leave eigenvalues of rounding's root about the origin, which are no modes."""
+
+_TAKES_PART = 0.1
+"""Share from which a state is named with the eigenvalues at the origin."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +61,17 @@ class LinearModel(Shown):
 
     def modes(self) -> tuple[Mode, ...]:
         """Eigenvalues with damping and frequency, fastest first."""
-        values, right = np.linalg.eig(self.A)
-        # Defective matrices (the chains of integrators of a hovering vehicle) have no left eigenvectors by inversion.
-        left = np.linalg.pinv(right).T
-        share = np.abs(right * left)
+        # The chains of integrators of a hovering vehicle make the eigenvectors singular: left ones not by inversion.
+        values, left, right = eig(self.A, left=True)
+        share = np.abs(right * left.conj())
         share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
+        integrating = _integrating(self.A, self.states)
         found = []
         for i in np.argsort(-np.abs(values), kind="stable"):
-            value = complex(values[i]) if abs(values[i]) > _ORIGIN else 0j
+            if abs(values[i]) <= _ORIGIN:
+                found.append(Mode(0j, 0.0, 0.0, np.inf, integrating))
+                continue
+            value = complex(values[i])
             if value.imag < 0.0:
                 continue
             order = np.argsort(-share[:, i], kind="stable")[:3]
@@ -73,7 +80,7 @@ class LinearModel(Shown):
                 Mode(
                     value,
                     frequency,
-                    -value.real / frequency if frequency > 0.0 else 0.0,
+                    -value.real / frequency,
                     -1.0 / value.real if value.real != 0.0 else np.inf,
                     tuple((self.states[j], float(share[j, i])) for j in order),
                 )
@@ -103,12 +110,32 @@ class LinearModel(Shown):
     def __repr__(self) -> str:
         lines = [f"LinearModel: {len(self.states)} states, inputs {', '.join(self.inputs)}"]
         lines.append(f"  {'eigenvalue [1/s]':<22}{'frequency [rad/s]':>18}{'damping':>9}  states")
-        for mode in self.modes():
+        modes = self.modes()
+        moving = [mode for mode in modes if mode.frequency > 0.0]
+        still = modes[len(moving) :]
+        for mode in (*moving, *still[:1]):
             value = mode.eigenvalue
             text = f"{value.real:+.3f}" + (f" +/- {value.imag:.3f}j" if value.imag > 0.0 else "")
+            if mode.frequency == 0.0:
+                text = "0" + (f" ({len(still)} times)" if len(still) > 1 else "")
             taking_part = ", ".join(name for name, share in mode.states if share > 0.1)
             lines.append(f"  {text:<22}{mode.frequency:>18.3f}{mode.damping:>9.3f}  {taking_part}")
         return "\n".join(lines)
+
+
+def _integrating(A: Array, states: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """States in the eigenvalues at the origin, in their order, with the share of each that lies in that subspace.
+
+    Single eigenvectors of a repeated eigenvalue are of no meaning: rounding chooses them. The spectral projector on all
+    of them (Golub and Van Loan 2013, sec. 7.6.3) is unique.
+    """
+    T, Z, n = schur(A, output="complex", sort=lambda value: abs(value) <= _ORIGIN)
+    if n == 0:
+        return ()
+    coupling = solve_sylvester(T[:n, :n], -T[n:, n:], -T[:n, n:])
+    projector = Z[:, :n] @ np.hstack([np.eye(n), -coupling]) @ Z.conj().T
+    share = np.abs(np.diag(projector))
+    return tuple((name, float(value)) for name, value in zip(states, share, strict=True) if value > _TAKES_PART)
 
 
 def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:

@@ -37,6 +37,9 @@ _ANGULAR_ACCELERATIONS = slice(9, 12)
 _STEPS = 60
 _MOVING = np.array([True, True, True, False, True, False])
 """What of a course is motion: velocities and the rate of turn."""
+_ROUNDING = 1e-13
+"""Attitudes, inputs and inner states below it are what rounding leaves of zero, and differ between processors."""
+
 _TOLERANCE = 1e-10
 """m/s^2 and rad/s^2 (and inner rates): far below any sensor, far above rounding."""
 
@@ -163,6 +166,7 @@ def trim(
     share = 1.0
     if not _at_rest(value) and near is None:
         z, value, share = _on_the_way(vehicle, residual)
+    z = np.where(np.abs(z) < _ROUNDING, 0.0, z)
     state, inputs = (np.asarray(part) for part in assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
     where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"

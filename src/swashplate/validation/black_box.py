@@ -8,7 +8,7 @@ given, the motion up to the start and the inputs up to the target, and nothing e
 * the inputs after the target are added. What an aircraft did cannot come from them, so if they help, they tell the
   motion backwards, as a controller's answers do, and the inputs before the target do so too. Such a ceiling is refused.
 
-The same regression without any input after the start cannot leak: it is what the past alone foretells.
+The same regression without any input after the start cannot leak: it is what the past alone predicts.
 
 The strength of the ridge is the one that predicts best (Hoerl and Kennard 1970), by channel: a ceiling may come out a
 little too high, and is never low for a badly chosen number.

@@ -103,10 +103,10 @@ class Floor:
         if not math.isfinite(self.seen):
             return ""
         if math.isfinite(self.past) and self.past - self.fit > _CLOSE:
-            return f"The model is poor: the past alone foretells {_percent(self.past)} %. "
+            return f"The model is poor: the past alone predicts {_percent(self.past)} %. "
         if self.seen - self.fit <= _CLOSE:
             return f"Even a black box that reads a controller's answers reaches {_percent(self.seen)} %. "
-        alone = f"The past alone foretells {_percent(self.past)} %, a" if math.isfinite(self.past) else "A"
+        alone = f"The past alone predicts {_percent(self.past)} %, a" if math.isfinite(self.past) else "A"
         return f"{alone} black box that reads a controller's answers {_percent(self.seen)} %. "
 
 

@@ -43,7 +43,7 @@ and Remple 2012): J per point is 20 [(8.69 Re)^2 + 0.01745 (57.3 Im)^2] of it, i
 
 UNSEEN = 1.0
 """Errors up to this many times the noise refute no model: a controller may have felt more of the gusts than the record
-shows, and then the controls foretell a part of the noise, whatever the model."""
+shows, and then the controls predict a part of the noise, whatever the model."""
 
 HEARD = 2.0
 """What the controls do counts where its power is this many times the noise's largest."""
@@ -59,7 +59,7 @@ class Finding:
     Attributes:
         source, output, band_hz: where.
         error: of the model's predictions. controls: what a model without any control would leave beyond the noise.
-        allowed: noise, what controls may foretell of it, and the larger of the model's own bounds and `MATERIAL` of
+        allowed: noise, what controls may predict of it, and the larger of the model's own bounds and `MATERIAL` of
             `controls`.
         heard: whether the controls stand out of the noise there.
         admitted: whether the record moves the controls by itself, and tells its noise there; others refute nobody.

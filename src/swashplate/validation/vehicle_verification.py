@@ -54,7 +54,7 @@ def verify_vehicle(
     shared = tuple(n for n in (outputs or known) if n in known and all(n in f for f in flights))
     if not shared:
         raise FlightError(
-            f"flight and vehicle share no output; '{vehicle.name}' foretells {', '.join(known)}.",
+            f"flight and vehicle share no output; '{vehicle.name}' predicts {', '.join(known)}.",
             where=flights[0].provenance.source or None,
             hint="Map the flight's columns to these names.",
         )

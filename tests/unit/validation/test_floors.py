@@ -1,4 +1,4 @@
-"""What a score stands beside: the black box finds what can be foretold and is caught where it cheats."""
+"""What a score stands beside: the black box finds what can be predicted and is caught where it cheats."""
 
 from __future__ import annotations
 

@@ -78,13 +78,24 @@ class Border(NamedTuple):
     v: Array
 
 
+_SINGULAR = 1e-13
+"""Singular bands left up to 4e-17 here, regular ones 0.25 and more; rounding grows with a band's length."""
+
+
 def factor(band: Array, damping: float = 0.0) -> Array | None:
-    """Cholesky factor of a band, its diagonal enlarged by a share; None where it is not positive definite."""
+    """Cholesky factor of a band, its diagonal enlarged by a share; None where it is not positive definite.
+
+    Rounding may leave a singular band with tiny pivots instead of an error: a squared pivot below `_SINGULAR` of its
+    diagonal is no information either (asked without damping, which makes every band regular).
+    """
     raised = band if damping == 0.0 else np.concatenate([band[:1] * (1.0 + damping), band[1:]])
     try:
-        return np.asarray(cholesky_banded(raised, lower=True, check_finite=False))
+        factored = np.asarray(cholesky_banded(raised, lower=True, check_finite=False))
     except LinAlgError:
         return None
+    if damping == 0.0 and np.any(factored[0] ** 2 < _SINGULAR * band[0]):
+        return None
+    return factored
 
 
 def solved(factored: Array, right: Array) -> Array:

@@ -73,14 +73,14 @@ class Ahead:
     steps: tuple[int, ...]
 
 
-class Foreteller(Protocol):
+class PredictsAhead(Protocol):
     """A likelihood whose filter can run ahead of its record."""
 
     @property
     def row(self) -> Row: ...
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less foretold, (starts, horizons, outputs)."""
+        """Per record, measured less predicted, (starts, horizons, outputs)."""
         ...
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
@@ -106,7 +106,7 @@ class MultiStepErrors:
     """
 
     def __init__(
-        self, base: Foreteller, row: Array, pieces: Sequence[Record], *, horizon: Horizon, settling: float = 0.0
+        self, base: PredictsAhead, row: Array, pieces: Sequence[Record], *, horizon: Horizon, settling: float = 0.0
     ) -> None:
         dt = pieces[0].dt
         steps = horizon.samples(dt)

@@ -59,7 +59,7 @@ class RecordLikelihood(Likelihood, Protocol):
         ...
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
-        """Every record beside what the model foretells."""
+        """Every record beside what the model predicts."""
         ...
 
 

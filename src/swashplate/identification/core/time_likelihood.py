@@ -98,7 +98,7 @@ class TimeErrors(ABC):
 
     @abstractmethod
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
 
     @abstractmethod
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
@@ -152,7 +152,7 @@ class TimeErrors(ABC):
         )
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
-        """Every record beside what the model foretells: from its inputs alone, or one sample ahead with a gain."""
+        """Every record beside what the model predicts: from its inputs alone, or one sample ahead with a gain."""
         sigma = np.sqrt(np.diag(self.covariance))
         return tuple(
             Comparison(

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eig
 
 from swashplate.arrays import Array, Complex
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -65,8 +66,11 @@ def mode_accuracy(
         lowest: fitted frequency [rad/s].
     """
     a = model.explicit()[0]
-    values, right = np.linalg.eig(a)
-    left = np.linalg.pinv(right)
+    # Left eigenvectors not by inversion: two integrators in series make `right` singular.
+    values, left, right = eig(a, left=True)
+    left = left.conj().T
+    length = np.sum(left.T * right, axis=0)
+    left = left / np.where(np.abs(length) > np.finfo(float).tiny, length, 1.0)[:, None]
     moved = _moved(model, tuple(bounds), left, right)
     told = np.isfinite(np.array(list(bounds.values())))
     size = np.where(told, list(bounds.values()), 0.0)

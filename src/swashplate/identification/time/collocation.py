@@ -29,11 +29,11 @@ from swashplate.identification.core.sources import sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.time.collocation_equations import ForetellingStructure, ForetellingVehicle
+from swashplate.identification.time.collocation_equations import StructurePredictor, VehiclePredictor
 from swashplate.identification.time.collocation_likelihood import CollocationErrors
 from swashplate.identification.time.linear_time_fit import linear_records, linear_result
 from swashplate.identification.time.prediction_error import parameter_entries
-from swashplate.identification.time.vehicle_likelihood import check_foretold, driving_rows
+from swashplate.identification.time.vehicle_likelihood import check_predicted, driving_rows
 from swashplate.identification.time.vehicle_time_fit import check_biases, outputs_of, vehicle_result
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves
@@ -83,7 +83,7 @@ _METHOD = "collocation"
 def _of_vehicle(vehicle: Vehicle, flights: Sequence[Flight], question: Question) -> Result[Vehicle, TimeDetails]:
     began = time.perf_counter()
     outputs = outputs_of(vehicle, flights, question)
-    check_foretold(vehicle, outputs)
+    check_predicted(vehicle, outputs)
     check_biases(question.biases, outputs)
     table = parameterize(
         vehicle,
@@ -133,7 +133,7 @@ def vehicle_errors(
     around = environment_of(vehicle, environment)
     constants = [getattr(around, name) for name in CONSTANTS]
     return CollocationErrors(
-        ForetellingVehicle(equations_of(vehicle), table.layout, outputs),
+        VehiclePredictor(equations_of(vehicle), table.layout, outputs),
         parameter_entries(table),
         states=vehicle.state_names,
         outputs=outputs,
@@ -163,7 +163,7 @@ def _of_structure(
     parameters = [(n, model.parameters[n]) for n in model.free]
     elements = tuple((e.matrix, e.row, e.column, e.expression) for e in model.elements)
     likelihood = CollocationErrors(
-        ForetellingStructure((elements, model.free, tuple(model.numbers().items())), model, outputs, delays),
+        StructurePredictor((elements, model.free, tuple(model.numbers().items())), model, outputs, delays),
         [Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper) for n, p in parameters],
         states=model.states,
         outputs=outputs,

@@ -35,7 +35,7 @@ Seen = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
 """From a state, its rate and what drives it."""
 
 
-class Foretelling(Protocol):
+class Predictor(Protocol):
     """A model's equations as hashable functions of rows."""
 
     def driving(self, given: Numbers, numbers: jax.Array) -> jax.Array:
@@ -48,7 +48,7 @@ class Foretelling(Protocol):
 
 
 @dataclass(frozen=True)
-class ForetellingVehicle:
+class VehiclePredictor:
     """Any vehicle's equations, their free parameters first in the row."""
 
     equations: Equations
@@ -78,7 +78,7 @@ class ForetellingVehicle:
 
 
 @dataclass(frozen=True)
-class ForetellingStructure:
+class StructurePredictor:
     """A state-space model, its free parameters first in the row; inputs are late by their delays."""
 
     key: Hashable
@@ -125,7 +125,7 @@ NOWHERE = -1
 class CollocationPlan:
     """What compiled code depends on; places are those in the row."""
 
-    model: Foretelling
+    model: Predictor
     dt: float
     shift: tuple[int, ...]
     bias: tuple[int, ...]

@@ -38,9 +38,9 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.time.collocation_equations import (
     NOWHERE,
     CollocationPlan,
-    Foretelling,
     Innovations,
     Numbers,
+    Predictor,
     chain_at,
     innovations_along,
     innovations_moved,
@@ -84,7 +84,7 @@ class CollocationErrors:
     """The likelihood of records with the states integrated out; the row has parameters, constants and noise.
 
     Args:
-        foretells: the model. states, outputs: names.
+        predicts: the model. states, outputs: names.
         entries: of the model's free parameters. records: what was measured.
         given: numbers that stay, beside each record's own. rest: where states are that are not measured.
         driving: of every record, (n, n_driving).
@@ -97,7 +97,7 @@ class CollocationErrors:
 
     def __init__(
         self,
-        foretells: Foretelling,
+        predicts: Predictor,
         entries: Sequence[Entry],
         *,
         states: Sequence[str],
@@ -127,7 +127,7 @@ class CollocationErrors:
         self._row = Row(tuple(made))
         self._plans = tuple(
             CollocationPlan(
-                foretells,
+                predicts,
                 round(record.dt, 9),
                 tuple(place.get(f"shift {s}[{k}]", NOWHERE) for s in states),
                 tuple(place.get(f"bias {o}[{k}]", NOWHERE) for o in outputs),
@@ -375,7 +375,7 @@ class CollocationErrors:
         return np.asarray(errors.T @ errors / len(errors))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
-        """Every record beside what is foretold of each sample from those before."""
+        """Every record beside what is predicted of each sample from those before."""
         return tuple(
             Comparison(
                 record=record,

@@ -2,7 +2,7 @@
 
 A command that past motion explains carries no information of its own: whatever relates it to the motion is the
 controller, and a fit of the aircraft to it may well find minus the controller's inverse (Ljung 1999, ch. 13). A slow
-sweep is explained by past motion too, because it can be foretold; but what the aircraft does comes after the command,
+sweep is explained by past motion too, because it can be predicted; but what the aircraft does comes after the command,
 so the motion that follows then explains it better still, which it does not where the command is an answer.
 """
 

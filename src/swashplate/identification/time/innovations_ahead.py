@@ -23,7 +23,7 @@ from swashplate.simulation.compilation import QUICK_TO_COMPILE
 def _traced(
     plan: FilterPlan, steps: tuple[int, ...], data: Mapping[str, jax.Array], row: jax.Array, starts: jax.Array
 ) -> Any:
-    """Measured less foretold after `steps` samples from each start, (records, starts, horizons, outputs)."""
+    """Measured less predicted after `steps` samples from each start, (records, starts, horizons, outputs)."""
     parameters, nuisances, noise = unpack(plan, data, row)
 
     def one(
@@ -51,8 +51,8 @@ def _traced(
         reaching = commands(plan.model.vehicle, plan.model.dt, u, nuisance)
 
         def run(start: jax.Array) -> Any:
-            foretold = _foretold(plan, steps, (states, reaching, voltage), parameters, noise, nuisance, start)
-            return y[start + jnp.array(steps)] - foretold
+            predicted = _predicted(plan, steps, (states, reaching, voltage), parameters, noise, nuisance, start)
+            return y[start + jnp.array(steps)] - predicted
 
         return jax.vmap(run)(starts)
 
@@ -60,7 +60,7 @@ def _traced(
     return jax.vmap(one)(*own, starts, nuisances)
 
 
-def _foretold(
+def _predicted(
     plan: FilterPlan,
     steps: tuple[int, ...],
     along: tuple[FilterState, jax.Array, jax.Array],
@@ -69,7 +69,7 @@ def _foretold(
     nuisance: Nuisance,
     start: jax.Array,
 ) -> Any:
-    """What is foretold to be measured after each of `steps` samples from one start (horizons, outputs)."""
+    """What is predicted to be measured after each of `steps` samples from one start (horizons, outputs)."""
     model, (states, reaching, voltage) = plan.model, along
 
     def advance(x: jax.Array, acting: jax.Array, k: jax.Array) -> Any:

@@ -75,7 +75,7 @@ class OutputErrors(TimeErrors):
         return errors[0].real, errors[1:].imag / STEP * self.row.scale[:, None, None]
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
         return [part[0].real for part in self._ahead(np.asarray(row * self.row.scale)[None], ahead)]
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
@@ -189,12 +189,12 @@ def _recursion() -> Any:
 
 @cache
 def _states() -> Any:
-    """The states foretold for the sample after each, (n_batch, n_t, n_states), compiled; arguments as before."""
+    """The states predicted for the sample after each, (n_batch, n_t, n_states), compiled; arguments as before."""
     return _compiled(lambda errors, states: states)
 
 
 def _compiled(chosen: Callable[[jax.Array, jax.Array], jax.Array]) -> Any:
-    """The innovations' form along a record for a batch of models: what is chosen of errors and foretold states."""
+    """The innovations' form along a record for a batch of models: what is chosen of errors and predicted states."""
     enable_double_precision()
 
     def one(x: Any, phi: Any, c: Any, gain: Any, measured: Any, drive: Any) -> Any:

@@ -176,7 +176,7 @@ class PredictionError:
         return innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
         errors = innovations_ahead.errors_ahead(
             self._plan, ahead.steps, self._data, jnp.asarray(row), _side_by_side(ahead)
         )

@@ -48,12 +48,12 @@ FORCES = ("ax", "ay", "az")
 
 
 def measurable(vehicle: Vehicle) -> tuple[str, ...]:
-    """Names of the channels that a vehicle's equations foretell: its states, their rates and the specific force."""
+    """Names of the channels that a vehicle's equations predict: its states, their rates and the specific force."""
     return (*vehicle.state_names, *(f"{name}dot" for name in vehicle.state_names), *FORCES)
 
 
-def check_foretold(vehicle: Vehicle, outputs: Sequence[str]) -> None:
-    """That a vehicle's equations foretell some channels.
+def check_predicted(vehicle: Vehicle, outputs: Sequence[str]) -> None:
+    """That a vehicle's equations predict some channels.
 
     Raises:
         IdentificationError: naming those that they do not, and those that they do.
@@ -62,7 +62,7 @@ def check_foretold(vehicle: Vehicle, outputs: Sequence[str]) -> None:
     strange = [name for name in outputs if name not in known]
     if strange:
         raise IdentificationError(
-            f"'{vehicle.name}' does not foretell it.",
+            f"'{vehicle.name}' does not predict it.",
             channel=", ".join(strange),
             hint=f"Its outputs may be {', '.join(known)}.",
         )
@@ -80,7 +80,7 @@ class VehicleErrors(TimeErrors):
         shifts, biases: see `TimeErrors`.
 
     Raises:
-        IdentificationError: an output that the equations do not foretell.
+        IdentificationError: an output that the equations do not predict.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class VehicleErrors(TimeErrors):
         biases: Sequence[str],
     ) -> None:
         vehicle, outputs = table.vehicle, records[0].output_names
-        check_foretold(vehicle, outputs)
+        check_predicted(vehicle, outputs)
         self.table, self.method = table, method
         super().__init__(
             parameter_entries(table),
@@ -157,7 +157,7 @@ class VehicleErrors(TimeErrors):
         )
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        """Per record, measured less foretold from the filter's states, (starts, horizons, outputs)."""
+        """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
         numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
         return [
             np.asarray(_ahead(p, ahead.steps, given, d, jnp.asarray(starts, dtype=int), numbers))
@@ -214,7 +214,7 @@ class _Filter:
     along: tuple[Any, Any]
     correct: Correct
     predict: Predict
-    foretold: Callable[[Any, Any], Any]
+    expected: Callable[[Any, Any], Any]
 
 
 def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.Array], numbers: jax.Array) -> _Filter:
@@ -233,15 +233,15 @@ def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.
     def rates(x: Any, w: Any) -> Any:
         return equations(x, w, p) + shift
 
-    def foretold(x: Any, w: Any) -> Any:
+    def expected(x: Any, w: Any) -> Any:
         every = jnp.concatenate([x, rates(x, w), force(x, w, p)])
         return every[jnp.array([measurable(vehicle).index(name) for name in plan.outputs])] + bias
 
     driving, start = data["driving"], at(plan.start)
-    gain = _gain(plan, at, given["sensors"], (rates, foretold), (start, driving[0]))
+    gain = _gain(plan, at, given["sensors"], (rates, expected), (start, driving[0]))
 
     def correct(x: Any, measured: Any, now: tuple[Any, Any]) -> tuple[Any, Any]:
-        error = measured - foretold(x, now[0])
+        error = measured - expected(x, now[0])
         # As a sum of products: XLA makes one function of a loop that calls no matrix product.
         return x if gain is None else x + jnp.sum(gain * error, axis=1), error
 
@@ -250,11 +250,11 @@ def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.
         return rk4_step(rates, x, lambda share: w + share * (after - w), plan.dt, looped=False)
 
     after = jnp.concatenate([driving[1:], driving[-1:]])
-    return _Filter(start, (driving, after), correct, predict, foretold)
+    return _Filter(start, (driving, after), correct, predict, expected)
 
 
 def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
-    """Errors of one record (n, n_outputs): measured less foretold from the samples before (output error: from none)."""
+    """Errors of one record (n, n_outputs): measured less predicted from earlier samples (output error: from none)."""
     f = _filter(plan, given, data, numbers)
     return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[0]
 
@@ -267,14 +267,14 @@ def _traced_ahead(
     starts: jax.Array,
     numbers: jax.Array,
 ) -> Any:
-    """Measured less foretold, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
+    """Measured less predicted, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
     f = _filter(plan, given, data, numbers)
     states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
 
     def run(start: jax.Array) -> Any:
         def sample(x: jax.Array, k: jax.Array) -> tuple[Any, Any]:
             following = f.predict(x, jax.tree.map(lambda rows: rows[k], f.along))
-            return following, f.foretold(following, f.along[1][k])
+            return following, f.expected(following, f.along[1][k])
 
         told = jax.lax.scan(sample, states[start], start + jnp.arange(steps[-1]))[1]
         return data["outputs"][start + jnp.array(steps)] - told[jnp.array(steps) - 1]

@@ -164,7 +164,7 @@ def vehicle_result(
 
 
 def outputs_of(model: Vehicle, flights: Sequence[Flight], question: Question) -> tuple[str, ...]:
-    """The channels that were asked for; where none were, all that the flights have and the equations foretell.
+    """The channels that were asked for; where none were, all that the flights have and the equations predict.
 
     Raises:
         IdentificationError: where there are none.
@@ -173,7 +173,7 @@ def outputs_of(model: Vehicle, flights: Sequence[Flight], question: Question) ->
     outputs = shared if question.outputs is None else question.outputs
     if not outputs:
         raise IdentificationError(
-            f"the flights have nothing that '{model.name}' foretells: {', '.join(measurable(model))}.",
+            f"the flights have nothing that '{model.name}' predicts: {', '.join(measurable(model))}.",
             channel="outputs",
         )
     return tuple(outputs)

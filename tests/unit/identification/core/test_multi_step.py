@@ -118,7 +118,7 @@ def test_the_search_makes_errors_ahead_smaller_and_backs_out_of_divergence() -> 
     assert criterion.cost(wild) == np.inf
 
 
-def test_what_cannot_be_foretold_is_refused() -> None:
+def test_what_cannot_be_predicted_is_refused() -> None:
     flown, free = gusty(), list(TRUTH)
     with pytest.raises(IdentificationError, match="output error has no filter"):
         fit_vehicle(rolling(), flown, free=free, outputs=["p"], method="output-error", horizon=AHEAD)

@@ -124,7 +124,7 @@ def test_what_cannot_be_estimated_is_said() -> None:
     dead = replace(idle, derivatives=lambda s, u, p, env, xp: Tilt(s.q, p.Md * u.stick + 0.0 * p.Mt))
     with pytest.raises(IdentificationError, match=r"Mt: leaves no trace.*another value than zero"):
         sp.identify(dead, tilted, free=["Mt", "Md"], method="collocation", outputs=("theta", "q"))
-    with pytest.raises(IdentificationError, match="does not foretell it"):
+    with pytest.raises(IdentificationError, match="does not predict it"):
         sp.identify(rolling(), flown, outputs=("p", "stick"), **asked)
     with pytest.raises(IdentificationError, match="says itself what is free"):
         sp.identify(parse(SAME), flown, free=["Lb"], method="collocation")

@@ -90,7 +90,7 @@ def test_an_open_loop_input_is_not_called_an_answer() -> None:
     assert found.words.endswith("the motion after it explains more: the motion follows the command.")
 
 
-def test_a_slow_sweep_is_not_called_an_answer_though_it_can_be_foretold() -> None:
+def test_a_slow_sweep_is_not_called_an_answer_though_it_can_be_predicted() -> None:
     time = np.arange(N) / RATE
     sweep = 0.1 * chirp(time, 0.5, SECONDS, 8.0, phi=-90)
     noise = np.random.default_rng(10).standard_normal((2, N))

@@ -36,7 +36,7 @@ def test_what_cannot_be_fitted_is_said() -> None:
     flown = flight(columns)
     with pytest.raises(IdentificationError, match="is no method"):
         fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, method="magic")
-    with pytest.raises(IdentificationError, match="does not foretell it"):
+    with pytest.raises(IdentificationError, match="does not predict it"):
         fit_vehicle(hfb320(), flown, free=list(START), outputs=("V", "beta"))
     with pytest.raises(IdentificationError, match="is none of the outputs"):
         fit_vehicle(hfb320(), flown, free=list(START), outputs=OUTPUTS, biases=["ay"])
