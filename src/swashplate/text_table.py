@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 import textwrap
@@ -24,10 +23,7 @@ Numbered = list[tuple[int, int]]
 
 
 def screen_width() -> int | None:
-    """Columns that there are: what COLUMNS says, else the terminal's; None for a pipe or a file: any line fits."""
-    told = os.environ.get("COLUMNS", "")
-    if told.isdecimal() and int(told) > 0:
-        return int(told)
+    """Columns of the terminal; None for a pipe or a file, where any line fits."""
     try:
         return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     except ValueError:  # a closed stream

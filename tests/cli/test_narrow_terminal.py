@@ -9,7 +9,9 @@ import pytest
 from commands import swash
 from test_frequency_verbs import log
 
+from swashplate import text_table
 from swashplate.cli import console
+from swashplate.flights import inspect
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +38,9 @@ def words(text: str) -> set[str]:
 )
 def test_no_number_is_broken_at_80_columns(verb: tuple[str, ...], flown: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = [str(flown) if word == "FLOWN" else word for word in verb]
-    monkeypatch.setenv("COLUMNS", "400")
     wide = swash(*asked)
-    monkeypatch.setenv("COLUMNS", "80")
+    for module in (console, text_table, inspect):
+        monkeypatch.setattr(module, "screen_width", lambda: 80)
     narrow = swash(*asked)
     assert narrow.code == wide.code == 0, narrow.err
     tables = [

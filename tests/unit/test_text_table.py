@@ -40,9 +40,10 @@ def test_columns_that_say_nothing_go_first() -> None:
     assert table.text(20) == "name  value\na       1.0\nb       2.0"
 
 
-def test_a_pipe_takes_any_line_and_columns_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("COLUMNS", raising=False)
-    assert screen_width() is None
+def test_a_pipe_takes_any_line_and_a_terminal_has_a_width(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "30")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: False)
+    assert screen_width() is None
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     assert screen_width() == 30
     assert max(map(len, text_table(HEAD[:5], [row[:5] for row in ROWS], left=(0, 1)).split("\n"))) <= 30
