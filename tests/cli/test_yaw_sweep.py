@@ -70,4 +70,4 @@ def test_from_a_yaw_sweep_to_gains(tmp_path: Path) -> None:
     at = yaw["flown_margins"]["omega_180"][0]
     turned = at * found["tau_yaw"] + np.arctan(at / (40.0 * np.pi)) + np.arctan(at / DAMPING) + np.arctan(0.1 / at)
     assert np.degrees(turned) == pytest.approx(180.0, abs=1.0)
-    assert "no feed-forward" in yaw["words"]
+    assert yaw["parameters"]["ATC_RAT_YAW_FF"] == pytest.approx(DAMPING / EFFECT, rel=0.06)

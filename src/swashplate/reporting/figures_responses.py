@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.flights.schema import channel
 from swashplate.identification.frequency.reading_accuracy import Answers
 from swashplate.identification.frequency.unnoticeable_dynamics import Mismatch, envelopes
@@ -168,6 +169,43 @@ def excitation(responses: FrequencyResponse) -> Figure:
         alt=f"Input spectra of {', '.join(responses.inputs)}"
         + (" and the coherence between them." if several else "."),
         keys=tuple(keys),
+    )
+
+
+def rate_steps_figure(suggestion: Suggestion) -> Figure | None:
+    """The rate after a step of its demand, and after a disturbance of the command, with both sets of gains."""
+    answers = suggestion.steps()
+    if not answers:
+        return None
+    layout = stacked(["rate / demand [1]", "disturbed rate [deg/s]"], height=150)
+    keys = {"suggested": Key("suggested", MODEL), "flown": Key("flown", FLIGHT, "dash")}
+    styles = {"suggested": "solid", "flown": "dash"}
+    traces = []
+    for which, found in answers.items():
+        key = keys[which]
+        both = (found.step, np.degrees(found.disturbance))
+        traces += [
+            line(
+                found.time,
+                values,
+                name=which,
+                color=key.color,
+                dash=styles[which],
+                axis=number,
+            )
+            for number, values in zip(("", "2"), both, strict=True)
+        ]
+    ends = next(iter(answers.values())).time[[0, -1]]
+    traces.append(line(ends, [1.0, 1.0], name="demand", color=PUBLISHED, dash="dot"))
+    wild = [which for which, found in answers.items() if not found.stable]
+    return Figure(
+        identifier=f"rate-steps-{suggestion.axis.lower()}",
+        spec={"data": traces, "layout": layout},
+        height=int(layout["height"]),
+        caption=f"{suggestion.axis}: the rate after a sudden step of its demand, and after a step of 0.1 of the "
+        "command, on the model at 400 Hz." + (f" Unstable: {', '.join(wild)}." if wild else ""),
+        alt="Time histories of the rate with the suggested and the flown gains.",
+        keys=(*(keys[which] for which in answers), Key("demand", PUBLISHED, "dot")),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from swashplate.arrays import Complex
-from swashplate.control.analysis.ardupilot_gains import PEAK, Suggestion
+from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.time_fit import TimeDetails
 from swashplate.identification.frequency.handling import Handling
@@ -24,7 +24,7 @@ from swashplate.identification.responses.frequency_response import TWO_PI, Frequ
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures.bode_matrix import of_fit, of_responses
 from swashplate.reporting.figures_fit import correlation_matrix, cost_history, eigenvalues
-from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure
+from swashplate.reporting.figures_responses import bode, excitation, mismatch_figure, rate_steps_figure
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.versions import versions
@@ -307,34 +307,33 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         for g in gains
         for name in g.parameters or g.flown
     )
-    judged = [
+    judged = tuple(
         (
             Cell(g.axis),
-            Cell(which),
-            *(Cell(repr(r).replace("+-", "±"), number=True) for r in (m.crossover, m.phase_margin, m.gain_margin)),
-            Cell(f"{peak:.2f}", number=True, tone="bad" if peak > 2.0 * PEAK else "plain"),
+            Cell(what),
+            *(Cell(text.replace("+-", "±"), number=True) for text in (suggested, flown)),
         )
         for g in gains
-        for which, m, peak in (("suggested", g.margins, g.peak), ("flown", g.flown_margins, g.flown_peak))
-        if np.isfinite(peak)
-    ]
-    heads = ("axis", "gains", "crossover [rad/s]", "phase margin [deg]", "gain margin [dB]", "peak sensitivity")
+        if np.isfinite(g.peak) or np.isfinite(g.flown_peak)
+        for what, suggested, flown in g.table()
+    )
+    said = dict.fromkeys(g.words for g in gains)
     return Section(
         "gains",
         "Suggested rate-loop gains (ArduPilot)",
         (
             Table("Gains", ("parameter", "suggested", "flown"), rows),
             Table(
-                "Margins of the rate loop on the identified model",
-                heads,
-                tuple(judged),
-                note="The least of each where the loop crosses several times. ± is what the Cramér-Rao bounds of the "
-                "model's parameters make of it. FLTE and FLTD are filters of the controller, and count.",
+                "The rate loop on the identified model",
+                ("axis", "", "suggested", "flown"),
+                judged,
+                note="Margins are the least of each where the loop crosses several times; ± is what the Cramér-Rao "
+                "bounds of the model's parameters make of them. FLTT, FLTE and FLTD are filters of the controller, and "
+                "count. The step of the demand is a sudden one; ArduPilot's own shaping is not in it.",
             ),
-            *(
-                Text(f"{', '.join(g.axis for g in gains if g.words == words)}: {words}", tone="caution")
-                for words in dict.fromkeys(g.words for g in gains)
-            ),
+            *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
+            *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),
+            *(Text(f"{', '.join(g.axis for g in gains if g.words == w)}: {w}", tone="caution") for w in said),
         ),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from swashplate.control.lqg.design import design
 from swashplate.filtering.batched_matrices import Stack, StackMatrices
@@ -43,6 +44,7 @@ def test_slopes_of_many_are_those_of_each() -> None:
     np.testing.assert_allclose(slopes.data, expected, atol=1e-15)
 
 
+@pytest.mark.proof
 def test_a_batch_flies_as_one_does() -> None:
     """The same seeds, one after the other, with noise, offsets, late readings and late commands."""
     vehicle = linear_vehicle(structure("thirteen_state"))

@@ -77,6 +77,7 @@ def test_constant_gains_are_the_filters_after_a_long_time() -> None:
     assert np.max(np.abs(np.asarray(mean) - estimate.mean)[:, 0] / sigma) < 1e-3
 
 
+@pytest.mark.proof
 def test_with_constant_gains_it_is_as_sure_as_it_may_be(tmp_path: Path) -> None:
     controller = with_steady_gain(made())
     found = trial(controller.vehicle, controller, duration=12.0, seeds=range(2), gusts=INDOOR)

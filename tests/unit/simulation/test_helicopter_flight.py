@@ -103,6 +103,7 @@ def _low(flight: Flight) -> float:
     return float(flight.values("z").max())
 
 
+@pytest.mark.proof
 def test_spin_up_on_the_skids_take_off_and_landing() -> None:
     """From rest: the rotor comes up to speed, collective lifts it off, and a slow descent puts it down again."""
     rate, depth = 500.0, RAPTOR.card.values()["skid_depth"]

@@ -76,6 +76,7 @@ def test_attitude_through_the_vertical_is_what_the_gyros_add_up_to(start: float)
     assert np.degrees(away.magnitude()) < 0.01
 
 
+@pytest.mark.proof
 def test_an_autopilot_that_flips_is_answered_with_numbers_until_the_ground_and_can_begin_again(tmp_path: Path) -> None:
     at = bench("raptor50", record=tmp_path / "flip.nc", record_rate=100.0)
     at.send(servo_packet(200, 0, RUNNING))

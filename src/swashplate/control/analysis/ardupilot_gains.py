@@ -1,88 +1,164 @@
-"""Rate-loop feed-forward and gains for ArduPilot's helicopter code, from an identified model, with their margins.
+"""Rate-loop feed-forward and gains for ArduPilot's helicopter code, from an identified model, and what they buy.
 
-ArduPilot's rate controller gives the mixer command u = FF target + P e + I int e + D de/dt, with the rate error e in
-rad/s behind a first-order filter (FLTE), and one more on the derivative (FLTD): parameters ATC_RAT_*_FF, _P, _I, _D,
-_FLTE, _FLTD. The filters belong to the loop, and so to the suggestion.
+The parameters are ATC_RAT_*_FF, _P, _I, _D and the filters _FLTT, _FLTE, _FLTD (`rate_loop`), which belong to the loop,
+and so to the suggestion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
-from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
-from swashplate.identification.frequency.handling_readings import model_margins
-from swashplate.identification.frequency.reading_accuracy import Fitted, response_of
+from swashplate.control.analysis.rate_loop import (
+    HALF_POWER,
+    LOWEST,
+    NO_FIGURES,
+    SEEN,
+    LoopFigures,
+    RateLoop,
+    couplings,
+    short,
+)
+from swashplate.control.analysis.rate_loop_steps import RateSteps, rate_loop_steps
+from swashplate.identification.frequency.handling import ResponseMargins
+from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
 
 PHASE_MARGIN, GAIN_MARGIN, PEAK = 45.0, 6.0, 2.0
 """Degrees, decibels and largest sensitivity that every suggestion keeps."""
+OVERSHOOT = 0.3
+"""Of a demand that steps at once; the filter of the demand (FLTT) is the fastest that keeps it."""
 
 AXES = {"RLL": ("p", "mixer_roll"), "PIT": ("q", "mixer_pitch"), "YAW": ("r", "mixer_yaw")}
 _FILTER = 20.0  # Hz: FLTE where the log does not say it, and FLTD of a suggestion
-_GAINS = ("FF", "P", "I", "D", "FLTE", "FLTD")
-_LOWEST = 2.0 * np.pi * 0.05
-_SEEN = np.geomspace(_LOWEST, 2.0 * np.pi * 40.0, 1500)
+_GAINS = ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD")
 _SLOW = 2.0 * np.pi * 0.2
 """rad/s: unstable modes below it are the attitude loop's or the pilot's, not the rate loop's."""
-_INTEGRATES = 2.0
-"""Gain at 0.1 Hz over that at 0.4 Hz from which a rate has no steady value to feed forward."""
+_SHARES = {
+    "P": np.geomspace(20.0, 0.02, 50),
+    "D": np.array([0.2, 0.1, 0.05, 0.0]),
+    "I": np.array([0.5, 0.25, 0.1]),
+}
+"""Shares: P of one over the steady rate, D of a tenth of P, I of the feed-forward or else of P / 5."""
+_NEARLY = 0.9
+_DEMAND = (20.0, 10.0, 7.0, 5.0, 3.0, 2.0)
+"""Hz: filters of the demand that are tried."""
 
 
 @dataclass(frozen=True, repr=False)
-class Suggestion:
+class Suggestion(Shown):
     """Gains of one axis.
 
     Attributes:
         axis: "RLL", "PIT" or "YAW".
         parameters: by ArduPilot's names; none where no gains keep the margins.
-        margins: of the broken rate loop with these gains, with what the fit's bounds make of them.
-        peak: largest closed-loop sensitivity |1/(1+L)|.
-        flown: the log's own gains (none where it does not hold them), and their margins and peak.
+        figures: what they are worth on the model, with what the fit's bounds make of the margins.
+        flown: the log's own gains (none where it does not hold them), and what they are worth.
+        buys, costs: what the suggestion betters and worsens, from flown to suggested.
         words: what it is, and what to do first.
+        loop: the axis' loop without gains.
     """
 
     axis: str
     parameters: dict[str, float]
-    margins: ResponseMargins
-    peak: float
-    words: str
+    figures_suggested: LoopFigures
     flown: dict[str, float]
-    flown_margins: ResponseMargins
-    flown_peak: float
+    figures_flown: LoopFigures
+    loop: RateLoop
+    words: str = ""
+    buys: tuple[str, ...] = ()
+    costs: tuple[str, ...] = ()
+
+    @property
+    def margins(self) -> ResponseMargins:
+        return self.figures_suggested.margins
+
+    @property
+    def flown_margins(self) -> ResponseMargins:
+        return self.figures_flown.margins
+
+    @property
+    def peak(self) -> float:
+        return self.figures_suggested.peak
+
+    @property
+    def flown_peak(self) -> float:
+        return self.figures_flown.peak
+
+    @property
+    def trade(self) -> tuple[str, ...]:
+        """What changes against the flown gains, in words; empty where none were logged or judged."""
+        if not (self.buys or self.costs):
+            return ()
+        return f"better than flown: {', '.join(self.buys) or 'nothing'}", f"worse: {', '.join(self.costs) or 'nothing'}"
+
+    def steps(self) -> dict[str, RateSteps]:
+        """How the loop answers a step of the demand and a disturbance: "suggested" and "flown", where there are any."""
+        structure, sets = self.loop.structure, {"suggested": self.parameters, "flown": self.flown}
+        if structure is None:
+            return {}
+        return {
+            which: rate_loop_steps(
+                structure, gains, rate=self.loop.rate, command=self.loop.command, gyro_filter=self.loop.gyro_filter
+            )
+            for which, gains in sets.items()
+            if {"P", "I", "D", "FF"} & set(short(gains))
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types."""
 
-        def read(m: ResponseMargins) -> dict[str, list[float]]:
-            return {name: [r.value, r.sigma] for name, r in vars(m).items()}
+        def read(f: LoopFigures) -> dict[str, Any]:
+            return {name: value for name, value in vars(f).items() if name != "margins"}
 
-        told = {"margins": read(self.margins), "flown_margins": read(self.flown_margins)}
-        return {**vars(self), **told}
+        def margins(f: LoopFigures) -> dict[str, list[float]]:
+            return {name: [r.value, r.sigma] for name, r in vars(f.margins).items()}
+
+        told: dict[str, Any] = {k: v for k, v in vars(self).items() if k != "loop"}
+        told |= {"figures_suggested": read(self.figures_suggested), "figures_flown": read(self.figures_flown)}
+        return told | {"margins": margins(self.figures_suggested), "flown_margins": margins(self.figures_flown)}
+
+    def table(self) -> list[tuple[str, str, str]]:
+        """What the loop is worth: a name with its unit, suggested, flown."""
+        told = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
+        coupled = any(np.isfinite(f.coupling) for f in (self.figures_suggested, self.figures_flown))
+        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*told, strict=True)][: 8 if coupled else 7]
 
     def __repr__(self) -> str:
-        words = f"{self.axis}: {_margin_words(self.margins, self.peak) if self.parameters else self.words}\n"
-        if self.flown:
-            words += f"  {'parameter':<18}{'suggested':>10}{'flown':>10}\n"
+        lines = [f"{self.axis}: {self.words}"]
+        if self.parameters or self.flown:
+            lines.append(f"  {'':<30}{'suggested':>18}{'flown':>18}")
         for name in self.parameters or self.flown:
-            cells = f"{self.parameters[name]:>10.4f}" if name in self.parameters else f"{'':>10}"
-            words += f"  {name:<18}{cells}" + (f"{self.flown[name]:>10.4f}" if name in self.flown else "") + "\n"
-        if self.flown:
-            words += f"  as flown: {_margin_words(self.flown_margins, self.flown_peak)}\n"
-        return f"{words}  {self.words}" if self.parameters else words.rstrip("\n")
+            cells = [f"{k[name]:.4f}" if name in k else "-" for k in (self.parameters, self.flown)]
+            lines.append(f"  {name:<30}{cells[0]:>18}{cells[1]:>18}")
+        if np.isfinite(self.peak) or np.isfinite(self.flown_peak):
+            lines += [f"  {name:<30}{cells[0]:>18}{cells[1]:>18}" for name, *cells in self.table()]
+        lines += [f"  {line}" for line in self.trade]
+        return "\n".join(lines)
 
 
-def _margin_words(m: ResponseMargins, peak: float) -> str:
-    where = f" at {m.omega_180.value:.3g} rad/s" if m.omega_180.value > 0.0 else ""
-    return (
-        f"phase margin {m.phase_margin!r} deg, gain margin {m.gain_margin!r} dB{where}, largest sensitivity {peak:.2f}"
-    )
+def _told(f: LoopFigures) -> list[tuple[str, str]]:
+    def number(value: float, scale: float = 1.0) -> str:
+        return f"{scale * value:.3g}" if np.isfinite(value) else "-"
+
+    return [
+        ("phase margin [deg]", f"{f.margins.phase_margin!r}"),
+        ("gain margin [dB]", f"{f.margins.gain_margin!r}"),
+        ("crossover [rad/s]", f"{f.margins.crossover!r}"),
+        ("largest sensitivity", number(f.peak)),
+        ("bandwidth [rad/s]", number(f.bandwidth)),
+        ("disturbance rejection [rad/s]", number(f.rejection)),
+        ("overshoot of a step [%]", number(f.overshoot, 100.0)),
+        ("coupling into other rates", number(f.coupling)),
+    ]
 
 
 def suggest_gains(
@@ -91,13 +167,14 @@ def suggest_gains(
     autopilot: Mapping[str, float] | None = None,
     sources: Mapping[str, str] | None = None,
 ) -> tuple[Suggestion, ...]:
-    """Feed-forward and gains for every axis whose rate and mixer command the model joins.
+    """Feed-forward and gains for every axis whose rate and mixer command the model joins, and what they buy.
 
     Feed-forward: one over the steady rate per command, so that a commanded rate is reached without an error; none where
-    the rate settles slowly or not at all (yaw without much damping). P, I and D: the largest P of a grid, with half the
-    feed-forward as I (a tenth of P without feed-forward) and D up to a fiftieth of P, that keeps 45 degrees, 6 dB and a
-    sensitivity peak below two at every crossing with the model's own delay and the controller's filters. Other axes are
-    left open: cross-coupling is not compensated.
+    the rate settles slowly or not at all (yaw without much damping). P, I and D: of a grid, those that reject
+    disturbances fastest among all that keep 45 degrees, 6 dB and a sensitivity peak below two at every crossing, with
+    the model's own delay and the controller's filters. The demand's filter: the fastest with which a step of the demand
+    overshoots by no more than 30 %, or least. Other axes are left open while an axis is judged; the coupling is that
+    with all loops closed. Where nothing that was tried is better than the flown gains, these are kept.
 
     Args:
         model: a model, or a fit, whose bounds the margins then get.
@@ -116,8 +193,8 @@ def suggest_gains(
             raw = behind.get(rates[0], rates[0]) != rate
             gyro = known.get("INS_GYRO_FILTER", 0.0) if raw else 0.0
             error = known.get(f"ATC_RAT_{axis}_FLTE", _FILTER)
-            made.append(_suggest(_Loop(model, axis, rates[0], commands[0], error, gyro), known))
-    return tuple(made)
+            made.append(_suggest(RateLoop(model, axis, rates[0], commands[0], error, gyro), known))
+    return tuple(_with_words(s) for s in _with_coupling(made))
 
 
 def _channels(model: StateSpaceModel | Fitted) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -128,117 +205,163 @@ def _channels(model: StateSpaceModel | Fitted) -> tuple[tuple[str, ...], tuple[s
     return tuple(m.output for m in held), (held[0].input,)
 
 
-@dataclass(frozen=True)
-class _Loop:
-    """A rate loop without its gains: what the model answers, and what filters stand beside it [Hz]."""
-
-    model: StateSpaceModel | Fitted
-    axis: str
-    rate: str
-    command: str
-    error_filter: float
-    gyro_filter: float
-
-    def plant(self, omega: Array) -> Complex:
-        if isinstance(self.model, StateSpaceModel):
-            h = self.model.response(omega)
-            return np.asarray(h[:, self.model.outputs.index(self.rate), self.model.inputs.index(self.command)])
-        return response_of(self.model, self.rate, self.command, omega)
-
-    def controller(self, gains: Mapping[str, float], omega: Array) -> Complex:
-        """From the rate to the command with its sign turned, gyro filter included where the model lacks it."""
-        s: Complex = np.asarray(1j * omega, dtype=np.complex128)
-        k = {name.rsplit("_", 1)[1]: value for name, value in gains.items()}
-        pid = k.get("P", 0.0) + k.get("I", 0.0) / s + k.get("D", 0.0) * s * _first_order(s, k.get("FLTD", 0.0))
-        c = 2.0 * np.pi * self.gyro_filter
-        gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
-        return np.asarray(pid * _first_order(s, k.get("FLTE", 0.0)) * gyro, dtype=np.complex128)
-
-    def margins(self, gains: Mapping[str, float], omega: Array) -> tuple[ResponseMargins, float]:
-        """Margins, with bounds where a fit has them, and the sensitivity's peak."""
-        controller = self.controller(gains, omega)
-        loop = np.asarray(controller * self.plant(omega), dtype=np.complex128)
-        peak = float(np.max(np.abs(1.0 / (1.0 + loop))))
-        if isinstance(self.model, StateSpaceModel):
-            return margins(omega, loop), peak
-        return model_margins(self.model, self.rate, self.command, omega, controller), peak
-
-    @property
-    def unstable(self) -> float:
-        """Size of the fastest growing mode [rad/s], zero for none."""
-        m = self.model if isinstance(self.model, StateSpaceModel) else self.model.model
-        modes = m.eigenvalues() if isinstance(m, StateSpaceModel) else m[0].poles
-        return float(np.max(np.abs(modes[modes.real > 1e-6]), initial=0.0))
-
-
-def _first_order(s: Complex, hertz: float) -> Complex | float:
-    return 1.0 / (1.0 + s / (2.0 * np.pi * hertz)) if hertz > 0.0 else 1.0
-
-
-def _suggest(loop: _Loop, known: Mapping[str, float]) -> Suggestion:
-    nothing = ResponseMargins(*[ReadNumber(float("nan"))] * 4)
+def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:
     names = [f"ATC_RAT_{loop.axis}_{name}" for name in _GAINS]
     flown = {name: known[name] for name in names if name in known}
     unstable = loop.unstable
-    omega = _SEEN[max(_LOWEST, 3.0 * unstable) <= _SEEN]
-    as_flown = loop.margins(flown, omega) if names[1] in flown and unstable < _SLOW else (nothing, float("nan"))
     if unstable >= _SLOW:
         words = (
             f"none: the model has an unstable mode at {unstable:.3g} rad/s, which no margin of a stable loop judges."
         )
-        return Suggestion(loop.axis, {}, nothing, float("nan"), words, flown, *as_flown)
-    gains, steady = _best(loop, omega)
+        return Suggestion(loop.axis, {}, NO_FIGURES, flown, NO_FIGURES, loop, words)
+    omega = _judged_at(loop)
+    as_flown = loop.figures(flown, omega) if names[1] in flown else NO_FIGURES
+    gains = _best(loop, omega)
     if gains is None:
         words = f"none: no gains tried keep {PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a sensitivity of {PEAK:g}."
-        return Suggestion(loop.axis, {}, nothing, float("nan"), words, flown, *as_flown)
+        return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, words)
+    found = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
+    better = [name for name, good, _ in _changes(found) if good]
+    if flown and not better and bool(_keep(_loops(loop, _as_rows(flown), omega))[0]):
+        return replace(found, parameters=flown, figures_suggested=as_flown)
+    return found
+
+
+def _judged_at(loop: RateLoop) -> Array:
+    return np.asarray(SEEN[max(LOWEST, 3.0 * loop.unstable) <= SEEN])
+
+
+def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
+    """The gains, None where none keep the margins."""
+    steady = np.isfinite(loop.steady)
+    if steady:
+        one = 1.0 / loop.steady
+    else:  # an integrator's phase is -90 degrees there
+        middle = complex(loop.plant(np.array([_SLOW]))[0])
+        one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
+    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _SHARES["I"], indexing="ij")
+    share, slope, integral = (np.ravel(x) for x in tried)
+    p: Array = one * share
+    grid: dict[str, Array] = {
+        "FF": np.full(p.size, one if steady else 0.0),
+        "P": p,
+        "I": integral * (one if steady else 0.2 * p),
+        "D": slope * 0.1 * p,
+        "FLTE": np.full(p.size, loop.error_filter),
+        "FLTD": np.full(p.size, _FILTER),
+    }
+    loops = _loops(loop, grid, omega)
+    kept = _keep(loops)
+    if not kept.any():
+        return None
+    sensitivity = np.abs(1.0 / (1.0 + loops[kept]))
+    rejected = omega[np.argmax(sensitivity > HALF_POWER, axis=1)]
+    # Of those that are nearly the fastest, the one whose integral takes a lasting disturbance away first.
+    slow = rejected < _NEARLY * rejected.max()
+    best = int(np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))[0]])
+    chosen = {name: float(value[best]) for name, value in grid.items()}
+    filters = {name: np.full(len(_DEMAND), value) for name, value in chosen.items()} | {"FLTT": np.array(_DEMAND)}
+    overshoot = np.nan_to_num(loop.overshoots(filters), nan=0.0 if loop.structure is None else np.inf)
+    quick = np.flatnonzero(overshoot <= max(OVERSHOOT, overshoot.min()))[0]
+    chosen["FLTT"] = _DEMAND[quick]
+    return {f"ATC_RAT_{loop.axis}_{name}": chosen[name] for name in _GAINS}
+
+
+def _as_rows(gains: Mapping[str, float]) -> dict[str, Array]:
+    return {name: np.array([value]) for name, value in short(gains).items()}
+
+
+def _loops(loop: RateLoop, grid: Mapping[str, Array], omega: Array) -> Complex:
+    """Broken loops of m sets of gains, shape (m, n)."""
+    size = max(value.size for value in grid.values())
+    sets = ({name: float(value[k]) for name, value in grid.items()} for k in range(size))
+    return np.stack([loop.controller(gains, omega) for gains in sets]) * loop.plant(omega)
+
+
+def _keep(loops: Complex) -> NDArray[np.bool_]:
+    """Which loops are stable by Nyquist's count of a stable plant, and far enough from -1 at every crossing, (m,)."""
+    around = 1.0 + loops
+    turns = np.unwrap(np.angle(around), axis=1)
+    size, phase = np.abs(loops), np.degrees(np.angle(loops))
+    above = size > 1.0
+    crossing = above[:, :-1] != above[:, 1:]
+    narrow = (crossing & (180.0 - np.abs(phase[:, :-1]) < PHASE_MARGIN)).any(axis=1)
+    loud = (np.abs(np.diff(phase, axis=1)) > 180.0) & (size[:, :-1] >= 10.0 ** (-GAIN_MARGIN / 20.0))
+    encircled = np.abs(turns[:, -1] - turns[:, 0]) > np.pi
+    near = np.abs(around).min(axis=1) <= 1.0 / PEAK
+    return np.asarray(~encircled & ~narrow & ~loud.any(axis=1) & ~near)
+
+
+def _with_coupling(made: Sequence[Suggestion]) -> list[Suggestion]:
+    """With what the axes do to each other, where all of them have gains."""
+    found, loops = list(made), tuple(s.loop for s in made)
+    for gains, figures in (("parameters", "figures_suggested"), ("flown", "figures_flown")):
+        sets = tuple(getattr(s, gains) for s in made)
+        if all({"P", "I", "D", "FF"} & set(short(k)) for k in sets) and all(np.isfinite(s.peak) for s in made):
+            joined = couplings(loops, sets, SEEN)
+            found = [
+                replace(s, **{figures: replace(getattr(s, figures), coupling=value)})
+                for s, value in zip(found, joined, strict=True)
+            ]
+    return found
+
+
+_CHANGES = (
+    # what, unit, scale, better if larger, smallest change that is named (of a number, or of its flown size)
+    ("phase margin", "deg", 1.0, True, 3.0, False),
+    ("gain margin", "dB", 1.0, True, 0.5, False),
+    ("largest sensitivity", "", 1.0, False, 0.05, True),
+    ("bandwidth", "rad/s", 1.0, True, 0.05, True),
+    ("disturbance rejection", "rad/s", 1.0, True, 0.05, True),
+    ("overshoot of a step", "%", 100.0, False, 5.0, False),
+    ("coupling", "", 1.0, False, 0.1, True),
+)
+
+
+def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
+    """What differs between flown and suggested by more than it matters: words, whether better, by how much."""
+    if not (np.isfinite(s.peak) and np.isfinite(s.flown_peak)):
+        return []
+    found = []
+    columns = [
+        (f.margins.phase_margin.value, f.margins.gain_margin.value, f.peak, f.bandwidth, f.rejection, f.overshoot,
+         f.coupling)
+        for f in (s.figures_flown, s.figures_suggested)
+    ]  # fmt: skip
+    for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):
+        change = scale * (after - before)
+        if not abs(change) >= (least * abs(scale * before) if relative else least):
+            continue  # NaN is no change either
+        words = f"{what} {scale * before:.3g} -> {scale * after:.3g} {unit}".rstrip()
+        found.append((words, (change > 0.0) == larger, change))
+    return found
+
+
+def _with_words(s: Suggestion) -> Suggestion:
+    if s.words:
+        return s
+    if s.parameters == s.flown:
+        return replace(
+            s, words="The flown gains are kept: they keep the margins, and nothing that was tried is better."
+        )
+    changes = _changes(s)
+    buys = tuple(words for words, good, _ in changes if good)
+    costs = tuple(words for words, good, _ in changes if not good)
     words = (
         f"Keeps {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g} dB on the model, one axis at a time. Fly the feed-forward "
         "first with P, I and D at a third, then raise them."
     )
-    if not steady:
+    if s.figures_suggested.overshoot > OVERSHOOT:
+        size = f"{100.0 * s.figures_suggested.overshoot:.0f} %"
+        words += f" A step of the demand overshoots by {size} with the slowest filter tried: give it soft demands."
+    if not np.isfinite(s.loop.steady):
         words += " Under a steady command the rate settles slowly or not at all: no feed-forward."
-    if unstable:
-        words += f" The slow mode that grows ({unstable:.2g} rad/s) is left to the attitude loop."
-    return Suggestion(loop.axis, gains, *loop.margins(gains, omega), words, flown, *as_flown)
-
-
-def _best(loop: _Loop, omega: Array) -> tuple[dict[str, float] | None, bool]:
-    """The gains, None where none keep the margins, and whether the rate has a steady value."""
-    plant = loop.plant(omega)
-    low, middle, high = loop.plant(2.0 * np.pi * np.array([0.1, 0.2, 0.4]))
-    steady = bool(abs(low) < _INTEGRATES * abs(high))
-    one = float(np.sign(middle.real or middle.imag or 1.0) / abs(middle))
-    if not steady:  # an integrator's phase is -90 degrees there
-        one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
-    name = f"ATC_RAT_{loop.axis}_"
-    for p in one * np.geomspace(20.0, 0.02, 80):
-        for share in (0.2, 0.1, 0.05, 0.02, 0.0):
-            numbers = (one if steady else 0.0, p, 0.5 * one if steady else 0.1 * p, share * p * 0.1)
-            gains = {name + k: float(v) for k, v in zip(_GAINS, (*numbers, loop.error_filter, _FILTER), strict=True)}
-            if _keeps(np.asarray(loop.controller(gains, omega) * plant, dtype=np.complex128)):
-                return gains, steady
-    return None, steady
-
-
-def _keeps(loop: Complex) -> bool:
-    """Stable by Nyquist's count of a stable plant, and far enough from -1 at every crossing."""
-    distance = np.abs(1.0 + loop)
-    turns = np.unwrap(np.angle(1.0 + loop))
-    encircled = abs(turns[-1] - turns[0]) > np.pi
-    return bool(not encircled and distance.min() > 1.0 / PEAK and _margins_hold(loop))
-
-
-def _margins_hold(loop: Complex) -> bool:
-    size, phase = np.abs(loop), np.degrees(np.angle(loop))
-    above = size > 1.0
-    crossings = np.flatnonzero(above[:-1] != above[1:])
-    if any(180.0 - abs(phase[k]) < PHASE_MARGIN for k in crossings):
-        return False
-    half_turns = np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
-    return all(size[k] < 10.0 ** (-GAIN_MARGIN / 20.0) for k in half_turns)
+    if s.loop.unstable:
+        words += f" The slow mode that grows ({s.loop.unstable:.2g} rad/s) is left to the attitude loop."
+    return replace(s, words=words, buys=buys, costs=costs)
 
 
 def loop_of(model: StateSpaceModel, suggestion: Suggestion, omega: Array) -> Complex:
     """The broken rate loop of a suggestion on a model, shape (n,)."""
-    loop = _Loop(model, suggestion.axis, *AXES[suggestion.axis], _FILTER, 0.0)
+    loop = RateLoop(model, suggestion.axis, *AXES[suggestion.axis], _FILTER, 0.0)
     return np.asarray(loop.controller(suggestion.parameters, omega) * loop.plant(omega), dtype=np.complex128)

@@ -1,8 +1,8 @@
 """A rate loop closed over an identified model, in time: the answer to a step of the target, and to a disturbance.
 
-ArduPilot's controller of `ardupilot_gains`: u = FF target + P e + I int e + D de/dt, with the error's filter FLTE and
-the derivative's FLTD, both of first order. The loop is stepped at 400 Hz, as the autopilot runs, with the model exact
-between steps (zero-order hold) and its delay in whole steps.
+ArduPilot's controller of `ardupilot_gains`: u = FF target + P e + I int e + D de/dt, with the filters FLTT of the
+target, FLTE of the error and FLTD of the derivative, all of first order. The loop is stepped at 400 Hz, as the
+autopilot runs, with the model exact between steps (zero-order hold) and its delay in whole steps.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class RateSteps:
         step: rate over a target of 1, shape (n,).
         disturbance: rate after a step of 0.1 of the command, in the model's unit, shape (n,).
         stable: whether both settle; where they do not, no gains should be flown.
-        overshoot: of the step beyond 1; settled: its last value.
+        overshoot: of the step beyond 1 (NaN where it leaves all bounds); settled: its last value.
     """
 
     time: Array
@@ -58,7 +58,7 @@ def rate_loop_steps(
 
     Args:
         model: identified, from the mixer command to the rate.
-        gains: by ArduPilot's names (`ATC_RAT_RLL_P`, ...) or their ends (`P`, `I`, `D`, `FF`, `FLTE`, `FLTD`).
+        gains: by ArduPilot's names (`ATC_RAT_RLL_P`, ...) or their ends (`P`, `I`, `D`, `FF`, `FLTT`, `FLTE`, `FLTD`).
         rate, command: the model's output and input.
         seconds: how long.
         gyro_filter: corner of a gyro filter that the model has not seen [Hz]; 0 for none.
@@ -73,70 +73,84 @@ def rate_loop_steps(
     for name, names in ((rate, structure.outputs), (command, structure.inputs)):
         if name not in names:
             raise ControllerError(f"is no channel of the model; it has {', '.join(names)}.", channel=name)
-    step, kept = _closed(structure, k, rate, command, seconds, gyro_filter, target=1.0, disturbance=0.0)
-    shaken, held = _closed(structure, k, rate, command, seconds, gyro_filter, target=0.0, disturbance=0.1)
+    row = {name: np.array([value]) for name, value in k.items()}
+    step = stepped(structure, row, rate, command, seconds=seconds, gyro_filter=gyro_filter)[:, 0]
+    shaken = stepped(
+        structure, row, rate, command, seconds=seconds, gyro_filter=gyro_filter, target=0.0, disturbance=0.1
+    )[:, 0]
     time = np.arange(step.size) / RATE
-    stable = kept and held and not _grows(step - step[-1]) and not _grows(shaken - shaken[-1])
-    return RateSteps(time, step, shaken, stable, float(max(0.0, np.max(step) - 1.0)), float(step[-1]))
+    stable = not _grows(step - step[-1]) and not _grows(shaken - shaken[-1])
+    return RateSteps(time, step, shaken, stable, float(np.maximum(0.0, np.max(step) - 1.0)), float(step[-1]))
 
 
-def _closed(
+def stepped(
     model: StateSpaceModel,
-    k: Mapping[str, float],
+    gains: Mapping[str, Array],
     rate: str,
     command: str,
-    seconds: float,
-    gyro: float,
     *,
-    target: float,
-    disturbance: float,
-) -> tuple[Array, bool]:
-    """The rate, and whether it stayed within bounds."""
+    seconds: float,
+    gyro_filter: float = 0.0,
+    target: float = 1.0,
+    disturbance: float = 0.0,
+) -> Array:
+    """The rate with each of m sets of gains, shape (n, m); NaN from where it leaves all bounds.
+
+    Args:
+        gains: by their short names (`P`, `I`, ...), shape (m,) each.
+        target, disturbance: steps at the start, of the demanded rate and of the command.
+    """
+    k = {
+        name: np.asarray(gains.get(name, 0.0), dtype=np.float64)
+        for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD")
+    }
+    m = max(value.size for value in k.values())
     a, b, c, d = model.explicit()
     i, o, n = model.inputs.index(command), model.outputs.index(rate), a.shape[0]
     dt = 1.0 / RATE
     held = expm(np.block([[a, b[:, [i]]], [np.zeros((1, n + 1))]]) * dt)
     ad, bd, cd, dd = held[:n, :n], held[:n, n], c[o], float(d[o, i])
-    waiting = [0.0] * max(1, round(model.delay(rate, command) * RATE))  # one step at least: commands act after it
-    filtered, sloped, before, summed, x = 0.0, 0.0, 0.0, 0.0, np.zeros(n)
-    error_share, slope_share = (1.0 - np.exp(-2.0 * np.pi * k.get(f, 0.0) * dt) or 1.0 for f in ("FLTE", "FLTD"))
-    seen = _Gyro(gyro, dt)
-    found = np.zeros(round(seconds * RATE) + 1)
-    for step in range(found.size):
+    late = max(1, round(model.delay(rate, command) * RATE))  # one step at least: commands act after it
+    waiting = [np.zeros(m)] * late
+    wanted, filtered, sloped, before, summed, x = *np.zeros((5, m)), np.zeros((n, m))
+    target_share, error_share, slope_share = (
+        np.where(k[name] > 0.0, 1.0 - np.exp(-2.0 * np.pi * k[name] * dt), 1.0) for name in ("FLTT", "FLTE", "FLTD")
+    )
+    seen, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
+    found = np.full((round(seconds * RATE) + 1, m), np.nan)
+    for step in range(len(found)):
         acting = waiting.pop(0)
-        y = float(cd @ x) + dd * acting
-        found[step] = y
-        if not abs(y) < _WILD * max(1.0, abs(target)):
-            found[step:] = np.nan
-            return found, False
-        filtered += error_share * (target - seen(y) - filtered)
-        summed += filtered * dt
-        sloped += slope_share * ((filtered - before) / dt - sloped)
+        y = cd @ x + dd * acting
+        flying &= np.abs(y) < _WILD * max(1.0, abs(target))
+        found[step, flying] = y[flying]
+        wanted = wanted + target_share * (target - wanted)
+        filtered = filtered + error_share * (wanted - seen(np.where(flying, y, 0.0)) - filtered)
+        summed = summed + filtered * dt
+        sloped = sloped + slope_share * ((filtered - before) / dt - sloped)
         before = filtered
-        u = k.get("FF", 0.0) * target + k.get("P", 0.0) * filtered + k.get("I", 0.0) * summed + k.get("D", 0.0) * sloped
-        waiting.append(u + disturbance)
-        x = ad @ x + bd * acting
-    return found, True
+        waiting.append(k["FF"] * wanted + k["P"] * filtered + k["I"] * summed + k["D"] * sloped + disturbance)
+        x = (ad @ x + np.outer(bd, acting)) * flying
+    return found
 
 
 class _Gyro:
-    """ArduPilot's second-order low-pass, as a state of two numbers; nothing where the corner is 0."""
+    """ArduPilot's second-order low-pass, as states of two numbers; nothing where the corner is 0."""
 
-    def __init__(self, corner: float, dt: float) -> None:
+    def __init__(self, corner: float, dt: float, size: int) -> None:
         w = 2.0 * np.pi * corner
         self._on, a = corner > 0.0, np.array([[0.0, 1.0], [-(w**2), -np.sqrt(2.0) * w]])
         held = expm(np.block([[a, np.array([[0.0], [w**2]])], [np.zeros((1, 3))]]) * dt)
-        self._a, self._b, self._x = held[:2, :2], held[:2, 2], np.zeros(2)
+        self._a, self._b, self._x = held[:2, :2], held[:2, 2], np.zeros((2, size))
 
-    def __call__(self, value: float) -> float:
+    def __call__(self, value: Array) -> Array:
         if not self._on:
             return value
-        self._x = self._a @ self._x + self._b * value
-        return float(self._x[0])
+        self._x = self._a @ self._x + np.outer(self._b, value)
+        return np.asarray(self._x[0])
 
 
 def _grows(values: Array) -> bool:
-    """Whether an oscillation is larger in the last third than in the one before."""
+    """Whether an oscillation is larger in the last third than in the one before, or left all bounds."""
     third = values.size // 3
     early, late = np.ptp(values[third : 2 * third]), np.ptp(values[2 * third :])
     return not late < 1.05 * early + 1e-6

@@ -18,7 +18,7 @@ def autopilot_gains(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
     """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
     said = [flight.provenance for flight in flights]
     names = (
-        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[ED])|INS_GYRO_FILTER", n)
+        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[TED])|INS_GYRO_FILTER", n)
     )
     values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
     same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}

@@ -93,7 +93,7 @@ def identify_sweep(
             *(study.fit.warnings if study.fit else ()),
         ],
         "verification": _verified(study, chosen, seen),
-        "gains": [_gains(study, suggestion, chosen, flight) for suggestion in study.material.gains],
+        "gains": [_gains(suggestion) for suggestion in study.material.gains],
         "no_gains": gained,
         "code": code.as_dict(),
     }
@@ -184,35 +184,33 @@ def _margin(reading: Any) -> list[float]:
     return [float(reading.value), float(reading.sigma)]
 
 
-def _gains(study: Any, suggestion: Any, chosen: Channels, flight: Flight) -> dict[str, Any]:
-    """Gains before and after with their margins and what the loop answers with each."""
+def _gains(suggestion: Any) -> dict[str, Any]:
+    """Gains before and after with what they are worth and what the loop answers with each."""
     names = list(suggestion.parameters) or list(suggestion.flown)
     rows = [[name, suggestion.flown.get(name), suggestion.parameters.get(name)] for name in names]
-    raw = chosen.output.endswith("_sid")
-    gyro = (flight.provenance.parameter(_GYRO) or 0.0) if raw else 0.0
-    answers: dict[str, dict[str, Any] | None] = {}
-    for label, gains, margins, peak in (
-        ("before", suggestion.flown, suggestion.flown_margins, suggestion.flown_peak),
-        ("after", suggestion.parameters, suggestion.margins, suggestion.peak),
+    steps = suggestion.steps()
+    answers: dict[str, dict[str, Any] | None] = {"before": None, "after": None}
+    for label, which, figures in (
+        ("before", "flown", suggestion.figures_flown),
+        ("after", "suggested", suggestion.figures_suggested),
     ):
-        if not {name.rsplit("_", 1)[1] for name in gains} & {"P", "FF", "I"} or study.model is None:
-            answers[label] = None
-            continue
-        found = resolve("rate_loop_steps")(
-            study.model, gains, rate=chosen.output, command=chosen.input, gyro_filter=gyro
-        )
-        answers[label] = {
-            "time": found.time,
-            "step": found.step,
-            "disturbance": np.degrees(found.disturbance),
-            "stable": found.stable,
-            "overshoot": found.overshoot,
-            "phase_margin": _margin(margins.phase_margin),
-            "gain_margin": _margin(margins.gain_margin),
-            "crossover": _margin(margins.crossover),
-            "peak": peak,
-        }
-    return {"axis": suggestion.axis, "rows": rows, "words": suggestion.words, **answers}
+        if which in steps:
+            found = steps[which]
+            answers[label] = {
+                "time": found.time,
+                "step": found.step,
+                "disturbance": np.degrees(found.disturbance),
+                "stable": found.stable,
+                "overshoot": found.overshoot,
+                "phase_margin": _margin(figures.margins.phase_margin),
+                "gain_margin": _margin(figures.margins.gain_margin),
+                "crossover": _margin(figures.margins.crossover),
+                "peak": figures.peak,
+                "bandwidth": figures.bandwidth,
+                "rejection": figures.rejection,
+            }
+    words = " ".join((suggestion.words, *(f"{line[0].upper()}{line[1:]}." for line in suggestion.trade)))
+    return {"axis": suggestion.axis, "rows": rows, "words": words, **answers}
 
 
 def _files(study: Any, responses: Any, record: Flight, part: Flight, folder: Path) -> dict[str, Make]:

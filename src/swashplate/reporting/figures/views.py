@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.inspect import Inspection
@@ -23,6 +24,7 @@ from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
 from swashplate.reporting.figures_fit import eigenvalues
 from swashplate.reporting.report import structure_of
+from swashplate.reporting.sections_responses import gains_section
 from swashplate.reporting.speed_page import by_contributor, controls
 from swashplate.reporting.structure import Block, Cell, Figure, Report, Section, Table, Text
 from swashplate.simulation.derivatives_over_speed import Derivatives
@@ -56,6 +58,8 @@ def section_of(shown: Any) -> Section:
         return section_of_comparison(shown)
     if isinstance(shown, Residuals):
         return section_of_residuals(shown)
+    if isinstance(shown, Suggestion):
+        return gains_section([shown])
     if isinstance(shown, LinearModel):
         return Section("modes", "Linear model", (eigenvalues({"model": shown.modes()}), _listing(repr(shown))))
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)

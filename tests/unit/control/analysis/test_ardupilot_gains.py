@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from swashplate.control.analysis.ardupilot_gains import GAIN_MARGIN, PHASE_MARGIN, loop_of, suggest_gains
+from swashplate.control.analysis.ardupilot_gains import GAIN_MARGIN, OVERSHOOT, PHASE_MARGIN, loop_of, suggest_gains
 from swashplate.models.linear.state_space_file import structure
 
 SITL = {
@@ -62,6 +62,52 @@ def test_the_controllers_filters_cost_margin_and_are_suggested_with_the_gains() 
     at = raw.flown_margins.omega_180.value
     gyro = signal.freqs(*signal.butter(2, 40.0 * np.pi, analog=True), [at])[1][0]
     assert turned(at, gyro, 1.0 / (1.0 + 1j * at / (40.0 * np.pi))) == pytest.approx(0.0, abs=0.1)
+
+
+def _all(**gains: float) -> dict[str, float]:
+    return {f"ATC_RAT_{axis}_{name}": value for axis in ("RLL", "PIT") for name, value in gains.items()}
+
+
+def test_what_gains_buy_and_cost_is_said_and_a_step_overshoots_little() -> None:
+    model = structure("rotor_body").with_values(SITL)
+    flown = _all(P=0.06, I=0.105, D=1e-4, FF=0.21, FLTT=20.0, FLTE=20.0, FLTD=0.0)
+    roll, pitch = suggest_gains(model, autopilot=flown)
+    for found in (roll, pitch):
+        before, after = found.figures_flown, found.figures_suggested
+        assert before.overshoot > 0.4  # the filter of the demand takes it away
+        assert after.overshoot <= OVERSHOOT
+        assert after.rejection > 1.2 * before.rejection
+        assert after.coupling < before.coupling
+        assert any("overshoot" in words for words in found.buys)
+        assert any("gain margin" in words for words in found.costs)
+        assert all(words in repr(found) for words in (*found.buys, *found.costs))
+        steps = found.steps()
+        assert steps["suggested"].overshoot == pytest.approx(after.overshoot)
+        assert steps["flown"].overshoot == pytest.approx(before.overshoot)
+    # Disturbance rejection by hand: the sensitivity of P and I on the model, where it is -3 dB.
+    s = 1j * np.array([roll.figures_flown.rejection])
+    own = (0.06 + 0.105 / s + 1e-4 * s) / (1.0 + s / (40.0 * np.pi))
+    assert abs(1.0 / (1.0 + own * model.response(s.imag)[:, 0, 0])) == pytest.approx(0.708, rel=0.01)
+
+
+def test_flown_gains_that_nothing_beats_are_kept() -> None:
+    model = structure("rotor_body").with_values(SITL)
+    first = suggest_gains(model)
+    good = {name: value for found in first for name, value in found.parameters.items()}
+    again = suggest_gains(model, autopilot=good)
+    for found in again:
+        assert found.parameters == found.flown
+        assert "flown gains are kept" in found.words
+        assert not found.costs
+    narrow = suggest_gains(model, autopilot=good | {"ATC_RAT_RLL_P": 2.0 * good["ATC_RAT_RLL_P"]})
+    assert narrow[0].parameters != narrow[0].flown  # these keep no 6 dB
+
+
+def test_the_steady_rate_is_the_models_and_not_that_of_a_slow_sweep() -> None:
+    """At a pole of 1.3 rad/s the gain at 0.2 Hz is 28 % below the steady one."""
+    (yaw,) = suggest_gains(structure("yaw").with_values({"Nr": -1.3, "Nped": 30.0, "tau_yaw": 0.05}))
+    assert yaw.parameters["ATC_RAT_YAW_FF"] == pytest.approx(1.3 / 30.0, rel=1e-6)
+    assert yaw.figures_suggested.overshoot <= OVERSHOOT
 
 
 @pytest.mark.parametrize("damping", [-0.02, -6.0])

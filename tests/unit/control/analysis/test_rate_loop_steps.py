@@ -76,6 +76,14 @@ def test_filters_cost_phase() -> None:
     assert not sp.rate_loop_steps(plant, {"P": 2.2}, gyro_filter=5.0, **NAMES).stable
 
 
+def test_the_filter_of_the_demand_softens_its_step_and_not_a_disturbance() -> None:
+    plant = first_order(delay=0.03)
+    sharp, soft = (sp.rate_loop_steps(plant, {"P": 1.2, "FLTT": hertz}, **NAMES) for hertz in (0.0, 2.0))
+    assert soft.overshoot < 0.5 * sharp.overshoot
+    np.testing.assert_array_equal(soft.disturbance, sharp.disturbance)
+    assert np.isnan(sp.rate_loop_steps(plant, {"P": 9.0}, **NAMES).overshoot), "not 0 where it left all bounds"
+
+
 def test_what_is_no_loop_is_refused() -> None:
     with pytest.raises(ControllerError, match="hold no gain"):
         sp.rate_loop_steps(first_order(), {"ATC_RAT_RLL_FLTE": 20.0}, **NAMES)

@@ -48,6 +48,7 @@ def test_numbers_vary_as_asked_within_physics(coax: Vehicle) -> None:
         tolerances_of(coax)
 
 
+@pytest.mark.proof
 def test_a_delay_of_whole_samples_is_a_command_of_so_many_samples_ago(coax: Vehicle, hover: Trim) -> None:
     """Entry 0 flies without a delay and agrees with a single flight; the others get what it commanded a while ago."""
     controller = autopilot(coax, hover)

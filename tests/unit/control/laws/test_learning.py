@@ -30,6 +30,7 @@ def test_one_step_teaches_the_law_the_aircraft() -> None:
         assert abs(again) < 0.25 * abs(drift)
 
 
+@pytest.mark.proof
 @pytest.mark.parametrize("late", [0.06])
 def test_the_lag_is_chosen_by_flying_the_model_with_its_delays(late: float) -> None:
     card = sp.vehicle("coax").card

@@ -78,6 +78,7 @@ def test_one_step_ahead_is_the_innovation() -> None:
     np.testing.assert_allclose(errors[:, 0], base._plain(base.row.starts())[1:], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.proof
 def test_a_linear_vehicle_is_fitted_ahead_as_the_linear_model() -> None:
     flown = gusty()
     found = fit_vehicle(rolling(), flown, free=list(TRUTH), outputs=OUTPUTS, biases=["ay"], horizon=AHEAD)

@@ -96,6 +96,7 @@ def test_conditioning_tells_correlated_inputs_apart_and_single_responses_do_not(
     assert any("moved together" in text for text in both.warnings)
 
 
+@pytest.mark.proof
 def test_random_error_is_what_many_seeds_scatter() -> None:
     logs, promised = [], []
     truth = None

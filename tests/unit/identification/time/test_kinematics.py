@@ -143,6 +143,7 @@ def test_slopes_are_those_of_a_straight_line_also_at_the_ends() -> None:
     np.testing.assert_allclose(rate, np.tile([1.0, -2.0, 0.5, 0.1, 0.2, 3.0], (3, 1)), atol=1e-12)
 
 
+@pytest.mark.proof
 def test_a_helicopters_steady_flight_and_inner_states_are_those_of_its_trim_and_differentiable() -> None:
     """The traced Newton steps end where `trim` does, and their derivative is that of trims at other masses."""
     raptor = vehicle("raptor50")

@@ -1,0 +1,198 @@
+"""A rate loop around an identified model: its controller and filters, and what a set of gains is worth in it.
+
+ArduPilot's rate controller gives the mixer command u = FF target + P e + I int e + D de/dt, with the target and the
+rate error e in rad/s behind first-order filters (FLTT and FLTE), and one more on the derivative (FLTD).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import expm
+
+from swashplate.arrays import Array, Complex
+from swashplate.control.analysis.rate_loop_steps import stepped
+from swashplate.errors import IdentificationError
+from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
+from swashplate.identification.frequency.handling_readings import model_margins
+from swashplate.identification.frequency.reading_accuracy import Fitted, response_of
+from swashplate.identification.frequency.transfer_function_fit import as_state_space
+from swashplate.models.linear.state_space import StateSpaceModel
+
+LOWEST = 2.0 * np.pi * 0.05
+SEEN = np.geomspace(LOWEST, 2.0 * np.pi * 40.0, 1500)
+"""rad/s: where loops are judged."""
+_SLOWER = frozenset(("x", "y", "z", "u", "v", "w", "phi", "theta", "psi"))
+"""States that a rate moves first of all: held, they leave what a rate settles at before they act."""
+_SETTLING, _SETTLED = 2.0, 0.25
+"""Seconds after which a rate must be within this share of its steady value to be fed forward."""
+HALF_POWER = 10.0 ** (-3.0 / 20.0)
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """What a set of gains is worth on the model, one axis at a time.
+
+    Attributes:
+        margins: of the broken loop, the least of each. peak: largest sensitivity |1 / (1 + L)|.
+        bandwidth: where the rate follows its demand by -3 dB for the first time [rad/s].
+        rejection: up to where a disturbance of the rate is halved in power: |1 / (1 + L)| = -3 dB [rad/s]; the
+            disturbance rejection bandwidth of ADS-79 (definition from memory).
+        overshoot: of the rate beyond a demand that steps at once, 1 is all of it; NaN where the loop is unstable or the
+            model cannot be stepped.
+        coupling: largest answer of another rate to this axis' demand, over the demand, with all axes' loops closed; NaN
+            where the model has one axis.
+    """
+
+    margins: ResponseMargins
+    peak: float
+    bandwidth: float
+    rejection: float
+    overshoot: float
+    coupling: float = NAN
+
+
+NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 4), NAN, NAN, NAN, NAN)
+
+
+@dataclass(frozen=True)
+class RateLoop:
+    """A rate loop without its gains: what the model answers, and what filters stand beside it [Hz]."""
+
+    model: StateSpaceModel | Fitted
+    axis: str
+    rate: str
+    command: str
+    error_filter: float
+    gyro_filter: float
+
+    @cached_property
+    def structure(self) -> StateSpaceModel | None:
+        """The model in time; None for a transfer function that cannot be stepped."""
+        if isinstance(self.model, StateSpaceModel):
+            return self.model
+        if isinstance(self.model.model, StateSpaceModel):
+            return self.model.model
+        try:
+            return as_state_space(self.model)
+        except IdentificationError:
+            return None
+
+    def plant(self, omega: Array) -> Complex:
+        if isinstance(self.model, StateSpaceModel):
+            return np.asarray(self._responses(omega)[:, 0, 0])
+        return response_of(self.model, self.rate, self.command, omega)
+
+    def _responses(self, omega: Array, axes: tuple[RateLoop, ...] = ()) -> Complex:
+        """From the commands of some axes (this one alone) to their rates, shape (n, axes, axes)."""
+        assert self.structure is not None
+        loops = axes or (self,)
+        rows = [self.structure.outputs.index(loop.rate) for loop in loops]
+        columns = [self.structure.inputs.index(loop.command) for loop in loops]
+        return np.asarray(self.structure.response(omega)[:, rows][:, :, columns])
+
+    def controller(self, gains: Mapping[str, float], omega: Array) -> Complex:
+        """From the rate to the command with its sign turned, gyro filter included where the model lacks it."""
+        s: Complex = np.asarray(1j * omega, dtype=np.complex128)
+        k = short(gains)
+        pid = k.get("P", 0.0) + k.get("I", 0.0) / s + k.get("D", 0.0) * s * _first_order(s, k.get("FLTD", 0.0))
+        c = 2.0 * np.pi * self.gyro_filter
+        gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
+        return np.asarray(pid * _first_order(s, k.get("FLTE", 0.0)) * gyro, dtype=np.complex128)
+
+    def ahead(self, gains: Mapping[str, float], omega: Array) -> Complex:
+        """From the demanded rate to the command: its filter, feed-forward, the controller without the gyro's filter."""
+        without, k = replace(self, gyro_filter=0.0), short(gains)
+        smooth = _first_order(np.asarray(1j * omega), k.get("FLTT", 0.0))
+        return np.asarray(smooth * (k.get("FF", 0.0) + without.controller(gains, omega)))
+
+    def figures(self, gains: Mapping[str, float], omega: Array) -> LoopFigures:
+        """Margins, with bounds where a fit has them, and what the loop does."""
+        controller, plant = self.controller(gains, omega), self.plant(omega)
+        loop = np.asarray(controller * plant, dtype=np.complex128)
+        sensitivity = np.abs(1.0 / (1.0 + loop))
+        if isinstance(self.model, StateSpaceModel):
+            read = margins(omega, loop)
+        else:
+            read = model_margins(self.model, self.rate, self.command, omega, controller)
+        follows = np.abs(plant * self.ahead(gains, omega) / (1.0 + loop))
+        overshoot = self.overshoots({name: np.array([value]) for name, value in short(gains).items()})
+        return LoopFigures(
+            read,
+            float(np.max(sensitivity)),
+            _first_below(omega, follows, HALF_POWER),
+            _first_above(omega, sensitivity, HALF_POWER),
+            float(overshoot[0]),
+        )
+
+    def overshoots(self, gains: Mapping[str, Array]) -> Array:
+        """Of the rate beyond a step of the demand, for each of m sets of gains, shape (m,)."""
+        if self.structure is None:
+            return np.full(max(np.size(v) for v in gains.values()), np.nan)
+        rate = stepped(self.structure, gains, self.rate, self.command, seconds=_SETTLING, gyro_filter=self.gyro_filter)
+        return np.asarray(np.maximum(0.0, rate.max(axis=0) - 1.0))
+
+    @cached_property
+    def steady(self) -> float:
+        """The rate per command that a held command settles at before attitude and speed act; NaN where there is none.
+
+        Of a transfer function its value at zero frequency; of a structure the value with the states of attitude,
+        heading, speed and place held. NaN where the rate is not within a quarter of it after two seconds.
+        """
+        if self.structure is None:
+            return NAN
+        a, b, c, d = self.structure.explicit()
+        kept = [k for k, name in enumerate(self.structure.states) if name not in _SLOWER]
+        i, o = self.structure.inputs.index(self.command), self.structure.outputs.index(self.rate)
+        fast, through, seen = a[np.ix_(kept, kept)], float(d[o, i]), c[o, kept]
+        if kept and np.max(np.linalg.eigvals(fast).real) >= 0.0:
+            return NAN
+        reached = np.linalg.solve(fast, b[kept, i]) if kept else np.zeros(0)
+        settled = through - float(seen @ reached)
+        missing = float(seen @ expm(fast * _SETTLING) @ reached) if kept else 0.0
+        return settled if settled and abs(missing) <= _SETTLED * abs(settled) else NAN
+
+    @property
+    def unstable(self) -> float:
+        """Size of the fastest growing mode [rad/s], zero for none."""
+        m = self.model if isinstance(self.model, StateSpaceModel) else self.model.model
+        modes = m.eigenvalues() if isinstance(m, StateSpaceModel) else m[0].poles
+        return float(np.max(np.abs(modes[modes.real > 1e-6]), initial=0.0))
+
+
+def couplings(loops: tuple[RateLoop, ...], gains: tuple[Mapping[str, float], ...], omega: Array) -> tuple[float, ...]:
+    """Per axis, the largest answer of another axis' rate to its demand with all loops closed (NaN: one axis alone)."""
+    if len(loops) < 2 or loops[0].structure is None:
+        return (NAN,) * len(loops)
+    H = loops[0]._responses(omega, loops)
+    back, ahead = (
+        np.stack([getattr(loop, part)(k, omega) for loop, k in zip(loops, gains, strict=True)], axis=1)
+        for part in ("controller", "ahead")
+    )
+    closed = np.linalg.solve(np.eye(len(loops)) + H * back[:, None, :], H * ahead[:, None, :])
+    size = np.abs(closed)
+    return tuple(float(np.max(np.delete(size[:, :, k], k, axis=1))) for k in range(len(loops)))
+
+
+def short(gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains by the ends of ArduPilot's names: `P`, `I`, `D`, `FF`, `FLTT`, `FLTE`, `FLTD`."""
+    return {name.rsplit("_", 1)[-1]: float(value) for name, value in gains.items()}
+
+
+def _first_order(s: Complex, hertz: float) -> Complex | float:
+    return 1.0 / (1.0 + s / (2.0 * np.pi * hertz)) if hertz > 0.0 else 1.0
+
+
+def _first_below(omega: Array, size: Array, level: float) -> float:
+    """Where a gain falls through a level for good at the first time; NaN where it starts below or never does."""
+    below = np.flatnonzero(size < level)
+    return float(omega[below[0]]) if below.size and below[0] > 0 else NAN
+
+
+def _first_above(omega: Array, size: Array, level: float) -> float:
+    above = np.flatnonzero(size > level)
+    return float(omega[above[0]]) if above.size and above[0] > 0 else NAN
