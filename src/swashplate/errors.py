@@ -110,3 +110,7 @@ class ExportError(SwashError):
 
 class LinkError(SwashError):
     """A link to another program that cannot be opened, or a servo mapping that does not fit the vehicle."""
+
+
+class MissingLibraryError(SwashError, ModuleNotFoundError):
+    """A library that this installation lacks; the message has the command that installs it."""

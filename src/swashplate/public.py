@@ -14,6 +14,9 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
+from swashplate.errors import MissingLibraryError
+from swashplate.extras import EXTRA_OF, missing
+
 _LIGHT: Mapping[str, str] = {
     "CHOICES": "swashplate.models.coax_choices:CHOICES",
     "Card": "swashplate.models.card:Card",
@@ -177,8 +180,14 @@ def resolve(name: str) -> Any:
 
     Raises:
         KeyError: where no table has the name.
+        MissingLibraryError: where it computes with a library that is not installed, with the command.
     """
-    if name in _COMPUTING:
-        for step in _SET_UP:
-            _load(step)()
-    return _load(place(name))
+    try:
+        if name in _COMPUTING:
+            for step in _SET_UP:
+                _load(step)()
+        return _load(place(name))
+    except ModuleNotFoundError as error:
+        if isinstance(error, MissingLibraryError) or (error.name or "").partition(".")[0] not in EXTRA_OF:
+            raise
+        raise missing(str(error.name), what=f"'{name}'") from None

@@ -28,6 +28,13 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return f"Did you mean '{near[0]}'?" if near else ""
 
 
+def listed(names: Iterable[str], *, most: int = 12) -> str:
+    """Names for a message: the first so many, and how many more there are; "nothing" where there are none."""
+    every = list(names)
+    shown = ", ".join(every[:most]) or "nothing"
+    return shown if len(every) <= most else f"{shown} and {len(every) - most} more"
+
+
 class Registry(Generic[Thing]):
     """Things of one kind by name, our own and those of other packages.
 

@@ -273,6 +273,21 @@ def test_from_a_dropped_log_to_gains_in_two_clicks(
     visit.close()
 
 
+@pytest.mark.proof
+def test_gains_are_there_a_minute_after_a_log_was_dropped(browser: Any, shared_data: Path, tmp_path: Path) -> None:
+    """From an empty page of a server that has just been started, as a newcomer has it."""
+    with served(cwd=tmp_path) as url:
+        visit = Visit(browser, url, clear=False)
+        began = time.monotonic()
+        visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
+        visit.until("document.querySelector('#sweeps button')")
+        visit.page.locator("#sweeps button").click()
+        visit.until("document.getElementById('identify').dataset.state === 'done'", seconds=240.0)
+        assert time.monotonic() - began < 60.0
+        assert "ATC_RAT_RLL_P" in visit.text("#identify")
+        visit.close()
+
+
 def test_an_identification_is_cancelled(browser: Any, address: str, shared_data: Path) -> None:
     visit = Visit(browser, address)
     visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_allbits_roll_rate.BIN")

@@ -7,6 +7,13 @@ from pathlib import Path
 import pytest
 
 from simulated_flights import ten_seconds
+from swashplate.cli import console
+
+
+@pytest.fixture(autouse=True)
+def no_stages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages are compared whole: a slow machine must not tell its stages between them."""
+    monkeypatch.setattr(console, "_STAGES_AFTER", 3600.0)
 
 
 @pytest.fixture(scope="session")

@@ -87,7 +87,9 @@ def test_without_a_compiler_the_fmu_has_its_sources_and_says_so(
 
 def test_without_casadi_it_says_which_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
-    assert "extra 'export'" in one_message(swash("export", "coax", "--format", "c", "--out", tmp_path))
+    assert "pip install 'swashplate[export]'" in one_message(
+        swash("export", "coax", "--format", "c", "--out", tmp_path)
+    )
     assert swash("export", "coax", "--format", "control", "--out", tmp_path).code == 0
 
 
@@ -112,3 +114,14 @@ def test_a_card_that_is_no_toml_and_an_out_that_is_a_file(tmp_path: Path) -> Non
     assert "bad.toml" in one_message(swash("export", tmp_path / "bad.toml", "--format", "c"))
     outcome = swash("export", "coax", "--format", "matlab", "--out", tmp_path / "bad.toml")
     assert "expected a folder" in one_message(outcome)
+
+
+def test_an_output_with_a_suffix_is_the_files_name(tmp_path: Path) -> None:
+    wanted = tmp_path / "deep" / "hover.json"
+    done = swash("export", "raptor50", "--format", "control", "-o", wanted)
+    assert done.code == 0, done.err
+    assert done.out.split() == ["Written:", str(wanted)]
+    assert [file.name for file in wanted.parent.iterdir()] == ["hover.json"]
+    told = one_message(swash("export", "raptor50", "--format", "control", "-o", tmp_path / "hover.mat"))
+    assert "ends in '.mat', and the format writes hover_control.json. Give a folder, or a name that ends so." in told
+    assert not (tmp_path / "hover.mat").exists()

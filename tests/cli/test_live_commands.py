@@ -104,14 +104,6 @@ def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     assert "does not exist" in one_message(swash("replay", "x.nc", "--video", tmp_path / "no" / "a.mp4"))
 
 
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    import importlib.util
-
-    real = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == "uvicorn" else real(name, *a))
-    assert "pip install swashplate[live]" in one_message(swash("live", "coax", "--port", "0"))
-
-
 def test_serves_until_interrupted(tmp_path: Path) -> None:
     if not (libraries.PAGE / "vendor" / "three.module.min.js").is_file():
         pytest.skip("the page's libraries are not here: python scripts/vendor_page.py")

@@ -135,7 +135,7 @@ def test_colour_can_be_forbidden(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "\x1b" not in CliRunner().invoke(app, ["inspect", "none.mat"], color=True).stderr
 
 
-@pytest.mark.parametrize(("columns", "width"), [("40", 80), ("120", 120)])
+@pytest.mark.parametrize(("columns", "width"), [("20", 40), ("60", 60), ("120", 120)])
 def test_a_narrow_terminal_cuts_no_number_off(monkeypatch: pytest.MonkeyPatch, columns: str, width: int) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)

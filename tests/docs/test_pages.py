@@ -75,7 +75,7 @@ def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch: pytest.Monk
 @pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[f"{name}: {c.line[:60]}" for name, c in COMMANDS])
 def test_a_command_is_one_that_the_command_line_takes(name: str, command: Any) -> None:
     words = command.words
-    if words == ["pip", "install", "."]:
+    if words[:2] == ["pip", "install"] and words[2].startswith("."):
         return
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)

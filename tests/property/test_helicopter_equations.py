@@ -13,6 +13,7 @@ from swashplate.errors import CardError
 from swashplate.models import catalogue
 from swashplate.models.conventional.helicopter import Controls, loads
 from swashplate.models.nesting import leaves, rebuild
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend, FloatBackend
 from swashplate.physics.environment import Environment
@@ -127,7 +128,7 @@ def test_blades_that_feel_the_yaw_are_blades_of_a_slower_rotor() -> None:
         par = vehicle.values()._replace(rotor_speed=omega)
         built = rebuild(vehicle.state, state.tolist())
         acting = loads(
-            built, Controls(*u), par, Environment(), FLOATS, options=vehicle.derivatives.keywords["options"]
+            built, Controls(*u), par, environment_of(vehicle), FLOATS, options=vehicle.derivatives.keywords["options"]
         ).main_rotor
         return np.array([*acting.force, *acting.moment])
 

@@ -146,7 +146,7 @@ def fly_maneuver(
         controller=make,
         pilot=pilot,
         speed=speed,
-        voltage=vehicle.card.values().get("voltage_nominal") if voltage is None else voltage,
+        voltage=voltage,
         sag=sag,
         rate=rate,
         wind=wind,

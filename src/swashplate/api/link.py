@@ -19,6 +19,7 @@ from swashplate.links.recorder import Recorder, recover
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import ServoMapping, packaged, servo_mapping
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import dispatch_in_line
@@ -222,7 +223,7 @@ def _plant(
     file = None if record is None else Path(record)
     check_record(file)
     _own_process()
-    around = Environment() if environment is None else environment
+    around = environment_of(vehicle, environment)
     if voltage is not None:
         if not 0.0 < voltage < 1000.0:
             raise SwashError(f"is {voltage:g} V, expected 0 to 1000.", channel="--voltage")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import webbrowser
 from collections.abc import Callable
-from importlib import util
 from pathlib import Path
 
 from swashplate.control.controller_file import read_controller
@@ -46,9 +45,8 @@ def live(
         ready: told the page's address when it can be opened.
 
     Raises:
-        SwashError: where the extra `live` is missing, the address is taken, or the controller needs other sensors.
+        SwashError: where the address is taken, or the controller needs other sensors.
     """
-    need_live_extra()
     from swashplate.links.live import server
     from swashplate.links.live.session import LiveSession
     from swashplate.links.web import serving
@@ -91,7 +89,6 @@ def show_replay(
     Raises:
         SwashError: where the extra `live` is missing, or the address is taken.
     """
-    need_live_extra()
     from swashplate.links.live import server
     from swashplate.links.web import serving
     from swashplate.links.web.libraries import check_page
@@ -117,14 +114,3 @@ def _for_sticks(controller: Controller | str | Path) -> Autopilot:
     except ControllerError as error:
         raise SwashError(error.problem, where=file, channel="--controller", hint=error.hint) from None
     return made
-
-
-def need_live_extra() -> None:
-    """That the libraries of the extra `live` are there.
-
-    Raises:
-        SwashError: saying how to install them.
-    """
-    missing = [name for name in ("starlette", "uvicorn", "websockets") if util.find_spec(name) is None]
-    if missing:
-        raise SwashError(f"needs {', '.join(missing)}.", hint="Install them with: pip install swashplate[live]")

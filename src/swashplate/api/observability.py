@@ -69,8 +69,8 @@ def observability(
     Raises:
         SwashError: for sensors that are none; TrimError for a speed that cannot be flown.
     """
-    chosen, usual = suite(sensors), vehicle.card.values().get("voltage_nominal") if voltage is None else voltage
+    chosen = suite(sensors)
     found = tuple(
-        study(vehicle, trim(vehicle, speed=at, voltage=usual), chosen, rate=rate, seconds=seconds) for at in speeds
+        study(vehicle, trim(vehicle, speed=at, voltage=voltage), chosen, rate=rate, seconds=seconds) for at in speeds
     )
     return ObservabilityStudy(vehicle.card.title, tuple(speeds), found)

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from swashplate.api.live import announce, need_live_extra
+from swashplate.api.live import announce
 from swashplate.errors import FlightError
 from swashplate.flights import datasets
 
@@ -43,9 +43,8 @@ def open_logs(
         ready: told the page's address when it can be opened.
 
     Raises:
-        SwashError: where the extra `live` is missing, a file is not there, or the address is taken.
+        SwashError: where a file is not there, or the address is taken.
     """
-    need_live_extra()
     from swashplate.links.logs.app import logs_app
     from swashplate.links.logs.code_lines import Read
     from swashplate.links.logs.desk import Desk

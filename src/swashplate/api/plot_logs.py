@@ -11,9 +11,10 @@ from typing import Literal
 
 from swashplate.atomic import make_folder, write_bytes
 from swashplate.errors import FlightError, SwashError
+from swashplate.extras import library
 from swashplate.flights.conditioning.synchronise import synchronise
 from swashplate.flights.flight import Flight
-from swashplate.reporting.figures.libraries import library
+from swashplate.registry import listed
 from swashplate.reporting.figures.of_flight import label, over_time, spectrogram, spectrum
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.html import write_page
@@ -117,7 +118,7 @@ def plot_logs(
                 "has none of the channels that were asked for.",
                 where=label(flight, k),
                 channel=", ".join(channels),
-                hint=f"It has {', '.join(flight.channels) or 'none'}.",
+                hint=f"It has {listed(flight.channels)}.",
             )
     aligned = Aligned((0.0,) * len(given), ())
     if kind == "spectrogram":
@@ -154,7 +155,7 @@ def _write(
         return
     stamp = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {"Software": None}}[path.suffix.lower()]
     made = io.BytesIO()
-    with library("matplotlib").rc_context({"svg.hashsalt": "swashplate"}):
+    with library("matplotlib", what="drawing").rc_context({"svg.hashsalt": "swashplate"}):
         figure = still([drawn], theme=theme, title=names)
         figure.savefig(made, format=path.suffix.lower()[1:], dpi=160, metadata=stamp)
     make_folder(path.parent)

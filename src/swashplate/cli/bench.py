@@ -122,17 +122,15 @@ def plan(
         return
     screen = console()
     rows = [(r.name, ", ".join(r.procedures), f"{r.duration:.0f}", r.words) for r in made.records]
-    first = table(("record", "procedure", "seconds", "points"), rows, left=2)
-    first.columns[3].justify = "left"
+    first = table(("record", "procedure", "seconds", "points"), rows, left=2, words=(3,))
     screen.print(first)
     typer.echo(f"\nOne pass takes {made.duration / 60.0:.0f} min of records. It gives, on the virtual bench:\n")
     cells = [
         (a.name, f"{a.value:.5g}", f"{a.sigma:.2g}", a.unit, str(a.repeats or "too many"), ", ".join(a.procedures))
         for a in made.aims
     ]
-    second = table(("parameter", "value", "sigma", "unit", f"passes for {100 * accuracy:g} %", "by"), cells)
-    second.columns[3].justify = second.columns[5].justify = "left"
-    screen.print(second)
+    head = ("parameter", "value", "sigma", "unit", f"passes for {100 * accuracy:g} %", "by")
+    screen.print(table(head, cells, words=(3, 5)))
 
 
 @app.command("simulate")

@@ -10,14 +10,13 @@ import numpy as np
 
 from swashplate.bench.record import COLUMNS, BenchRecord
 from swashplate.cli.tables import table
+from swashplate.text_table import TextTable
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from swashplate.bench.result import Bench
 
 
-def bench_tables(bench: Bench) -> Iterator[Table]:
+def bench_tables(bench: Bench) -> Iterator[TextTable]:
     """The measured parameters against the published ones, the tables of the procedures, and the findings."""
     published = bench.start.card.parameters
     measured = {name: bench.model.card.parameters[name] for name in bench.names}
@@ -26,8 +25,7 @@ def bench_tables(bench: Bench) -> Iterator[Table]:
             (name, f"{published[name].value:.5g}", f"{e.value:.5g}", f"{2.0 * (e.sigma or 0.0):.2g}", e.unit, e.source)
             for name, e in measured.items()
         ]
-        made = table(("parameter", "published", "measured", "+- 2 sigma", "unit", "source"), rows)
-        made.columns[4].justify = made.columns[5].justify = "left"
+        made = table(("parameter", "published", "measured", "+- 2 sigma", "unit", "source"), rows, words=(4, 5))
         yield made
     for result in bench.details.results:
         for shown in result.tables:
@@ -38,9 +36,8 @@ def bench_tables(bench: Bench) -> Iterator[Table]:
             (f.name, f"{f.value:.4g}", f"{2.0 * f.sigma:.2g}" if math.isfinite(f.sigma) else "-", f.unit)
             for f in findings
         ]
-        made = table(("found beside the card", "value", "+- 2 sigma", "unit"), cells, title=" " if measured else None)
-        made.columns[3].justify = "left"
-        yield made
+        head = ("found beside the card", "value", "+- 2 sigma", "unit")
+        yield table(head, cells, words=(3,), title=" " if measured else None)
 
 
 def record_as_dict(record: BenchRecord) -> dict[str, object]:
@@ -59,16 +56,15 @@ def record_as_dict(record: BenchRecord) -> dict[str, object]:
     }
 
 
-def record_table(record: BenchRecord) -> Table:
+def record_table(record: BenchRecord) -> TextTable:
     """Every column of a record with its unit, range and meaning."""
     rows = [
         (name, COLUMNS[name][0], f"{values.min():.5g}", f"{np.mean(values):.5g}", f"{values.max():.5g}",
          COLUMNS[name][1])
         for name, values in record.channels.items()
     ]  # fmt: skip
-    made = table(("column", "unit", "lowest", "mean", "highest", "what"), rows, left=2, title=f"{_words(record)}\n")
-    made.columns[5].justify = "left"
-    return made
+    head = ("column", "unit", "lowest", "mean", "highest", "what")
+    return table(head, rows, left=2, words=(5,), title=f"{_words(record)}\n")
 
 
 def _words(record: BenchRecord) -> str:

@@ -33,7 +33,12 @@ Climb = Annotated[float, typer.Option("--climb", help="Climb rate [m/s], negativ
 Lateral = Annotated[float, typer.Option("--lateral", help="Speed to the right [m/s].")]
 Turn = Annotated[float, typer.Option("--turn", help="Rate of turn to the right [deg/s].")]
 Wind = Annotated[str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")]
-Altitude = Annotated[float, typer.Option("--altitude", help="Altitude in the standard atmosphere [m].")]
+Altitude = Annotated[
+    float | None,
+    typer.Option(
+        "--altitude", help="Altitude in the standard atmosphere [m]; without it, the card's air or sea level."
+    ),
+]
 Mass = Annotated[float | None, typer.Option("--mass", help="Mass instead of the card's [kg].")]
 Set = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Another number of the card; may be repeated.")
@@ -176,24 +181,25 @@ def conditions(
     lateral: Lateral = 0.0,
     turn: Turn = 0.0,
     wind: Wind = "0,0,0",
-    altitude: Altitude = 0.0,
+    altitude: Altitude = None,
     mass: Mass = None,
     changed: Set = None,
     switched: Switch = None,
 ) -> Conditions:
     """The conditions that the options describe; JAX is set up by this."""
+    from swashplate.models.surroundings import environment_of
     from swashplate.physics.atmosphere import air_density
     from swashplate.physics.environment import Environment
     from swashplate.simulation.compilation import enable_compilation_cache
 
     made = vehicle_of(vehicle, changed, switched, mass)
     enable_compilation_cache()
-    if not -500.0 <= altitude <= 11_000.0:
+    if altitude is not None and not -500.0 <= altitude <= 11_000.0:
         raise SwashError(f"is {altitude:g} m, expected -500 to 11000.", channel="--altitude")
     north, east, down = options.numbers(wind, option="--wind", count=3)
-    around = Environment(north, east, down, air_density(altitude))
-    if "voltage_nominal" in made.parameter_names:
-        around = around._replace(voltage=made.card.values()["voltage_nominal"])
+    around = environment_of(made, Environment(north, east, down))
+    if altitude is not None:
+        around = around._replace(air_density=air_density(altitude))
     return Conditions(vehicle, made, speeds(speed), climb, lateral, math.radians(turn), around)
 
 

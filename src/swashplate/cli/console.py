@@ -10,29 +10,31 @@ from typing import TYPE_CHECKING, Any
 
 from swashplate import progress_lines
 from swashplate.json_text import as_json, plain
+from swashplate.text_table import screen_width
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["Progress", "as_json", "console", "plain", "progress"]
+__all__ = ["Progress", "as_json", "console", "doing", "plain", "progress"]
 
 _PIPED_WIDTH = 400  # columns: wide enough for every line, so that a file or a pipe gets whole ones
-_NARROWEST = 80  # columns: below this a table would cut its numbers off, so that the terminal wraps whole lines instead
+_NARROWEST = 40  # columns: no table gets narrower; the terminal wraps whole lines instead
 _AFTER = 1.0  # s: what is done sooner needs no progress bar
+_STAGES_AFTER = 10.0  # s: from here on, without a terminal, every stage is a line
 
 
 def console() -> Console:
     """Standard output; as wide as the terminal, or wide enough for every table where there is none."""
     from rich.console import Console
 
-    screen = Console(highlight=False)
-    return Console(highlight=False, width=max(screen.width, _NARROWEST) if sys.stdout.isatty() else _PIPED_WIDTH)
+    return Console(highlight=False, width=max(screen_width() or _PIPED_WIDTH, _NARROWEST))
 
 
 class Progress:
-    """One line on standard error that says what is being done; appears after a second, and only on a terminal.
+    """One line on standard error that says what is being done; it appears after a second on a terminal.
 
-    Where whoever started the command asks for it, every change is a line of `progress_lines` instead.
+    Elsewhere (a pipe, a file), what takes more than ten seconds says every stage as a line of its own. Where whoever
+    started the command asks for it, every change is a line of `progress_lines` instead.
     """
 
     def __init__(self, *, quiet: bool) -> None:
@@ -40,11 +42,25 @@ class Progress:
         self._bar: Any = None
         self._latest: dict[str, Any] = {"description": "", "completed": 0.0, "total": None, "note": ""}
         # A timer, because a compilation goes on for seconds without calling back.
-        self._timer = threading.Timer(_AFTER, self._show)
+        screen = sys.stderr.isatty()
+        self._timer = threading.Timer(*((_AFTER, self._show) if screen else (_STAGES_AFTER, self._stage)))
         self._timer.daemon = True
         self._tells = progress_lines.wanted()
-        if not quiet and not self._tells and sys.stderr.isatty():
+        self._stages, self._told = False, ""
+        if not quiet and not self._tells:
             self._timer.start()
+
+    def _stage(self) -> None:
+        with self._lock:
+            if not self._timer.finished.is_set():
+                self._stages = True
+                self._tell_stage()
+
+    def _tell_stage(self) -> None:
+        what = self._latest["description"]
+        if self._stages and what and what != self._told:
+            self._told = what
+            print(f"... {what}", file=sys.stderr, flush=True)
 
     def _show(self) -> None:
         from rich.console import Console
@@ -68,12 +84,21 @@ class Progress:
             self._latest = {"description": what, "completed": done, "total": total, "note": note}
             if self._bar is not None:
                 self._bar.update(self._bar.task_ids[0], **self._latest)
+            self._tell_stage()
 
     def close(self) -> None:
         with self._lock:
             self._timer.cancel()
             if self._bar is not None:
                 self._bar.stop()
+
+
+@contextmanager
+def doing(what: str, *, quiet: bool) -> Iterator[None]:
+    """Says one thing that takes a while, as `progress` does."""
+    with progress(quiet=quiet) as line:
+        line.say(what)
+        yield
 
 
 @contextmanager

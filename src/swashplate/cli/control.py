@@ -82,23 +82,25 @@ def design(
     """
     shared.check_suffixes((out, ".toml", "--out"), (c_code, ".c", "--c"))
     import swashplate as sp
+    from swashplate.cli.console import doing
 
-    made = sp.design_controller(
-        given.vehicle_of(model, None, switched),
-        method=method.value,
-        sensors=sensors,
-        holding=holding.value,
-        speeds=given.speeds(speed),
-        rate=rate,
-        delays=delays_from(delay),
-        computation=None if computation is None else computation / 1e3,
-        allowed=options.numbers_by_name(allow, option="--allow"),
-        effort=options.numbers_by_name(effort, option="--effort") or None,
-        Q=_weights(state_weights, "--state-weights"),
-        R=_weights(input_weights, "--input-weights"),
-        gain=gain.value,
-        voltage=voltage,
-    )
+    with doing("designing the controller", quiet=quiet or json):
+        made = sp.design_controller(
+            given.vehicle_of(model, None, switched),
+            method=method.value,
+            sensors=sensors,
+            holding=holding.value,
+            speeds=given.speeds(speed),
+            rate=rate,
+            delays=delays_from(delay),
+            computation=None if computation is None else computation / 1e3,
+            allowed=options.numbers_by_name(allow, option="--allow"),
+            effort=options.numbers_by_name(effort, option="--effort") or None,
+            Q=_weights(state_weights, "--state-weights"),
+            R=_weights(input_weights, "--input-weights"),
+            gain=gain.value,
+            voltage=voltage,
+        )
     code = shared.write(made, out=out, c_code=c_code, precision=precision)
     told = None
     if code is not None:

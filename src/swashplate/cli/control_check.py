@@ -71,25 +71,27 @@ def check(
     if scale is not None and not scale > 0.0:
         raise SwashError(f"is {scale:g}, expected a positive number.", channel="--scale", hint="Full size is 1.")
     import swashplate as sp
+    from swashplate.cli.console import doing
     from swashplate.cli.flying import end_with
     from swashplate.cli.gusts import turbulence
     from swashplate.cli.outputs import folder_when_complete, place_of
 
     with folder_when_complete(out, ours=OURS) as folder:
-        found = sp.check_controller(
-            given.vehicle_of(model, None, None),
-            controller,
-            speed=speed,
-            voltage=voltage,
-            task=task.value,
-            command=response.value,
-            scale=scale,
-            duration=duration,
-            gusts=turbulence(gusts),
-            delays=delays_from(delay),
-            computation=None if computation is None else computation / 1e3,
-            required_delay=None if delay_margin is None else delay_margin / 1e3,
-        )
+        with doing("checking the controller", quiet=quiet or json):
+            found = sp.check_controller(
+                given.vehicle_of(model, None, None),
+                controller,
+                speed=speed,
+                voltage=voltage,
+                task=task.value,
+                command=response.value,
+                scale=scale,
+                duration=duration,
+                gusts=turbulence(gusts),
+                delays=delays_from(delay),
+                computation=None if computation is None else computation / 1e3,
+                required_delay=None if delay_margin is None else delay_margin / 1e3,
+            )
         if folder is not None:
             from swashplate.atomic import write_text
             from swashplate.json_text import as_json

@@ -68,23 +68,25 @@ def decouple(
         raise SwashError("goes into the file of --out; the C of --c takes measurements.", channel="--sensors")
     import swashplate as sp
     from swashplate.api.decouple import PAPERS_SPEED
+    from swashplate.cli.console import doing
 
-    made = sp.decouple(
-        sp.vehicle(model),
-        mode=mode.value,
-        lag=None if lag is None else _lag(lag),
-        mixing=None if mixing is None else mixing.value,
-        speed_terms=speed_terms,
-        voltage=voltage,
-        rate=rate,
-        sensors=sensors,
-        step=step,
-        to_speed=PAPERS_SPEED if report is not None and step is None and to_speed is None else to_speed,
-        drift=drift,
-        fit=fit,
-        draws=draws,
-        seed=seed,
-    )
+    with doing("designing the controller", quiet=quiet or json):
+        made = sp.decouple(
+            sp.vehicle(model),
+            mode=mode.value,
+            lag=None if lag is None else _lag(lag),
+            mixing=None if mixing is None else mixing.value,
+            speed_terms=speed_terms,
+            voltage=voltage,
+            rate=rate,
+            sensors=sensors,
+            step=step,
+            to_speed=PAPERS_SPEED if report is not None and step is None and to_speed is None else to_speed,
+            drift=drift,
+            fit=fit,
+            draws=draws,
+            seed=seed,
+        )
     code = shared.write(made, out=out, c_code=c_code, precision=precision)
     if report is not None:
         sp.report(made, path=report)

@@ -49,18 +49,20 @@ def decouple(
     if min(frequencies) <= 0.0:
         raise SwashError(f"'{at}' is not all positive.", channel="--at")
     import swashplate as sp
+    from swashplate.cli.console import doing
     from swashplate.cli.flying import end_with
 
-    made = sp.decouple_axes(
-        sp.vehicle(model),
-        pairs=options.assignments(pair, option="--pair"),
-        frequency=frequency,
-        bandwidth=bandwidth,
-        keep=[part.strip() for part in keep.split(",")] if keep else None,
-        frequencies=frequencies,
-        speed=speed,
-        name=model,
-    )
+    with doing("designing the decoupling", quiet=quiet or json):
+        made = sp.decouple_axes(
+            sp.vehicle(model),
+            pairs=options.assignments(pair, option="--pair"),
+            frequency=frequency,
+            bandwidth=bandwidth,
+            keep=[part.strip() for part in keep.split(",")] if keep else None,
+            frequencies=frequencies,
+            speed=speed,
+            name=model,
+        )
     if out is not None:
         made.save(out)
     if report is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -45,7 +46,8 @@ def export(
         ),
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for the files; it is made if missing.")
+        Path,
+        typer.Option("--out", metavar="DIR|FILE", help="Folder, made if missing; or one file's name."),
     ] = Path("."),
     speed: Annotated[
         str | None,
@@ -93,6 +95,8 @@ def export(
         raise SwashError(
             f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join((*FORMATS, MCAP))}."
         )
+    one_file = out.suffix in _ENDINGS and not out.is_dir()
+    name = out.stem if one_file and name is None else name
     only_vehicles = {"--speed": speed, "--mass": mass, "--set": changed, "--option": switched, "--delays": delays}
     refused = [option for option, value in only_vehicles.items() if value is not None]
     if form == MCAP:
@@ -108,8 +112,7 @@ def export(
         made = sp.export_model(
             exported, form, name=name or Path(model).stem, trim=trim, precision=precision.value, delays=delays
         )
-    made.save(out)
-    written = [str(out / file) for file in made.files]
+    written = [str(file) for file in (_as_file(made, out).save(out.parent) if one_file else made.save(out))]
     if json:
         typer.echo(as_json({"files": written, "notes": list(made.notes)}))
         return
@@ -117,6 +120,24 @@ def export(
         typer.echo(f"Note: {note}", err=True)
     if not quiet:
         typer.echo(f"Written: {', '.join(written)}")
+
+
+_ENDINGS = (".c", ".fmu", ".json", ".mat", ".mcap")
+
+
+def _as_file(made: Export, out: Path) -> Export:
+    """The files with the name that one of them was given."""
+    alike = [file for file in made.files if Path(file).suffix == out.suffix]
+    if not alike:
+        raise SwashError(
+            f"ends in '{out.suffix}', and the format writes {', '.join(made.files)}.",
+            where=out,
+            channel="--out",
+            hint="Give a folder, or a name that ends so.",
+        )
+    if out.name in made.files:
+        return made
+    return replace(made, files={out.name if file == alike[0] else file: text for file, text in made.files.items()})
 
 
 def _flight(flight: str, name: str | None, refused: list[str]) -> Export:

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from swashplate.cli.spelling import spelled
 from swashplate.errors import SwashError
+from swashplate.extras import EXTRA_OF, missing
 
 _LONGEST = 200  # characters of a foreign error that are shown
 _LONGEST_LINE = 1_900  # of a whole message: file names may have thousands
@@ -73,6 +74,8 @@ class Guarded(TyperGroup):
         except OSError as error:
             _end(_file_trouble(error), Exit.INPUT, debug=debug)
         except Exception as error:
+            if isinstance(error, ModuleNotFoundError) and (library := (error.name or "").partition(".")[0]) in EXTRA_OF:
+                _end(str(missing(library, what=f"swash {ctx.invoked_subcommand}")), Exit.INPUT, debug=debug)
             first = next(iter(str(error).splitlines()), "")[:_LONGEST]  # libraries put whole tracebacks into a message
             described = f"{type(error).__name__}: {first}" if first else type(error).__name__
             advice = "This is a bug in swashplate, not in your input. Please report it with the output of"

@@ -42,7 +42,6 @@ def live(
     from swashplate.api import live as verbs
     from swashplate.cli.console import progress
 
-    verbs.need_live_extra()
     if out.exists() and not out.is_dir():
         raise SwashError("is a file, expected a folder.", where=out, channel="--out")
     vehicle = given.vehicle_of(model, None, switched, whole=True)

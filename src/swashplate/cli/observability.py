@@ -23,13 +23,15 @@ def observability(
 ) -> None:
     """Say which directions of a vehicle's states a sensor suite cannot see, and how well the others are known."""
     import swashplate as sp
+    from swashplate.cli.console import doing
 
-    found = sp.observability(
-        given.vehicle_of(model, None, switched),
-        sensors,
-        speeds=given.speeds(speed),
-        seconds=seconds,
-        rate=rate,
-        voltage=voltage,
-    )
+    with doing("watching the observer", quiet=json):
+        found = sp.observability(
+            given.vehicle_of(model, None, switched),
+            sensors,
+            speeds=given.speeds(speed),
+            seconds=seconds,
+            rate=rate,
+            voltage=voltage,
+        )
     shared.show(found, written=(), json=json, quiet=False)

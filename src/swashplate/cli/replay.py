@@ -52,7 +52,6 @@ def replay(
 ) -> None:
     """Replay a flight: scrub through it in the browser, or film it."""
     import swashplate as sp
-    from swashplate.api.live import need_live_extra
     from swashplate.cli.console import progress
     from swashplate.cli.reading import asked, read
 
@@ -64,8 +63,6 @@ def replay(
         raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
     chosen = None if model is None else given.vehicle_of(model, None, None)
     film_place = video or frames
-    if film_place is None:
-        need_live_extra()
     with progress(quiet=quiet) as line:
 
         def prepared() -> Replay:

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.table import Table
+from swashplate.text_table import TextTable
 
+if TYPE_CHECKING:
     from swashplate.identification.core.result import Result
     from swashplate.models.vehicle import Vehicle
     from swashplate.validation.validation import Score, Validation
@@ -17,20 +16,23 @@ if TYPE_CHECKING:
 _FIGURES_FROM = 110  # columns of a terminal that hold all three figures side by side
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]], *, left: int = 1, title: str | None = None) -> Table:
-    """Text cells as a rich table; the first `left` columns are words, the others numbers."""
-    from rich.markup import escape
-    from rich.table import Table
+def table(
+    head: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    *,
+    left: int = 1,
+    words: Iterable[int] = (),
+    keys: int = 1,
+    title: str | None = None,
+) -> TextTable:
+    """Text cells as a table; the first `left` columns and those of `words` are words, the others numbers.
 
-    made = Table(box=None, pad_edge=False, title=title, title_justify="left", header_style="bold")
-    for place, heading in enumerate(head):
-        made.add_column(escape(heading), justify="left" if place < left else "right", overflow="fold")
-    for row in rows:
-        made.add_row(*(escape(cell) for cell in row))
-    return made
+    Where it is too wide the first `keys` columns stand again before the rest.
+    """
+    return TextTable(tuple(head), [tuple(row) for row in rows], (*range(left), *words), keys, title or "")
 
 
-def fit_table(fit: Result[Any, Any]) -> RenderableType:
+def fit_table(fit: Result[Any, Any]) -> TextTable:
     """Published and identified value of each parameter, two corrected sigmas, and what decided it."""
     rows = []
     for e in fit.estimates:
@@ -40,9 +42,7 @@ def fit_table(fit: Result[Any, Any]) -> RenderableType:
         known = math.isfinite(e.best_sigma) and not e.tie
         bound = f"{2 * e.best_sigma:.2g}" if known else "-"
         rows.append((e.name, f"{e.start:.4g}", f"{e.value:.4g}", bound, e.unit, ", ".join(remarks)))
-    made = table(("parameter", "published", "identified", "+- 2 sigma", "unit", "remark"), rows)
-    made.columns[4].justify = made.columns[5].justify = "left"
-    return made
+    return table(("parameter", "published", "identified", "+- 2 sigma", "unit", "remark"), rows, words=(4, 5))
 
 
 def _cells(scores: dict[str, Score], figure: str, factor: float, style: str) -> list[str]:
@@ -50,7 +50,7 @@ def _cells(scores: dict[str, Score], figure: str, factor: float, style: str) -> 
     return ["-" if value is None else format(value, style) for value in values]
 
 
-def validation_table(validation: Validation, *, width: int) -> RenderableType:
+def validation_table(validation: Validation, *, width: int) -> TextTable:
     """Fit %, RMS error and Theil's coefficient of the model and its rivals, by channel and horizon."""
     from swashplate.flights.schema import channel
     from swashplate.validation.validation import PREDICTORS
@@ -71,25 +71,22 @@ def validation_table(validation: Validation, *, width: int) -> RenderableType:
     for _, heading, _ in figures:
         first, *others = (short[predictor] for predictor in PREDICTORS)
         head += [f"{heading}{first}", *others]
-    return table(head, rows, left=2)
+    return table(head, rows, left=2, keys=3)
 
 
-def floors_table(validation: Validation) -> RenderableType:
+def floors_table(validation: Validation) -> TextTable:
     """What the model's scores stand beside, by channel and horizon."""
     from swashplate.validation.floors import ROWS
 
     head = ("channel", "ahead [s]", "fit %", *(words for words, _ in ROWS))
     rows = [(f.channel, f"{f.horizon:g}", f"{f.fit:.0f}", *(cell(f) for _, cell in ROWS)) for f in validation.floors]
-    return table(head, rows)
+    return table(head, rows, keys=2)
 
 
-def parameter_table(vehicle: Vehicle) -> RenderableType:
+def parameter_table(vehicle: Vehicle) -> TextTable:
     """Every number of a card with its unit, status and source."""
     rows = [
         (name, f"{p.value:.6g}", p.unit, p.status, p.source + (f" ({p.note})" if p.note else ""))
         for name, p in vehicle.card.parameters.items()
     ]
-    made = table(("parameter", "value", "unit", "status", "source"), rows)
-    for place in (2, 3, 4):
-        made.columns[place].justify = "left"
-    return made
+    return table(("parameter", "value", "unit", "status", "source"), rows, words=(2, 3, 4))

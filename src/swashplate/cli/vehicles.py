@@ -84,7 +84,7 @@ def show(
     if trim:
         import swashplate as sp
 
-        hover = sp.trim(vehicle, voltage=card.values().get("voltage_nominal"))
+        hover = sp.trim(vehicle)
     if json:
         document: dict[str, Any] = {
             "vehicle": card.vehicle,

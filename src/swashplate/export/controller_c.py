@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from swashplate.atomic import write_text
 from swashplate.control.kinds import TracedStep, kind_of
-from swashplate.errors import ControllerError
+from swashplate.extras import library
 from swashplate.simulation.closed_loop import REFERENCES, Controller
 
 Precision = Literal["double", "float"]
@@ -58,14 +58,10 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
         precision: of every number in it.
 
     Raises:
-        ControllerError: where CasADi is not installed, or this kind of controller has no C.
+        ControllerError: where this kind of controller has no C.
+        MissingLibraryError: where CasADi is not installed.
     """
-    try:
-        import casadi
-    except ImportError:
-        raise ControllerError(
-            "needs CasADi.", channel="C code", hint="Install swashplate with the extra 'export'."
-        ) from None
+    casadi = library("casadi", what="C code")
     traced = kind_of(controller).traced(controller)
     function = traced.function
     with tempfile.TemporaryDirectory() as folder:

@@ -127,7 +127,7 @@ def export_model(
         if delays is False and any(known.values()):
             told = ", ".join(f"{name} {1e3 * d:.3g} ms" for name, d in known.items() if d)
             left_out = f"Left out: the identified delays of the inputs ({told})."
-        about = trim or find_trim(flying, voltage=flying.card.values().get("voltage_nominal"))
+        about = trim or find_trim(flying)
     called = identifier(name)
     made = FORMATS[form](ExportRequest(model, called, about, late, precision))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made

@@ -22,6 +22,7 @@ import xarray as xr
 
 from swashplate.atomic import write_bytes
 from swashplate.errors import ExportError
+from swashplate.extras import library
 from swashplate.flights.flight import Flight
 
 _SECOND = 1_000_000_000
@@ -99,13 +100,7 @@ def schema(name: str, data: xr.Dataset) -> dict[str, Any]:
 
 
 def _library(where: str) -> Any:
-    try:
-        from mcap import writer
-    except ImportError:
-        raise ExportError(
-            "needs the library mcap.", where=where or None, hint="Install it with: pip install swashplate[mcap]"
-        ) from None
-    return writer
+    return library("mcap.writer", what="the format mcap", where=where or None)
 
 
 def _messages(flight: Flight, shift: float) -> Iterator[tuple[int, str, str, int]]:

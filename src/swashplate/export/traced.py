@@ -11,6 +11,7 @@ import numpy as np
 from swashplate.errors import ExportError
 from swashplate.export.c_text import identifier
 from swashplate.export.linear import Linear
+from swashplate.extras import library
 from swashplate.flights.schema import channel, is_known
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
@@ -81,13 +82,7 @@ def late_notes(model: Traced) -> tuple[str, ...]:
 
 def require_casadi() -> Any:
     """CasADi, or what to do without it."""
-    try:
-        import casadi
-    except ImportError:
-        raise ExportError(
-            "needs CasADi.", channel="C code", hint="Install swashplate with the extra 'export'."
-        ) from None
-    return casadi
+    return library("casadi", what="C code")
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import kalman_gain
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.discretisation import held_series
 from swashplate.simulation.dynamics import (
@@ -99,7 +99,8 @@ class StochasticModel:
 
     def _rates(self, parameters: Any) -> Any:
         rates = row_rates(self.equations, padded=False)
-        constants = [getattr(Environment(), name) for name in CONSTANTS]
+        around = environment_of(self.vehicle, parameters=parameters)
+        constants = [getattr(around, name) for name in CONSTANTS]
         numbers = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])
         return lambda x, w: rates(x, w, numbers)
 

@@ -20,7 +20,7 @@ from swashplate.flights.conditioning.attitude import interpolate, quaternion_fro
 from swashplate.flights.conditioning.derive import body_rates, differentiate
 from swashplate.flights.conditioning.resample import common, unbroken
 from swashplate.flights.flight import Flight
-from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
+from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
 
 Array = NDArray[np.float64]
 Reference = Callable[[Array], Array]
@@ -217,7 +217,7 @@ def _compared(
             if name and told:
                 # The band in which the two sides know each other best: noise of a derivative, drift of a gyroscope.
                 clearest = max(told, key=lambda by_axis: max(abs(at.correlation) for at in by_axis.values()))
-                found += _judged(here, i, clearest, kind)
+                found += _judged(flight, here, i, clearest, kind)
     return found
 
 
@@ -285,7 +285,9 @@ def _agreements(
     return made
 
 
-def _judged(names: tuple[str, ...], i: int, by_axis: Mapping[int, _Agreement], kind: _Kind) -> list[Inconsistency]:
+def _judged(
+    flight: Flight, names: tuple[str, ...], i: int, by_axis: Mapping[int, _Agreement], kind: _Kind
+) -> list[Inconsistency]:
     """What the agreements of one channel with the three axes say; nothing where all is right or nothing can be told."""
     name, own = names[i], by_axis.get(i)
     best = max(by_axis, key=lambda j: abs(by_axis[j].correlation))
@@ -313,8 +315,19 @@ def _judged(names: tuple[str, ...], i: int, by_axis: Mapping[int, _Agreement], k
     words = [f"is {unit[1:]} times too small (converted twice?)" if doubled else f"looks like {unit}, not {inside}"]
     words = words * bool(unit) + ["has the other sign"] * bool(sign)
     text = f"{' and '.join(words)}, against {kind.reference} ({number})"
-    mend = "Check the units of both sides." if doubled else f"Give --unit {name}={sign}{unit or inside}."
+    mend = "Check the units of both sides." if doubled else _unit_to_give(flight, name, sign=sign, looks_like=unit)
     return [Inconsistency(name, text, mend)] if words else []
+
+
+def _unit_to_give(flight: Flight, name: str, *, sign: str, looks_like: str) -> str:
+    """The option that mends a channel: it replaces the unit that the file was read with, sign and all."""
+    inside = channel(name).unit
+    logged = str(flight[name].attrs.get(LOGGED_UNIT, "")) or inside
+    turned, plain = logged.startswith("-"), logged.removeprefix("-")
+    if looks_like and plain != inside:
+        return f"It was read as {logged}; check its unit."
+    signed = "-" if turned != bool(sign) else ""
+    return f"Give --unit {name}={signed}{looks_like or plain}."
 
 
 def _unit_of(ratio: float, kind: _Kind) -> str | None:
@@ -341,7 +354,8 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
             if abs(abs(felt) - weight) < 0.3 * weight and (unit, felt > 0.0) != ("m/s^2", True):
                 words = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
                 text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected -9.81 m/s^2"
-                mend = f"Give --unit {name}={'-' if felt < 0.0 else ''}{unit}."
+                sign, looks_like = "-" if felt < 0.0 else "", "" if unit == "m/s^2" else unit
+                mend = _unit_to_give(flight, name, sign=sign, looks_like=looks_like)
                 # Without an attitude it may have lain on its back.
                 found.append(Inconsistency(name, text, mend, decisive=attitude is not None))
     return found

@@ -19,6 +19,7 @@ from swashplate.flights import storage
 from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import channel
 from swashplate.public import resolve
+from swashplate.registry import listed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,7 +108,7 @@ class Flight:
             f"the flight has no such channel.{f' {asked}' if asked else ''}",
             where=self.provenance.source or None,
             channel=name,
-            hint=f"It has {', '.join(self.channels) or 'none'}.",
+            hint=f"It has {listed(self.channels)}.",
         )
 
     def time(self, name: str) -> Array:

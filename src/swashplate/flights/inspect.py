@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.flights.schema import QUATERNION, channel, is_known
 from swashplate.shown import Shown
+from swashplate.text_table import TextTable, screen_width
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -152,11 +154,15 @@ class Inspection(Shown):
     def _lists(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
         return (("sweeps", tuple(map(str, self.sweeps))), ("problems", self.problems), ("notes", self.notes))
 
+    def _tables(self) -> Iterator[TextTable]:
+        for heading, *rows in (self.stream_rows(), self.channel_rows()):
+            words = [i for i in range(len(heading)) if not (rows and _is_number(rows[0][i]))]
+            yield TextTable(heading, rows, words)
+
     def __str__(self) -> str:
         lines = [self._title()]
-        for rows in (self.stream_rows(), self.channel_rows()):
-            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-            lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
+        for table in self._tables():
+            lines += ["", table.text(screen_width())]
         for heading, texts in self._lists():
             lines += ["", f"{heading}: {'' if texts else 'none'}".rstrip(), *(f"  - {text}" for text in texts)]
         return "\n".join(lines)
@@ -164,15 +170,9 @@ class Inspection(Shown):
     def __rich__(self) -> Group:
         from rich.console import Group, RenderableType
         from rich.markup import escape
-        from rich.table import Table
 
         parts: list[RenderableType] = [f"[bold]{escape(self._title())}[/bold]"]
-        for heading, *rows in (self.stream_rows(), self.channel_rows()):
-            table = Table(box=None, pad_edge=False)
-            for i, cell in enumerate(heading):
-                table.add_column(escape(cell), justify="right" if rows and _is_number(rows[0][i]) else "left")
-            for row in rows:
-                table.add_row(*map(escape, row))
+        for table in self._tables():
             parts += ["", table]
         for title, texts in self._lists():
             parts += ["", f"[bold]{title}[/bold]", *(f"  • {escape(text)}" for text in texts or ("none",))]

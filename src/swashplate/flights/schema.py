@@ -99,6 +99,8 @@ POSITION = ("x", "y", "z")
 ATTITUDE = ("phi", "theta", "psi")
 VELOCITY = ("u", "v", "w")
 RATES = ("p", "q", "r")
+LOGGED_UNIT = "logged_unit"
+"""Attribute of a channel: the unit that its file was read with, where a reader keeps it."""
 QUATERNION = ("qw", "qx", "qy", "qz")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
 from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector
@@ -72,11 +73,11 @@ class Plant:
         record_rate: float = 200.0,
     ) -> None:
         self.vehicle, self.mapping = vehicle, mapping
-        self._around = around
-        self._rest = at_rest(vehicle, around.environment)
+        self._around = replace(around, environment=environment_of(vehicle, around.environment))
+        self._rest = at_rest(vehicle, self.environment)
         self.standing_depth = -float(self._rest[vehicle.index("z")])
         self.numbers = vehicle.card.values()
-        self._stepping = Stepping(vehicle, self._rest, around.environment)
+        self._stepping = Stepping(vehicle, self._rest, self.environment)
         self._recorder, self._spacing = recorder, 1.0 / record_rate
         self.restart()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 
@@ -30,9 +31,10 @@ def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array)
     said = vehicle.traits.doubts
     if said is None:
         return ()
-    first: dict[str, str] = {}
+    usual, first = environment_of(vehicle), dict[str, str]()
     for k in np.unique(np.linspace(0, len(time) - 1, min(_LOOKS, len(time))).astype(int)):
-        for kind, words in said(vehicle, x[k], u[k], Environment(*(float(v) for v in wind[k]))).items():
+        blowing = dict(zip(Environment._fields[:3], map(float, wind[k]), strict=True))
+        for kind, words in said(vehicle, x[k], u[k], usual._replace(**blowing)).items():
             first.setdefault(kind, f"At {time[k]:.1f} s {words}")
     return tuple(first.values())
 

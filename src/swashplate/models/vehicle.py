@@ -12,12 +12,13 @@ from swashplate.models.card import Card
 from swashplate.models.choices import Choice
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
+from swashplate.models.surroundings import environment_of
 from swashplate.models.traits import Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment
 
-_CALM, _FLOATS = Environment(), FloatBackend()
+_FLOATS = FloatBackend()
 Derivatives = Callable[[Any, Any, Any, Environment, Backend], Any]
 
 
@@ -88,15 +89,16 @@ class Vehicle:
         return self.parameters(*(numbers[name] for name in self.parameter_names))
 
     def rates(
-        self, x: Any, u: Any, parameters: Any, environment: Environment = _CALM, xp: Backend = _FLOATS
+        self, x: Any, u: Any, parameters: Any, environment: Environment | None = None, xp: Backend = _FLOATS
     ) -> list[Any]:
         """Derivatives of the flat state row `x` under the flat input row `u`, as a list in the order of the states.
 
-        In calm air and on plain floats where nothing else is said.
+        In calm air of its own (`environment_of`) and on plain floats where nothing else is said.
         """
         nested = rebuild(self.state, [x[i] for i in range(len(self.state_names))])
         commands = self.inputs(*(u[i] for i in range(len(self.input_names))))
-        return list(leaves(self.derivatives(nested, commands, parameters, environment, xp)))
+        around = environment_of(self, environment, parameters=parameters)
+        return list(leaves(self.derivatives(nested, commands, parameters, around, xp)))
 
     def index(self, state: str) -> int:
         """Place of a state in the flat row."""

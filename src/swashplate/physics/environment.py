@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from swashplate.physics.backend import Scalar
 from swashplate.physics.frames import Vector
 
 LABORATORY_GRAVITY = 9.81
 """m/s^2, the value that the published hover figures of the CoaX were computed with (Zurich: 9.807)."""
+USUAL: Any = None
+"""Not said: what is usual for the vehicle (`swashplate.models.surroundings.environment_of` fills it in)."""
 
 
 class Environment(NamedTuple):
-    """Surroundings at one instant; wind is the air's velocity in local axes (north-east-down)."""
+    """Surroundings at one instant; wind is the air's velocity in local axes (north-east-down).
+
+    Air density [kg/m^3] and battery voltage [V] that are not given are the vehicle's own: the density of its card, or
+    1.225 kg/m^3 (sea level of the standard atmosphere) where the card has none, and the card's nominal voltage.
+    """
 
     wind_north: Scalar = 0.0
     wind_east: Scalar = 0.0
     wind_down: Scalar = 0.0
-    air_density: Scalar = 1.2
+    air_density: Scalar = USUAL
     gravity: Scalar = LABORATORY_GRAVITY
-    voltage: Scalar = 12.22
+    voltage: Scalar = USUAL
 
     @property
     def wind(self) -> Vector:

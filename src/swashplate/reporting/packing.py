@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.reporting.figures.libraries import library
+from swashplate.extras import library
 from swashplate.reporting.figures.themes import unpacked
 from swashplate.reporting.structure import Figure
 
@@ -33,7 +33,7 @@ def plotly_script() -> str:
     Raises:
         SwashError: plotly missing, with the command that installs it.
     """
-    return _squeezed(str(library("plotly.offline").get_plotlyjs()).encode("utf-8"))
+    return _squeezed(str(library("plotly.offline", what="a page").get_plotlyjs()).encode("utf-8"))
 
 
 def figures_text(figures: Sequence[Figure]) -> str:

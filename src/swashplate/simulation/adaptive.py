@@ -15,8 +15,9 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision, equations_of, parameter_row, row_rates
+from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
-from swashplate.simulation.trim import Trim, start_row
+from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 
 def simulate_adaptive(
@@ -27,6 +28,7 @@ def simulate_adaptive(
     rate: float = 100.0,
     interpolation: Interpolation = "linear",
     environment: Environment | None = None,
+    delays: Delays = None,
     tolerance: float = 1e-11,
     max_steps: int = 100_000,
 ) -> Flight:
@@ -36,17 +38,18 @@ def simulate_adaptive(
     sample, where the inputs have a jump ("held") or a kink ("linear").
 
     Args:
-        vehicle, inputs, start, rate, interpolation, environment: as in `simulate`.
+        vehicle, inputs, start, rate, interpolation, environment, delays: as in `simulate`.
         tolerance: relative and absolute error per step.
         max_steps: how many steps it may take before it gives up.
     """
     enable_double_precision()
-    surroundings = environment or Environment()
+    surroundings = surroundings_of_start(vehicle, start, environment)
     time, rows = driving_rows(vehicle, inputs, rate=rate, environment=surroundings, interpolation=interpolation)
-    first = dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True))
-    x0 = start_row(vehicle, start, surroundings._replace(**first))
+    first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True)))
+    x0 = start_row(vehicle, start, first)
+    acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
     rates, p = row_rates(equations_of(vehicle), padded=False), jnp.asarray(parameter_row(vehicle, surroundings))
-    stamps, table = jnp.asarray(time), jnp.asarray(rows)
+    stamps, table = jnp.asarray(time), jnp.asarray(acting)
 
     def field(t: Any, x: Any, _: Any) -> Any:
         i = jnp.clip(jnp.searchsorted(stamps, t, side="right") - 1, 0, stamps.size - 2)

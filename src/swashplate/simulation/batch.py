@@ -28,10 +28,11 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
-from swashplate.simulation.trim import Trim, start_row
+from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 Precision = Literal["float64", "float32"]
 
@@ -86,6 +87,7 @@ def simulate_batch(
     rate: float = 100.0,
     interpolation: Interpolation = "held",
     environment: Environment | None = None,
+    delays: Delays = None,
     keep: int = 1,
     precision: Precision = "float64",
 ) -> Batch:
@@ -99,12 +101,13 @@ def simulate_batch(
         size: number of vehicles, needed where nothing else says it.
         rate: steps per second [Hz].
         interpolation: inputs "held" or "linear" between samples.
-        environment: air, gravity, and wind and voltage where `inputs` has none.
+        environment: air, gravity, and wind and voltage where `inputs` has none; by default as in `simulate`.
+        delays: as in `simulate`.
         keep: every how many steps a sample is kept (memory: 8 x 18 bytes per sample and vehicle).
         precision: "float32" is faster and loses about nine digits.
     """
     enable_double_precision()
-    surroundings = environment or Environment()
+    surroundings = surroundings_of_start(vehicle, start, environment)
     numbers = {name: np.asarray(values, dtype=np.float64) for name, values in (parameters or {}).items()}
     for name in numbers:
         if name not in vehicle.parameter_names:
@@ -121,14 +124,15 @@ def simulate_batch(
     for name, values in numbers.items():
         p[vehicle.parameter_names.index(name)] = values
     fixed = start if isinstance(start, Trim) else {k: float(v) for k, v in states.items() if not v.ndim}
-    first = dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :, 0], strict=True))
-    x0 = np.repeat(start_row(vehicle, fixed, surroundings._replace(**first))[:, None], count, axis=1)
+    first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :, 0], strict=True)))
+    x0 = np.repeat(start_row(vehicle, fixed, first)[:, None], count, axis=1)
     for name, values in states.items():
         if values.ndim:
             x0[vehicle.index(name)] = values
 
     dtype = np.dtype(precision)
-    arguments = (np.asarray(values, dtype) for values in (x0, rows, p, 1.0 / rate))
+    acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
+    arguments = (np.asarray(values, dtype) for values in (x0, acting, p, 1.0 / rate))
     later = fly_batch(equations_of(vehicle), *arguments, keep=keep, held=interpolation == "held")
     kept = np.arange(0, steps + 1, keep)
     return Batch(vehicle, kept / rate, np.asarray(later)[: kept.size], rows[kept])

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
@@ -29,9 +29,10 @@ from swashplate.simulation.dynamics import (
     row_force,
     row_rates,
 )
+from swashplate.simulation.late import steps_late
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
-from swashplate.simulation.trim import Trim, start_row, trim
+from swashplate.simulation.trim import Trim, start_row, surroundings_of_start, trim
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
@@ -80,11 +81,6 @@ def flown_delays(
     return np.array(list(complete_delays(vehicle, delays).values()))
 
 
-def steps_late(delays: Array, rate: float) -> NDArray[np.int_]:
-    """Delays [s] in steps of a simulation at `rate` [Hz], rounded up: no command acts before it can."""
-    return np.asarray(np.ceil(np.asarray(delays) * rate - 1e-6), dtype=np.int_)
-
-
 def simulate_closed_loop(
     vehicle: Vehicle,
     controller: Controller,
@@ -130,7 +126,7 @@ def simulate_closed_loop(
     n = round(duration * rate) + 1
     if n < 2:
         raise SwashError(f"duration is {duration} s, expected at least one step of {1.0 / rate:g} s.")
-    surroundings = environment or Environment()
+    surroundings = surroundings_of_start(vehicle, start, environment)
     given = {**(wind or {}), **({} if voltage is None else {"voltage": voltage})}
     around = _table(SURROUNDINGS, given, n, [getattr(surroundings, name) for name in SURROUNDINGS])
     x0 = start_row(vehicle, start, surroundings._replace(**dict(zip(SURROUNDINGS, around[0], strict=True))))

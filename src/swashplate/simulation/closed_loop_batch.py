@@ -18,7 +18,7 @@ from swashplate.errors import CardError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch
-from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays, steps_late
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -29,9 +29,10 @@ from swashplate.simulation.dynamics import (
     row_force,
     row_rates,
 )
+from swashplate.simulation.late import steps_late
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
-from swashplate.simulation.trim import Trim
+from swashplate.simulation.trim import Trim, surroundings_of_start
 from swashplate.simulation.trim import trim as find_trim
 
 BLOCK = 256
@@ -93,7 +94,7 @@ def simulate_closed_loops(
     if samples < 1 or size < 1:
         raise SwashError(f"{samples} samples of {size} vehicles, expected at least one of each.")
     begin = start or find_trim(vehicle, environment=environment)
-    surroundings = environment or begin.environment
+    surroundings = surroundings_of_start(vehicle, begin, environment)
     given: dict[str, Any] = {**(wind or {}), **({} if voltage is None else {"voltage": voltage})}
     around = np.stack(
         [_series(name, given.get(name, getattr(surroundings, name)), samples, size) for name in SURROUNDINGS], 1

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Num
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from swashplate.arrays import Array
@@ -24,7 +24,7 @@ def zero_order_hold(A: Array, B: Array, dt: float) -> tuple[Array, Array]:
     return np.asarray(F), np.asarray(G)
 
 
-def first_order_hold(A: Num[np.ndarray, "... n n"], B: Num[np.ndarray, "... n m"], dt: float) -> tuple[Any, Any, Any]:
+def first_order_hold(A: NDArray[Any], B: NDArray[Any], dt: float) -> tuple[Any, Any, Any]:
     """Exact step for inputs that run straight between samples: x+ = F x + G0 u + G1 (u+ - u) (Van Loan 1978).
 
     SciPy's `cont2discrete` turns the state into one that is no sample of x; this does not.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.arrays import Array
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights.flight import Flight
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import SURROUNDINGS
@@ -49,8 +50,9 @@ def driving_rows(
     else:
         columns = _columns(vehicle, inputs)
         time = np.arange(max(column.size for column in columns.values())) / rate
+    around = environment_of(vehicle, environment)
     for name in SURROUNDINGS:
-        columns.setdefault(name, np.array(getattr(environment, name), dtype=np.float64))
+        columns.setdefault(name, np.array(getattr(around, name), dtype=np.float64))
     rows = np.empty((time.size, len(columns)))
     for i, name in enumerate((*vehicle.input_names, *SURROUNDINGS)):
         column = columns[name]

@@ -24,9 +24,10 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_steps
-from swashplate.simulation.trim import Trim, start_row
+from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 if TYPE_CHECKING:
     from swashplate.simulation.sensors import Sensors
@@ -41,6 +42,7 @@ def simulate(
     substeps: int = 1,
     interpolation: Interpolation = "held",
     environment: Environment | None = None,
+    delays: Delays = None,
     sensors: Sensors | None = None,
     seed: int | None = None,
 ) -> Flight:
@@ -55,7 +57,10 @@ def simulate(
         rate: samples and steps per second [Hz].
         substeps: Runge-Kutta steps per sample.
         interpolation: inputs "held" from sample to sample (as a digital controller does) or "linear" between them.
-        environment: air, gravity, and wind and voltage where `inputs` has none.
+        environment: air, gravity, and wind and voltage where `inputs` has none; by default that of the trim at the
+            start, or the vehicle's own (`Environment`).
+        delays: from command to action [s], one for all inputs or by name, rounded up to steps; where not given those
+            that the vehicle's card knows (`sp.structure` models and identified ones). The flight has the commands.
         sensors: sensor models that turn the true flight into a log; they need a `seed`.
         seed: of the sensors' noise; the same call with the same seed gives the same bits on the same machine.
 
@@ -65,19 +70,20 @@ def simulate(
     Raises:
         DivergenceError: with the time, the state that went first and the flight up to there.
         FlightError: where an input is missing or not finite.
+        CardError: where inputs reach outputs after different times, and `delays` does not say one for each.
     """
     enable_double_precision()
     if substeps < 1:
         raise SwashError(f"substeps is {substeps}, expected at least 1.")
-    surroundings = environment or Environment()
+    surroundings = surroundings_of_start(vehicle, start, environment)
     time, rows = driving_rows(vehicle, inputs, rate=rate, environment=surroundings, interpolation=interpolation)
-    first = dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True))
-    x0 = start_row(vehicle, start, surroundings._replace(**first))
+    first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True)))
+    x0 = start_row(vehicle, start, first)
     states = np.asarray(
         trajectory(
             equations_of(vehicle),
             x0,
-            rows,
+            acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first),
             parameter_row(vehicle, surroundings),
             1.0 / rate,
             substeps=substeps,

@@ -20,6 +20,7 @@ from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
@@ -75,7 +76,7 @@ class Stepping:
         self._parameters = jax.device_put(parameter_row(vehicle, environment))
         self._n = len(self._moved.state_names)
         self._gravity = float(environment.gravity)
-        self._around = np.array([getattr(environment, name) for name in SURROUNDINGS])
+        self._around = np.array([getattr(environment_of(vehicle, environment), name) for name in SURROUNDINGS])
         self._low, self._high = np.array(vehicle.input_limits).T
         self.place(state)
 

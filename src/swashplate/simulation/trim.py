@@ -15,6 +15,7 @@ from jaxtyping import Float
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
 from swashplate.models.nesting import leaves
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
@@ -78,9 +79,10 @@ class Trim:
     def __repr__(self) -> str:
         head = f"Trim at {self.speed:g} m/s ahead, {self.lateral:g} m/s right, {self.climb:g} m/s up, "
         head += f"turning {np.degrees(self.turn):g} deg/s, " if self.turn else ""
+        head += f"in air of {float(self.environment.air_density):.4g} kg/m^3"
         if any(name.startswith("motor") for name in self.input_names):
-            head += f"{float(self.environment.voltage):g} V "
-        head = head.rstrip(", ") + f" (residual {self.residual:.1e})"
+            head += f", {float(self.environment.voltage):g} V"
+        head += f" (residual {self.residual:.1e})"
         lines = [
             f"  {name:<14}{round(value, 5) + 0.0: .5f}" for name, value in {**self.commands(), **self.states()}.items()
         ]
@@ -131,7 +133,7 @@ def trim(
         TrimError: naming the input whose limit prevents it, or the state that does not come to rest.
     """
     enable_double_precision()
-    surroundings = environment or Environment()
+    surroundings = environment_of(vehicle, environment)
     if voltage is not None:
         surroundings = surroundings._replace(voltage=voltage)
     need_whole_body(vehicle)
@@ -337,6 +339,15 @@ def _hint(*, battery: bool, too_low: bool) -> str:
     if battery:
         return "Ask for a slower flight, less payload or a fuller battery."
     return "Ask for a slower flight." if too_low else "Ask for a slower flight or less weight."
+
+
+def surroundings_of_start(
+    vehicle: Vehicle, start: Trim | Mapping[str, Any] | None, environment: Environment | None
+) -> Environment:
+    """What a simulation flies in: the environment given, else that of the trim it starts from, else the vehicle's."""
+    if environment is None and isinstance(start, Trim):
+        environment = start.environment
+    return environment_of(vehicle, environment)
 
 
 def start_row(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, environment: Environment) -> Array:

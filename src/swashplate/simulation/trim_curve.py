@@ -102,6 +102,7 @@ class TrimCurve(Shown):
                     "climb": at.climb,
                     "lateral": at.lateral,
                     "turn": at.turn,
+                    "air_density": float(at.environment.air_density),
                     "inputs": at.commands(),
                     "states": at.states(),
                     "residual": at.residual,

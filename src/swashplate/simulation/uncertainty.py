@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError, TrimError
 from swashplate.models.catalogue import from_card
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.derivatives import derivative_table
@@ -72,7 +73,7 @@ def spread(
     uncertain = {name: p for name, p in card.parameters.items() if p.sigma}
     if not uncertain:
         raise SwashError("no parameter of the card has a sigma.", where=card.where)
-    around = environment or at.environment
+    around = environment_of(vehicle, environment or at.environment)
     rng = np.random.default_rng(seed)
     nominal = linearize(vehicle, at)
     values = np.linalg.eigvals(nominal.A).astype(complex)

@@ -18,6 +18,7 @@ from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import minimise
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -62,7 +63,7 @@ def verify_vehicle(
         Parameterization(vehicle, ()),
         pieces,
         method="output-error",
-        environment=environment or Environment(),
+        environment=environment_of(vehicle, environment),
         shifts=shifts,
         # A bias of a state is a shift of where it starts.
         biases=tuple(name for name in shared if name not in vehicle.state_names),

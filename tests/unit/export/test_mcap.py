@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from swashplate.errors import ExportError
+from swashplate.errors import ExportError, MissingLibraryError
 from swashplate.export.mcap import as_mcap
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Event, Provenance
@@ -80,5 +80,5 @@ def test_what_cannot_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ExportError, match="nanoseconds of 64 bits"):
         as_mcap(Flight({"s": stream(np.array([0.0, 1e12]), {"p": np.zeros(2)})}))
     monkeypatch.setitem(sys.modules, "mcap", None)
-    with pytest.raises(ExportError, match="needs the library mcap"):
+    with pytest.raises(MissingLibraryError, match=r"needs the library mcap.*'swashplate\[mcap\]'"):
         as_mcap(flight())

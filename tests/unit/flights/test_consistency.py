@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from swashplate.flights.conditioning.condition import condition, replay
 from swashplate.flights.consistency import consistency, refuse_inconsistent
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.inspect import inspect
+from swashplate.flights.readers.read import read
 from swashplate.flights.schema import ATTITUDE, RATES
+from swashplate.identification.responses.respond import respond
 
 DEGREE = 180.0 / np.pi
 
@@ -121,3 +124,21 @@ def test_what_conditioning_derived_is_no_measurement() -> None:
     made = condition(tracked(hover(20.0, 2), 2), trim_ground=False)
     flipped = made.with_channel("p", -made.values("p"), like="p")
     assert consistency(flipped) == ()  # p is attitude's own derivative here: nothing was measured
+
+
+@pytest.mark.parametrize(
+    ("given", "mend"),
+    [("deg/s", "--unit p=-deg/s"), ("-rad/s", "--unit p=-deg/s"), ("rad/s", "--unit p=-deg/s"), ("-deg/s", None)],
+)
+def test_the_remedy_is_one_whatever_the_file_was_read_with(given: str, mend: str | None, tmp_path: Path) -> None:
+    """A roll rate in deg/s with its sign turned: the option replaces the header's unit, sign and all."""
+    time = np.arange(0.0, 30.0, 0.02)
+    phi = 20.0 * np.sin(2.0 * time) + 5.0 * np.sin(5.1 * time)
+    table = np.column_stack([time, phi, np.cos(time), -np.gradient(phi, time)])
+    path = tmp_path / "turned.csv"
+    np.savetxt(path, table, delimiter=",", header="time [s],phi [deg],theta [deg],p [deg/s]", comments="")
+    found = [each for each in consistency(read(path, units={"p": given})) if each.channel == "p"]
+    assert [each.mend for each in found] == ([] if mend is None else [f"Give {mend}."])
+    if found:
+        with pytest.raises(FlightError, match=r"p: .*--unit p=-deg/s"):
+            respond(read(path, units={"p": given}), inputs=["theta"], outputs=["p"])

@@ -59,7 +59,7 @@ def test_a_structure_is_trimmed_linearised_held_and_flown(mettler: sp.Vehicle) -
 
 def test_a_model_of_less_than_a_body_is_flown_from_rest_and_says_why_it_is_not_trimmed() -> None:
     heave = sp.structure("heave")
-    flight = sp.simulate(heave, {"mixer_collective": np.full(201, 0.1)}, rate=100.0)
+    flight = sp.simulate(heave, {"mixer_collective": np.full(201, 0.1)}, rate=100.0, delays=0.0)
     values = heave.card.values()
     damping, power = values["w_by_w"], values["w_by_mixer_collective"]
     exact = 0.1 * power / damping * (np.exp(damping * flight.time("w")) - 1.0)

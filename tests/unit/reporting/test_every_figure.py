@@ -13,11 +13,11 @@ from scipy.signal import lfilter
 import swashplate as sp
 from report_samples import fit, flight, modes, validation
 from swashplate.errors import SwashError
+from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.reporting.compose import compose
 from swashplate.reporting.figures import of_flight
 from swashplate.reporting.figures.interactive import interactive
-from swashplate.reporting.figures.libraries import library
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import DARK
 from swashplate.reporting.figures.views import figures_of

@@ -12,6 +12,7 @@ import swashplate as sp
 from swashplate.errors import DivergenceError
 from swashplate.models.catalogue import vehicle
 from swashplate.models.nesting import rebuild
+from swashplate.models.surroundings import environment_of
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.standing import at_rest, skids_of, standing
@@ -23,7 +24,7 @@ from swashplate.simulation.stepping import Stepping
 )
 def test_steps_are_those_of_the_simulation(name: str, options: dict[str, object]) -> None:
     flown = vehicle(name, **options)
-    around = Environment(1.0, -0.5, 0.2, voltage=12.22)
+    around = environment_of(flown, Environment(1.0, -0.5, 0.2))
     hover = sp.trim(flown, environment=around)
     random = np.random.default_rng(0)
     inputs = np.array(hover.inputs) + 0.01 * random.standard_normal((41, len(hover.inputs)))

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
+from swashplate.text_table import text_table
 
 _REFINED = 8
 """Frequencies about the peak at which the scaling is optimised; Perron's scaling, near the best, does elsewhere."""
@@ -91,16 +92,17 @@ class Margins:
         return min(self.delay, *(axis.delay for axis in self.axes))
 
     def __repr__(self) -> str:
-        lines = [f"{'loop':<14}{'gain [dB]':>16}{'phase [deg]':>12}{'crossover [rad/s]':>19}"]
-        lines[0] += f"{'delay [ms]':>12}{'disc':>7}{'max |S|':>9}"
+        head = ("loop", "gain [dB]", "phase [deg]", "crossover [rad/s]", "delay [ms]", "disc", "max |S|")
+        rows = []
         for a in self.axes:
             with np.errstate(divide="ignore"):
                 down, up = 20.0 * np.log10([a.gain_down, a.gain])
-            lines.append(
-                f"{a.name:<14}{f'{down:.1f} to {up:+.1f}':>16}{np.degrees(a.phase):>12.0f}{a.crossover:>19.2f}"
-                f"{1e3 * a.delay:>12.0f}{a.disc.alpha:>7.2f}{a.sensitivity:>9.2f}"
+            numbers = (f"{1e3 * a.delay:.0f}", f"{a.disc.alpha:.2f}", f"{a.sensitivity:.2f}")
+            rows.append(
+                (a.name, f"{down:.1f} to {up:+.1f}", f"{np.degrees(a.phase):.0f}", f"{a.crossover:.2f}", *numbers)
             )
         t = self.together
+        lines = [text_table(head, rows)]
         lines.append(
             f"all at once: gain +- {20.0 * np.log10(t.gain):.1f} dB, phase +- {np.degrees(t.phase):.0f} deg "
             f"(disc {t.alpha:.2f} at {t.frequency:.2f} rad/s), delay {1e3 * self.delay:.0f} ms"

@@ -35,6 +35,7 @@ from swashplate.filtering.disturbances import Unrest
 from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import Suite
 from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.discretisation import with_late_inputs, zero_order_hold
@@ -104,9 +105,9 @@ def design(
     if computation is not None and not 0.0 <= computation <= 1.0:
         raise ControllerError(f"is {computation:g} s, expected 0 to 1.", channel="computation")
     waits = [d + (computation or 0.0) for d in late.values()]
-    around = environment or Environment()
-    if voltage is not None or "voltage_nominal" in vehicle.parameter_names:
-        around = around._replace(voltage=voltage if voltage is not None else vehicle.card.values()["voltage_nominal"])
+    around = environment_of(vehicle, environment)
+    if voltage is not None:
+        around = around._replace(voltage=voltage)
     trims = trims_over_speed(vehicle, speeds, environment=around)
     plan = ObserverPlan(
         equations_of(vehicle), tuple(sensors), float(rate), tuple(int(np.ceil(d * rate - 1e-9)) for d in waits)

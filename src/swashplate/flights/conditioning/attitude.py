@@ -10,6 +10,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, QUATERNION
+from swashplate.registry import listed
 
 _TOO_SHORT = 1e-6  # a quaternion shorter than this has no direction left to normalise
 
@@ -79,7 +80,7 @@ def attitude_of(flight: Flight) -> Array:
         return quaternion_from_euler(flight.array(ATTITUDE))
     raise FlightError(
         f"the flight has no attitude: neither {', '.join(QUATERNION)} nor {', '.join(ATTITUDE)}; "
-        f"it has {', '.join(flight.channels) or 'nothing'}.",
+        f"it has {listed(flight.channels)}.",
         where=flight.provenance.source or None,
     )
 

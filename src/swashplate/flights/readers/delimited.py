@@ -35,7 +35,7 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
-from swashplate.flights.schema import channel, is_known
+from swashplate.flights.schema import LOGGED_UNIT, channel, is_known
 
 NAME = "csv"
 VERSION = "1"
@@ -265,8 +265,11 @@ def read(source: Source, options: Options) -> Flight:
     channels = {name: values[keep] for name, values in channels.items()}
     foreign = {name: labels[name] for name in channels if not is_known(name)}
     notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
+    log = stream(time[keep], channels, foreign)
+    for name in channels:
+        log[name].attrs[LOGGED_UNIT] = options.units.get(name, columns[name].unit) or ""
     return Flight(
-        streams={"log": stream(time[keep], channels, foreign)},
+        streams={"log": log},
         provenance=source.provenance(NAME, VERSION, notes=notes, epoch=zero),
     )
 

@@ -67,7 +67,7 @@ def read(
     and Betaflight (`.bbl`, `.bfl`), a ROS bag (1 or 2), a CoaX-56 `.mat` record, a NanoBench CSV file, a swashplate
     netCDF or CSV file, a Vicon or OptiTrack CSV export.
 
-    ULog files and ROS bags need `pip install swashplate[logs]`.
+    ULog files and ROS bags need `pip install 'swashplate[logs]'`.
 
     Args:
         path_or_name: the file, or the folder of a rosbag2; or a file of a public data set as

@@ -16,9 +16,9 @@ import xarray as xr
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import clocked, frames
-from swashplate.flights.readers.extras import needed
 from swashplate.flights.readers.options import Options, with_mocap_table
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import QUATERNION
@@ -139,8 +139,8 @@ Collected = tuple[dict[str, list[float]], dict[str, list[Row]], dict[tuple[str, 
 
 def _collected(source: Source) -> Collected:
     """Stamps [s from the first message] and numbers by topic, messages by topic and type, first stamp [ns], damage."""
-    anyreader = needed("rosbags.highlevel", where=source.name, kind="ROS bag")
-    typesys = needed("rosbags.typesys", where=source.name, kind="ROS bag")
+    anyreader = library("rosbags.highlevel", what="a ROS bag", where=source.name)
+    typesys = library("rosbags.typesys", what="a ROS bag", where=source.name)
     stamps: dict[str, list[float]] = {}
     rows: dict[str, list[Row]] = {}
     counts: dict[tuple[str, str], int] = {}

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
+from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked
-from swashplate.flights.readers.extras import needed
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.ulog_messages import MAGIC, Whole, whole_messages
@@ -151,7 +151,7 @@ def read(source: Source, options: Options) -> Flight:
 
 def _decoded(content: bytes, where: str) -> Any:
     """What pyulog makes of the bytes; whatever it stumbles over is the file's fault."""
-    core = needed("pyulog.core", where=where, kind="PX4 ULog file")
+    core = library("pyulog.core", what="a PX4 ULog file", where=where)
     sizes = re.findall(rb"\w\[(\d{1,20})\] ", content)
     if any(int(size) > _LARGEST for size in sizes):
         raise FlightError("describes an array that no message can hold: it is damaged or forged.", where=where)

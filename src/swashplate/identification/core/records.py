@@ -12,11 +12,15 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight, did_you_mean
 from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
+from swashplate.registry import listed
 
 POSE = (*POSITION, *ATTITUDE)
 """What motion capture measures."""
+
+
+_TO_DO = "Condition the flight first (flight.condition(rate=100)), or map its columns to these names."
 
 
 @dataclass(frozen=True)
@@ -99,12 +103,12 @@ def uniform_table(flight: Flight, wanted: Sequence[str], *, who: str) -> tuple[A
     source = flight.provenance.source or "flight"
     missing = [name for name in wanted if name not in flight]
     if missing:
+        asked = did_you_mean(missing[0], flight.channels)
         raise FlightError(
-            f"lacks what {who} needs; it has {', '.join(flight.channels) or 'nothing'}.",
+            f"lacks what {who} needs.",
             where=source,
             channel=", ".join(missing),
-            hint=did_you_mean(missing[0], flight.channels)
-            or "Condition the flight first (flight.condition(rate=100)), or map its columns to these names.",
+            hint=f"{asked or _TO_DO} It has {listed(flight.channels)}.",
         )
     table = flight.array(wanted)
     time = flight.time(wanted[0])
@@ -129,7 +133,7 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     wanted = (*vehicle.input_names, *outputs)
     time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
     source = flight.provenance.source or "flight"
-    nominal = vehicle.card.values().get("voltage_nominal", Environment().voltage)
+    nominal = float(environment_of(vehicle).voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
     return Record(

@@ -15,6 +15,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.public import resolve
+from swashplate.registry import listed, nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +83,9 @@ class FrequencyResponse:
         for name, names, role in ((output, self.outputs, "output"), (input, self.inputs, "input")):
             if name not in names:
                 raise IdentificationError(
-                    f"is no {role} of these responses; there are {', '.join(names)}.", channel=name
+                    f"is no {role} of these responses; there are {listed(names)}.",
+                    channel=name,
+                    hint=nearest(name, names) or None,
                 )
         return self.outputs.index(output), self.inputs.index(input)
 

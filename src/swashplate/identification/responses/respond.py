@@ -11,6 +11,7 @@ import numpy as np
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.uniform_records import renamed_channels
+from swashplate.flights.consistency import refuse_inconsistent
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
@@ -118,7 +119,8 @@ def respond(
         direct: the direct estimate alone, as one needs it where the sweeps are none of a pilot or program.
 
     Raises:
-        FlightError: no channel or no record to work on; messages name them.
+        FlightError: no channel or no record to work on, or a raw flight whose channels contradict each other; messages
+            name them.
     """
     flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
     inputs, outputs = tuple(inputs), tuple(outputs)
@@ -135,6 +137,9 @@ def respond(
             channel=", ".join(sorted(mixed)),
             hint="A reference is what a program adds to a command, such as sid_target.",
         )
+    for flight in flights:
+        if not flight.history:  # as read; whatever conditions a flight checks it itself
+            refuse_inconsistent(flight)
     others = bystanders_of(flights, (*inputs, *outputs, *references)) if bystanders is None else tuple(bystanders)
     pieces = signals(flights, (*inputs, *outputs, *references, *others))
     sweep = sweeps_of(flights)

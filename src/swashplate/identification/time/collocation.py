@@ -37,6 +37,7 @@ from swashplate.identification.time.vehicle_likelihood import check_predicted, d
 from swashplate.identification.time.vehicle_time_fit import check_biases, outputs_of, vehicle_result
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -129,7 +130,8 @@ def vehicle_errors(
         shifts, biases: see `CollocationErrors`, which tells its errors.
     """
     vehicle, outputs = table.vehicle, pieces[0].output_names
-    constants = [getattr(environment, name) for name in CONSTANTS]
+    around = environment_of(vehicle, environment)
+    constants = [getattr(around, name) for name in CONSTANTS]
     return CollocationErrors(
         VehiclePredictor(equations_of(vehicle), table.layout, outputs),
         parameter_entries(table),
@@ -137,7 +139,7 @@ def vehicle_errors(
         outputs=outputs,
         records=pieces,
         given={"card": jnp.asarray(table.card_row), "constants": jnp.asarray(constants, dtype=float)},
-        driving=[driving_rows(piece, environment) for piece in pieces],
+        driving=[driving_rows(piece, around) for piece in pieces],
         rest=dict(zip(vehicle.state_names, map(float, leaves(vehicle.state)), strict=True)),
         shifts=shifts,
         biases=biases,

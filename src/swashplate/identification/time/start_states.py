@@ -13,6 +13,7 @@ from swashplate.errors import TrimError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import Record
 from swashplate.models.nesting import leaves
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
@@ -72,7 +73,7 @@ def _trim_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: A
     (the implicit function theorem).
     """
     equations = equations_of(vehicle)
-    calm = Environment()
+    calm = environment_of(vehicle, parameters=parameters)
     row = jnp.stack([jnp.asarray(0.0)] * 3 + [jnp.asarray(voltage, dtype=float)])
     constants = [getattr(calm, name) for name in CONSTANTS]
     p = jnp.stack([jnp.asarray(value, dtype=float) for value in (*parameters, *constants)])

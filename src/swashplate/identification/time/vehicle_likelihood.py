@@ -28,6 +28,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.models.nesting import leaves
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
@@ -105,10 +106,11 @@ class VehicleErrors(TimeErrors):
             biases=biases,
         )
         self._plans = [self._plan(number, record) for number, record in enumerate(records)]
-        self._data = [_data(record, environment) for record in records]
+        around = environment_of(vehicle, environment)
+        self._data = [_data(record, around) for record in records]
         self._given = {
             "card": jnp.asarray(table.card_row),
-            "constants": jnp.asarray([getattr(environment, name) for name in CONSTANTS], dtype=float),
+            "constants": jnp.asarray([getattr(around, name) for name in CONSTANTS], dtype=float),
         }
 
     def _plan(self, number: int, record: Record) -> _Plan:

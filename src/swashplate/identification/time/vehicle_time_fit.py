@@ -24,6 +24,7 @@ from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -94,7 +95,7 @@ def fit_vehicle(
         table,
         pieces,
         method=method,
-        environment=environment or Environment(),
+        environment=environment_of(vehicle, environment),
         shifts=shifts,
         biases=tuple(biases),
     )

@@ -16,6 +16,7 @@ from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.links.gym.tasks import Task
 from swashplate.models.catalogue import vehicle as find_vehicle
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
@@ -183,9 +184,7 @@ def flying(
             f"rate is {rate:g}, substeps {substeps}, authority {authority:g} and spread {spread:g}; expected positive "
             "numbers, authority at most 1."
         )
-    surroundings = Environment(*wind)
-    if "voltage_nominal" in chosen.parameter_names:
-        surroundings = surroundings._replace(voltage=chosen.card.values()["voltage_nominal"])
+    surroundings = environment_of(chosen, Environment(*wind))
     for name in randomize or {}:
         if name not in chosen.parameter_names:
             raise SwashError("is no parameter of the vehicle.", where=chosen.name, channel=f"randomize {name}")

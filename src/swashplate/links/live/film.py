@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.atomic import make_folder, replaced_when_complete, write_bytes
 from swashplate.errors import SwashError
+from swashplate.extras import library
 from swashplate.flights.schema import channel
 from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.links.live.replay import Replay, floor, gaps
 from swashplate.links.live.wireframe import Camera, ground, helicopter
-from swashplate.physics.environment import Environment
+from swashplate.models.surroundings import environment_of
 
 Tell = Callable[[int, int], None]
 
@@ -97,10 +98,7 @@ def write_film(shown: Replay, path: Path, *, rate: float = 25.0, tell: Tell | No
     """
     if path.suffix.lower() not in (".mp4", ".mkv", ".mov"):
         raise SwashError(f"ends in '{path.suffix}', expected .mp4, .mkv or .mov.", where=path, channel="--video")
-    try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-    except ImportError:
-        raise SwashError("needs imageio-ffmpeg.", channel="--video", hint="pip install swashplate[live]") from None
+    get_ffmpeg_exe = library("imageio_ffmpeg", what="a film").get_ffmpeg_exe
     count = 0
     with replaced_when_complete(path) as temporary:
         raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{SIZE[0]}x{SIZE[1]}", "-r", f"{rate:g}", "-i", "-"]
@@ -158,7 +156,7 @@ class _Page:
         from matplotlib.figure import Figure
 
         self._shown, self._picture = shown, picture(shown.vehicle)
-        self._pose, self._around = pose_of(shown.vehicle), Environment()
+        self._pose, self._around = pose_of(shown.vehicle), environment_of(shown.vehicle)
         dpi = 100
         figure = Figure(figsize=(SIZE[0] / dpi, SIZE[1] / dpi), dpi=dpi, facecolor="white")
         canvas: Any = FigureCanvasAgg(figure)

@@ -18,8 +18,9 @@ from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.models.catalogue import from_card
 from swashplate.models.catalogue import vehicle as named_vehicle
 from swashplate.models.delays import input_delays
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import Environment
+from swashplate.registry import listed
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
 from swashplate.simulation.integrate import simulate
 from swashplate.simulation.trim import trim
@@ -103,9 +104,10 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
     missing = [name for name in PREDICTED if name not in flight]
     if missing:
         raise FlightError(
-            f"lacks {', '.join(missing)}; it has {', '.join(flight.channels) or 'nothing'}.",
+            f"lacks {', '.join(missing)}.",
             where=flight.provenance.source,
-            hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least.",
+            hint="A replay draws place, velocity, attitude and rates: give a log that has place and attitude at least. "
+            f"It has {listed(flight.channels)}.",
         )
     notes: list[str] = []
     if model is not None:
@@ -116,7 +118,7 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
     rate = flight.rate("phi")
     stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))
     body, time = flight.array(PREDICTED)[::stride], flight.time("phi")[::stride]
-    hover = trim(vehicle, voltage=vehicle.card.values().get("voltage_nominal"))
+    hover = trim(vehicle)
     states = np.tile(hover.state, (time.size, 1))
     states[:, : len(PREDICTED)] = body
     unknown = [name for name in vehicle.state_names[len(PREDICTED) :] if name not in flight]
@@ -165,8 +167,8 @@ def _driven(flight: Flight, model: Vehicle, *, hold_missing: bool) -> tuple[Flig
             f"lacks {', '.join(missing)}: {model.card.where or model.card.title} is driven by them, and without them "
             "there is no prediction.",
             where=flight.provenance.source,
-            hint=f"It has {', '.join(flight.channels)}. Map its columns to these names (--mapping), give a model of "
-            "the channels that it has, leave --model out, or hold what is missing at the hover's with --hold-missing.",
+            hint="Map its columns to these names (--mapping), give a model of its channels, leave --model out, "
+            f"or hold what is missing at the hover's with --hold-missing. It has {listed(flight.channels)}.",
         )
     hover = trim(model, voltage=nominal)
     held = {name: float(hover.inputs[model.input_names.index(name)]) for name in missing}
@@ -250,6 +252,7 @@ def _flown(
                 {n: u[part] for n, u in (*zip(model.input_names, inputs.T, strict=True), *around.items())},
                 start=dict(zip(model.state_names, states[first].tolist(), strict=True)),
                 rate=1.0 / step,
+                delays=0.0,
                 substeps=max(1, round(500.0 * step)),
             )
         except DivergenceError:
@@ -277,7 +280,7 @@ def floor(shown: Replay) -> float:
 def as_json(shown: Replay) -> dict[str, Any]:
     """What the page draws: shapes, and per moment body state, inputs, discs and the predicted body state."""
     vehicle = shown.vehicle
-    pose, around = pose_of(vehicle), Environment()
+    pose, around = pose_of(vehicle), environment_of(vehicle)
     moments = []
     for k, (x, u) in enumerate(zip(shown.states, shown.inputs, strict=True)):
         parts = pose(x, u, around)

@@ -20,6 +20,7 @@ from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
 from swashplate.links.live.recording import LONGEST
 from swashplate.models.delays import input_delays
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.closed_loop import Step
@@ -146,7 +147,7 @@ class World:
         self._linear = vehicle.traits.linear
         battery = vehicle.card.values().get("voltage_nominal")
         self.nominal_voltage = battery
-        around = Environment() if battery is None else Environment(voltage=battery)
+        around = environment_of(vehicle)
         self.start_height = max(2.0, 8.0 * picture(vehicle)["size"])
         self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
         self.pilot: Pilot = pilot(vehicle, self.trim, controller=controller)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from swashplate.errors import LinkError
+from swashplate.extras import library
 from swashplate.links.px4 import place
 from swashplate.links.sensing import Readings
 from swashplate.links.servo import CENTRE, HALF, NO_PULSE
@@ -29,16 +29,11 @@ class Mavlink:
     """Writes and reads messages of one connection.
 
     Raises:
-        LinkError: where pymavlink is not installed.
+        MissingLibraryError: where pymavlink is not installed.
     """
 
     def __init__(self) -> None:
-        try:
-            from pymavlink.dialects.v20 import common  # type: ignore[import-untyped]
-        except ImportError:
-            raise LinkError(
-                "needs pymavlink.", channel="px4", hint="Install swashplate with the extra 'link'."
-            ) from None
+        common = library("pymavlink.dialects.v20.common", what="a link to PX4")
         self._writer: Any = common.MAVLink(None, srcSystem=1, srcComponent=1)
         self._reader: Any = common.MAVLink(None)
         self._reader.robust_parsing = True

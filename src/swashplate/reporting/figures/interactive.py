@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from swashplate.reporting.figures.libraries import library
+from swashplate.extras import library
 from swashplate.reporting.figures.themes import checked, coloured, in_unit
 from swashplate.reporting.structure import Figure, Key
 
@@ -21,7 +21,7 @@ def interactive(figure: Figure, *, theme: str = "light", frequency: str = "Hz", 
         SwashError: a theme or a unit that there is not; plotly missing.
     """
     look = checked(theme)
-    made = library("plotly.graph_objects")
+    made = library("plotly.graph_objects", what="drawing")
     spec = in_unit(figure.spec, frequency)
     layout = dict(spec["layout"]) | {"showlegend": bool(figure.keys)}
     margin = dict(layout.get("margin", {}))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swashplate.reporting.figures.libraries import library
+from swashplate.extras import library
 from swashplate.reporting.figures.themes import Theme, checked, coloured, in_unit, unpacked
 from swashplate.reporting.structure import Figure, Key
 
@@ -49,7 +49,7 @@ def still(figures: Sequence[Figure], *, theme: str = "paper", frequency: str = "
         SwashError: a theme or a unit that there is not.
     """
     look = checked(theme)
-    mpl, made_by = library("matplotlib"), library("matplotlib.figure")
+    mpl, made_by = library("matplotlib", what="drawing"), library("matplotlib.figure", what="drawing")
     ink, ground = ("#dcdcdc", "#15191e") if look == "dark" else ("#111111", "#ffffff")
     size = _SIZES[look]
     style = {

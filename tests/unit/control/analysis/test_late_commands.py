@@ -23,9 +23,10 @@ from swashplate.filtering.sensor_suite import suite
 from swashplate.models.delays import input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
-from swashplate.simulation.closed_loop import flown_delays, simulate_closed_loop, steps_late
+from swashplate.simulation.closed_loop import flown_delays, simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.discretisation import held_late, with_late_inputs
+from swashplate.simulation.late import steps_late
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from made_autopilot_logs import PX4LOG, dataflash, px4_rows, ulog
-from swashplate.errors import FlightError
+from swashplate.errors import FlightError, MissingLibraryError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 
@@ -68,7 +68,7 @@ def test_a_ulog_without_known_topics_or_with_forged_arrays_is_refused(tmp_path: 
 def test_without_pyulog_the_error_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyulog", None)
     monkeypatch.setitem(sys.modules, "pyulog.core", None)
-    with pytest.raises(FlightError, match=r"needs the library pyulog\. .*pip install swashplate\[logs\]"):
+    with pytest.raises(MissingLibraryError, match=r"needs the library pyulog,.*pip install 'swashplate\[logs\]'"):
         _flight(tmp_path, ulog(), "a.ulg")
 
 

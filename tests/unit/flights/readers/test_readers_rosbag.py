@@ -14,7 +14,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from swashplate.errors import FlightError
+from swashplate.errors import FlightError, MissingLibraryError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 
@@ -149,5 +149,5 @@ def test_a_bag_that_was_not_closed_or_has_nothing_known_is_refused(tmp_path: Pat
 def test_without_rosbags_the_error_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = _bag1(tmp_path / "a.bag")
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
-    with pytest.raises(FlightError, match=r"needs the library rosbags\. .*pip install swashplate\[logs\]"):
+    with pytest.raises(MissingLibraryError, match=r"needs the library rosbags,.*pip install 'swashplate\[logs\]'"):
         read(bag)

@@ -94,7 +94,7 @@ def test_input_delays_are_flown(session: LiveSession) -> None:
     assert not np.array_equal(rows[2], start)
     driven = np.repeat(given, 5, axis=0)
     driven = np.vstack([np.tile(world.trim.inputs, (10, 1)), driven, driven[-1:]])[: len(driven) + 1]
-    flown = sp.simulate(vehicle, driven, start=world.trim, rate=500.0)
+    flown = sp.simulate(vehicle, driven, start=world.trim, rate=500.0, delays=0.0)
     found = flown.array(vehicle.state_names)[5::5]
     assert np.max(np.abs(found - rows)) < 1e-9
 

@@ -1,0 +1,122 @@
+"""Without the extra `model` a log is read, looked at, answered, fitted and drawn; what needs it says the command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from test_frequency_verbs import log
+
+import swashplate as sp
+from swashplate.errors import MissingLibraryError
+from swashplate.extras import EXTRA_OF, library, missing
+
+ROOT = Path(__file__).resolve().parents[2]
+
+RUN = """
+import json, sys
+from importlib.abc import MetaPathFinder
+
+class Absent(MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in json.loads(sys.argv[1]):
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+sys.meta_path.insert(0, Absent())
+from typer.testing import CliRunner
+from swashplate.cli.app import app
+
+for words in json.loads(sys.argv[2]):
+    done = CliRunner().invoke(app, words)
+    drawn = "matplotlib" in sys.modules
+    print(json.dumps([words[0], done.exit_code, drawn, done.stderr]))
+
+import swashplate as sp
+answered = sp.FrequencyResponse.load(sys.argv[3])
+for name in ("trim", "identify", "simulate_bench"):
+    try:
+        getattr(sp, name)
+    except ImportError as error:
+        print(json.dumps([name, type(error).__name__, False, str(error)]))
+"""
+COMMAND = "Install it with: pip install 'swashplate[model]'"
+
+
+def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None:
+    """One cold process in which the extras' libraries cannot be imported."""
+    flown, unseen = log(tmp_path / "flown.csv", seed=1), log(tmp_path / "unseen.csv", seed=2, seconds=40.0)
+    answers, model = tmp_path / "responses", tmp_path / "model"
+    light: list[list[object]] = [
+        ["inspect", flown],
+        ["vehicles"],
+        ["maneuver", "sweep:roll,0.5-8Hz,30s,0.1", "--out", tmp_path / "sweep.csv"],
+        ["respond", flown, "--inputs", "mixer_roll,mixer_pitch", "--outputs", "p,q", "--band", "0.5-8", "-o", answers],
+        ["fit-tf", answers, "--input", "mixer_roll", "--outputs", "p", "--form", "1/2", "-o", tmp_path / "tf"],
+        ["fit-ss", "rotor_body", answers, "--starts", "1", "--gains", "-o", model],
+        ["fit-ss", "rotor_body,rotor_body", answers, "--search", "-o", tmp_path / "search"],
+        ["validate", "--model", model / "model.toml", "--flight", unseen, "-o", tmp_path / "validation"],
+        ["plot", flown, "-o", tmp_path / "flown.svg"],
+    ]
+    heavy: list[list[object]] = [
+        ["trim", "coax"],
+        ["identify", "--vehicle", "coax", "--flight", flown],
+        ["fit-time", "rotor_body", flown],
+        ["demo"],
+        ["live", "coax"],
+        ["export", "coax", "--format", "control"],
+    ]
+    words = json.dumps([[str(word) for word in verb] for verb in light + heavy])
+    ran = subprocess.run(
+        [sys.executable, "-c", RUN, json.dumps(sorted(EXTRA_OF)), words, str(answers / "responses.nc")],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    told = [json.loads(line) for line in ran.stdout.splitlines()]
+    assert [(verb, code) for verb, code, *_ in told[: len(light)]] == [(verb[0], 0) for verb in light], told
+    assert [verb for verb, _, drawn, _ in told[: len(light)] if drawn] == ["plot"], "matplotlib is for pictures only"
+    assert all((tmp_path / out / "report.html").is_file() for out in ("responses", "tf", "model", "validation"))
+    for verb, code, _, err in told[len(light) : len(light) + len(heavy)]:
+        assert (code, err.count("\n")) == (2, 1), err
+        assert " needs the library ja" in err, (verb, err)
+        assert COMMAND in err
+    assert ran.returncode == 0, ran.stderr
+    late = told[len(light) + len(heavy) :]
+    assert [(name, kind) for name, kind, *_ in late] == [
+        (name, "MissingLibraryError") for name in ("trim", "identify", "simulate_bench")
+    ]
+    assert all(COMMAND in words for *_, words in late)
+
+
+def test_what_does_import_jax_would_be_noticed() -> None:
+    code = "import sys, swashplate.simulation.trim; print('jax' in sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300)
+    assert ran.stdout.strip() == "True"
+
+
+def test_the_extras_that_messages_name_are_the_projects() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    brought = {name.replace("-", "_"): extra for extra, names in extras.items() for name in _plain(names)}
+    assert {name: EXTRA_OF[name] for name in brought} == brought
+    assert set(EXTRA_OF) - set(brought) == {"jaxlib", "equinox"}, "those come along with jax and diffrax"
+    assert not set(_plain(project["dependencies"])) & set(EXTRA_OF)
+    (every,) = extras["all"]
+    assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all"})
+
+
+def _plain(requirements: list[str]) -> list[str]:
+    return [line.partition(">=")[0] for line in requirements if not line.startswith("swashplate[")]
+
+
+def test_a_library_that_is_missing_is_both_errors() -> None:
+    with pytest.raises(ImportError, match="pip install no_such_library") as told:
+        library("no_such_library.part", what="drawing")
+    assert isinstance(told.value, sp.SwashError)
+    assert isinstance(missing("casadi"), MissingLibraryError)
+    assert "drawing needs the library no_such_library, which is not installed here." in str(told.value)
