@@ -284,6 +284,7 @@ def test_what_is_recorded_is_identified_and_reported(visit_: Any, raptor: str) -
 @pytest.mark.proof
 def test_a_coax_flown_by_hand_is_identified(visit_: Any, coax: str) -> None:
     visit = visit_(coax).flies()
+    visit.page.click("[data-mode=held]")
     _identified(visit, seconds=14.0, axes=("roll", "pitch"))
     visit.done()
 
@@ -335,7 +336,6 @@ def test_an_installed_wheel_is_flown_by_keys(seconds: float, installed: Path, vi
     assert found.startswith(str(installed.parents[1]))
     with _served("live", "raptor50", cwd=tmp_path, python=installed, without=("PYTHONPATH",)) as url:
         visit = visit_(url).flies()
-        visit.page.click("button[data-mode=velocity]")
         keys, clock, tilts = (
             ("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "KeyA", "KeyD", "KeyW", "KeyS"),
             [0.0],

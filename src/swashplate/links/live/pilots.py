@@ -1,9 +1,10 @@
-"""What turns sticks into inputs on the live page: four modes, decoupling on or off, for every vehicle.
+"""What turns sticks into inputs on the live page: five modes, decoupling on or off, for every vehicle.
 
 Sticks are roll (right), pitch (stick ahead, nose down), yaw (nose right) and heave (up), each -1 to 1. In mode "raw"
-all four move the vehicle's inputs about the hover trim. In "held" heave and yaw move the height and heading that are
-held, roll and pitch the cyclic. In "velocity" roll and pitch ask for a speed, in "position" they move the place that is
-held. Modes differ in numbers only, so that a switch in flight compiles nothing.
+all four move the vehicle's inputs about the hover trim. In all others heave and yaw move the height and heading that
+are held. Roll and pitch move the cyclic in "held", ask for an attitude in "attitude" and for a speed in "velocity",
+and move the place that is held in "position". Modes differ in numbers only, so that a switch in flight compiles
+nothing.
 """
 
 from __future__ import annotations
@@ -28,10 +29,12 @@ from swashplate.simulation.closed_loop import REFERENCES, Step
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
-Mode = Literal["raw", "held", "velocity", "position"]
+Mode = Literal["raw", "held", "attitude", "velocity", "position"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 WANTED = (*REFERENCES, "yaw", "heave")
 """The reference row here: that of every controller, then the sticks of raw yaw and heave."""
+LEAN = np.radians(12.0)
+"""Roll or pitch that a full stick asks for in the mode "attitude" [rad]."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,13 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
     base = controller or autopilot(vehicle, trim)
     plain = autopilot(vehicle, trim, decoupled=False).numbers.law
     commands, gains = trim.commands(), {}
-    names: dict[Mode, Any] = {"raw": "manual", "held": "manual", "velocity": "speed", "position": "place"}
+    names: dict[Mode, Any] = {
+        "raw": "manual",
+        "held": "manual",
+        "attitude": "speed",
+        "velocity": "speed",
+        "position": "place",
+    }
     for mode, name in names.items():
         for decoupled in (True, False):
             chosen = base.in_mode(name)
@@ -96,6 +105,9 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
                 chosen = chosen.with_gains(**plain._asdict())
             head = [commands["motor_lower"], commands["motor_upper"], float(mode == "raw")]
             travel = [_COAX_TRAVEL[axis] for axis in STICKS]
+            if mode == "attitude":  # speed is free; the lean that is kept is where the stick balances its feedback
+                travel[:2] = [float(LEAN * chosen.numbers.cyclic.lean)] * 2
+                chosen = chosen.with_gains(speed=0.0, speed_integral=0.0)
             gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
     if abs(500.0 / base.rate - round(500.0 / base.rate)) > 1e-9:
         raise ControllerError(f"runs at {base.rate:g} Hz, expected a whole part of 500 Hz.", where=base.model)
@@ -137,15 +149,19 @@ def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
     rows = np.flatnonzero(np.any(axes.directions[:, [STICKS.index("yaw"), STICKS.index("heave")]], axis=1))
     columns = np.array([vehicle.index(name) for name in _HELD])
     keeping[np.ix_(rows, columns)] = K[np.ix_(rows, columns)]
-    by_mode: dict[Mode, tuple[Array, float]] = {
-        "raw": (np.zeros((m, n)), 0.0),
-        "held": (keeping, 0.0),
-        "velocity": (K, 0.0),
-        "position": (K, 1.0),
+    free = K.copy()  # of place and speed
+    free[:, [vehicle.index(name) for name in ("x", "y", "u", "v")]] = 0.0
+    by_mode: dict[Mode, tuple[Array, float, float]] = {
+        "raw": (np.zeros((m, n)), 0.0, 0.0),
+        "held": (keeping, 0.0, 0.0),
+        "attitude": (free, 0.0, LEAN),
+        "velocity": (K, 0.0, 0.0),
+        "position": (K, 1.0, 0.0),
     }
+    by_hand = {mode: 0.0 if lean else 1.0 for mode, (_, _, lean) in by_mode.items()}
     gains = {
-        (mode, on): np.array([place, *axes.mixing[on].ravel(), *feedback.ravel(), *rest])
-        for mode, (feedback, place) in by_mode.items()
+        (mode, on): np.array([place, lean, *(by_hand[mode] * axes.mixing[on]).ravel(), *feedback.ravel(), *rest])
+        for mode, (feedback, place, lean) in by_mode.items()
         for on in (True, False)
     }
     return Pilot(
@@ -173,10 +189,10 @@ def state_feedback_step(
     memory: Any, time: Any, measured: Any, wanted: Any, gains: Any, *, inputs: int, states: int
 ) -> tuple[Any, Any]:
     """A state hold whose place follows the aircraft unless a place is held, with the sticks mixed on top."""
-    place, mixing = gains[0], gains[1 : 1 + 4 * inputs].reshape(inputs, 4)
+    place, lean, mixing = gains[0], gains[1], gains[2 : 2 + 4 * inputs].reshape(inputs, 4)
     x, y = jnp.where(place > 0.5, wanted[0], measured[0]), jnp.where(place > 0.5, wanted[1], measured[1])
     held = jnp.concatenate([jnp.stack([x, y]), wanted[2 : len(REFERENCES)]])
     # The hold works on deviations: what is asked for is taken from what is measured.
-    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5])
-    memory, commands = state_hold_step(memory, time, seen, held, gains[1 + 4 * inputs :], inputs=inputs, states=states)
+    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5]).at[6].add(-lean * wanted[6]).at[7].add(lean * wanted[7])
+    memory, commands = state_hold_step(memory, time, seen, held, gains[2 + 4 * inputs :], inputs=inputs, states=states)
     return memory, commands + mixing @ wanted[6:10]

@@ -122,7 +122,7 @@ class Moment:
 class Setting:
     """What the page's switches and sliders say."""
 
-    mode: Mode = "held"
+    mode: Mode = "attitude"
     decoupled: bool = True
     ghost: bool = False
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -296,7 +296,7 @@ class World:
             height = self._target[2] - self.period * law.climb * s["heave"]
             self._target[2] = height if self._linear else min(height, -0.2)
             self._target[3] += self.period * law.turn * s["yaw"]
-        if setting.mode in ("raw", "held"):
+        if setting.mode in ("raw", "held", "attitude"):
             row.update(roll=s["roll"], pitch=s["pitch"])
         else:
             ahead, right = law.speed * s["pitch"], law.speed * s["roll"]

@@ -22,7 +22,7 @@ from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
-from swashplate.links.live.world import World
+from swashplate.links.live.world import Setting, World
 from swashplate.links.web.priority import come_first
 from swashplate.models.card import packaged_cards
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
@@ -81,7 +81,7 @@ def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(coax: World
 def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> None:
     for name in ("raptor50", "lynx"):  # rotors of both senses
         world = World(sp.vehicle(name, in_plane="blade-element"))
-        mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
+        mixing = world.pilot.gains["raw", True][2:18].reshape(4, 4)
         model = sp.linearize(world.vehicle, world.trim)
         matrix = static_decoupling(
             model.to_control(), inputs=["A1", "B1", "theta0T", "theta0"], outputs=["p", "q", "r", "w"]
@@ -98,7 +98,7 @@ def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> Non
 def test_axes_that_first_derivatives_do_not_tell_apart_are_decoupled_a_moment_later() -> None:
     """With the thrust perpendicular to the disc collective pitches at once and the cyclic does not: half a second."""
     world = World(sp.vehicle("lynx"))
-    mixing = world.pilot.gains["raw", True][1:17].reshape(4, 4)
+    mixing = world.pilot.gains["raw", True][2:18].reshape(4, 4)
     model = sp.linearize(world.vehicle, world.trim)
     n, m = model.B.shape
     step = scipy.linalg.expm(0.5 * np.block([[model.A, model.B], [np.zeros((m, n + m))]]))[:n, n:]
@@ -107,10 +107,31 @@ def test_axes_that_first_derivatives_do_not_tell_apart_are_decoupled_a_moment_la
     assert (np.sign(np.diag(moved)) == [1.0, -1.0, 1.0, -1.0]).all()
 
 
+def test_in_the_mode_it_opens_in_short_presses_and_long_ones_end_level(world: World) -> None:
+    """Keys are all or nothing: pressed for a second on every axis, then let go, it levels out and flies on."""
+    fresh(world, "attitude")
+    phi, theta = (world.vehicle.index(name) for name in ("phi", "theta"))
+    ahead = fly(world, 2.0, pitch=1.0)
+    assert -np.radians(14.0) < ahead[theta] < -np.radians(0.5)
+    assert ahead[3] > 0.3
+    right = fly(world, 2.0, pitch=0.0, roll=1.0)
+    assert np.radians(0.5) < right[phi] < np.radians(14.0)
+    for axis in ("roll", "pitch", "yaw", "heave"):
+        for way in (1.0, -1.0):
+            fly(world, 1.0, **{"roll": 0.0, "pitch": 0.0, "yaw": 0.0, "heave": 0.0, axis: way})
+    rests = fly(world, 8.0, roll=0.0, pitch=0.0, yaw=0.0, heave=0.0)
+    assert world.trouble == ""
+    assert np.max(np.abs(rests[[phi, theta]])) < np.radians(5.0)
+
+
+def test_it_opens_in_attitude() -> None:
+    assert Setting().mode == "attitude"
+
+
 def test_modes_change_in_flight_without_a_jump(coax: World) -> None:
     fresh(coax, "held")
     fly(coax, 2.0, pitch=0.3)
-    for mode in ("position", "velocity", "held"):
+    for mode in ("position", "velocity", "attitude", "held"):
         before = coax.moment().crafts["own"][0].copy()
         coax.set_mode(mode)  # type: ignore[arg-type]
         after = fly(coax, coax.period)
