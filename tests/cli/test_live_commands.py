@@ -98,7 +98,7 @@ def test_replay_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     (tmp_path / "poor.csv").write_text("time [s],p [rad/s]\n" + "".join(f"{0.01 * i},{i % 7}\n" for i in range(300)))
     told = one_message(swash("replay", tmp_path / "poor.csv", "--model", "coax", "--port", "0"))
     assert "lacks x, y, z" in told
-    assert "it has p" in told
+    assert "It has p" in told
     film, frames = tmp_path / "a.mp4", tmp_path / "frames"
     assert "Give one of them" in one_message(swash("replay", "x.nc", "--video", film, "--frames", frames))
     assert "does not exist" in one_message(swash("replay", "x.nc", "--video", tmp_path / "no" / "a.mp4"))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Progress", "as_json", "console", "doing", "plain", "progress"]
 
-_PIPED_WIDTH = 400  # columns: wide enough for every line, so that a file or a pipe gets whole ones
+_PIPED_WIDTH = 2_000  # columns: wide enough for every line, so that a file or a pipe gets whole ones
 _NARROWEST = 40  # columns: no table gets narrower; the terminal wraps whole lines instead
 _AFTER = 1.0  # s: what is done sooner needs no progress bar
 _STAGES_AFTER = 10.0  # s: from here on, without a terminal, every stage is a line
