@@ -267,7 +267,9 @@ def read(source: Source, options: Options) -> Flight:
     notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
     log = stream(time[keep], channels, foreign)
     for name in channels:
-        log[name].attrs[LOGGED_UNIT] = options.units.get(name, columns[name].unit) or ""
+        unit = options.units.get(name, columns[name].unit)
+        if unit and unit != log[name].attrs.get("units"):
+            log[name].attrs[LOGGED_UNIT] = unit
     return Flight(
         streams={"log": log},
         provenance=source.provenance(NAME, VERSION, notes=notes, epoch=zero),
