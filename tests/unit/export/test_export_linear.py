@@ -149,7 +149,7 @@ def test_ardupilot_holds_the_hybrid_structure_exactly(tmp_path: Path) -> None:
 
 def test_ardupilot_keeps_the_modes_of_a_helicopters_card() -> None:
     raptor = sp.vehicle("raptor50")
-    trim = sp.trim(raptor)
+    trim = sp.trim(raptor, environment=sp.Environment(air_density=1.2))
     made = export_model(raptor, "ardupilot-statespace", name="raptor50", trim=trim)
     numbers = json.loads(made.files["raptor50_ardupilot.json"])
     assert numbers["nominal_rpm"] == pytest.approx(1600, rel=1e-3)
