@@ -19,7 +19,7 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.trim_curve import TrimCurve
 
 XP = FloatBackend()
-CALM = Environment()
+CALM = Environment(air_density=1.225)
 
 
 def acting(flown: Vehicle, x: np.ndarray, u: np.ndarray) -> HelicopterLoads:

@@ -16,6 +16,7 @@ from typing import Any, Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.linalg import expm
 
 from swashplate.arrays import Array
 from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
@@ -26,7 +27,7 @@ from swashplate.links.live.axes import STICKS, axes_of
 from swashplate.links.live.picture import picture
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, Step
-from swashplate.simulation.linearize import linearize
+from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 
 Mode = Literal["raw", "held", "attitude", "velocity", "position"]
@@ -106,7 +107,6 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
             head = [commands["motor_lower"], commands["motor_upper"], float(mode == "raw")]
             travel = [_COAX_TRAVEL[axis] for axis in STICKS]
             if mode == "attitude":  # speed is free; the lean that is kept is where the stick balances its feedback
-                travel[:2] = [float(LEAN * chosen.numbers.cyclic.lean)] * 2
                 chosen = chosen.with_gains(speed=0.0, speed_integral=0.0)
             gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
     if abs(500.0 / base.rate - round(500.0 / base.rate)) > 1e-9:
@@ -140,7 +140,8 @@ _HELD = ("z", "w", "psi", "r")
 
 
 def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
-    axes = axes_of(vehicle, linearize(vehicle, trim))
+    model = linearize(vehicle, trim)
+    axes = axes_of(vehicle, model)
     hold = state_hold(vehicle, trim, rate=100.0, along=axes.directions, spans=axes.spans)
     n, m = len(vehicle.state_names), len(vehicle.input_names)
     K = hold.gains[: m * n].reshape(m, n)
@@ -151,17 +152,17 @@ def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
     keeping[np.ix_(rows, columns)] = K[np.ix_(rows, columns)]
     free = K.copy()  # of place and speed
     free[:, [vehicle.index(name) for name in ("x", "y", "u", "v")]] = 0.0
-    by_mode: dict[Mode, tuple[Array, float, float]] = {
-        "raw": (np.zeros((m, n)), 0.0, 0.0),
-        "held": (keeping, 0.0, 0.0),
-        "attitude": (free, 0.0, LEAN),
-        "velocity": (K, 0.0, 0.0),
-        "position": (K, 1.0, 0.0),
+    leans = _leans(model, free)
+    by_mode: dict[Mode, tuple[Array, float, tuple[float, float], float]] = {
+        "raw": (np.zeros((m, n)), 0.0, (0.0, 0.0), 1.0),
+        "held": (keeping, 0.0, (0.0, 0.0), 1.0),
+        "attitude": (free, 0.0, leans, 0.0) if leans else (keeping, 0.0, (0.0, 0.0), 1.0),
+        "velocity": (K, 0.0, (0.0, 0.0), 1.0),
+        "position": (K, 1.0, (0.0, 0.0), 1.0),
     }
-    by_hand = {mode: 0.0 if lean else 1.0 for mode, (_, _, lean) in by_mode.items()}
     gains = {
-        (mode, on): np.array([place, lean, *(by_hand[mode] * axes.mixing[on]).ravel(), *feedback.ravel(), *rest])
-        for mode, (feedback, place, lean) in by_mode.items()
+        (mode, on): np.array([place, *asked, *(by_hand * axes.mixing[on]).ravel(), *feedback.ravel(), *rest])
+        for mode, (feedback, place, asked, by_hand) in by_mode.items()
         for on in (True, False)
     }
     return Pilot(
@@ -177,6 +178,23 @@ def _state_feedback(vehicle: Vehicle, trim: Trim) -> Pilot:
     )
 
 
+def _leans(model: LinearModel, feedback: Array) -> tuple[float, float] | None:
+    """Roll and pitch to ask for, so that `LEAN` is reached a second later on the linear model.
+
+    Speed is free, and its moments take a part of what is asked for. None where the hold without its feedback of speed
+    hardly keeps an attitude: of an aircraft whose bar does (the coaxial structure), with the cyclic by hand.
+    """
+    n, found = len(model.states), []
+    for name in ("phi", "theta"):
+        k = model.states.index(name)
+        held = np.zeros((n + 1, n + 1))
+        held[:n, :n], held[:n, n] = model.A - model.B @ feedback, model.B @ feedback[:, k]
+        found.append(float(expm(held * _SOON)[k, n]))
+    return None if min(found) < _LEAST_KEPT else (LEAN / min(1.0, found[0]), LEAN / min(1.0, found[1]))
+
+
+_LEAST_KEPT = 0.4
+_SOON = 1.0
 _STEPS: dict[tuple[int, int], Step] = {}
 
 
@@ -189,10 +207,11 @@ def state_feedback_step(
     memory: Any, time: Any, measured: Any, wanted: Any, gains: Any, *, inputs: int, states: int
 ) -> tuple[Any, Any]:
     """A state hold whose place follows the aircraft unless a place is held, with the sticks mixed on top."""
-    place, lean, mixing = gains[0], gains[1], gains[2 : 2 + 4 * inputs].reshape(inputs, 4)
+    place, mixing = gains[0], gains[3 : 3 + 4 * inputs].reshape(inputs, 4)
     x, y = jnp.where(place > 0.5, wanted[0], measured[0]), jnp.where(place > 0.5, wanted[1], measured[1])
     held = jnp.concatenate([jnp.stack([x, y]), wanted[2 : len(REFERENCES)]])
     # The hold works on deviations: what is asked for is taken from what is measured.
-    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5]).at[6].add(-lean * wanted[6]).at[7].add(lean * wanted[7])
-    memory, commands = state_hold_step(memory, time, seen, held, gains[2 + 4 * inputs :], inputs=inputs, states=states)
+    seen = measured.at[3].add(-wanted[4]).at[4].add(-wanted[5])
+    seen = seen.at[6].add(-gains[1] * wanted[6]).at[7].add(gains[2] * wanted[7])
+    memory, commands = state_hold_step(memory, time, seen, held, gains[3 + 4 * inputs :], inputs=inputs, states=states)
     return memory, commands + mixing @ wanted[6:10]

@@ -470,5 +470,5 @@ def test_the_trim_comes_from_the_flights_unless_it_is_given() -> None:
     assert {n: found.parameters[n].value for n in ("U0", "theta0", "W0")} == {"U0": 14.0, "theta0": -0.05, "W0": 0.0}
     given = at_flown_trim(model.with_values({"U0": 10.0}), responses)
     assert given.parameters["U0"].value == 10.0
-    with pytest.raises(CardError, match=r"trim\.p"):
-        parse(to_toml(model).replace("[trim]", '[trim]\np = "U0"'))
+    with pytest.raises(CardError, match=r"trim\.gamma"):
+        parse(to_toml(model).replace("[trim]", '[trim]\ngamma = "U0"'))

@@ -81,7 +81,7 @@ def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(coax: World
 def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> None:
     for name in ("raptor50", "lynx"):  # rotors of both senses
         world = World(sp.vehicle(name, in_plane="blade-element"))
-        mixing = world.pilot.gains["raw", True][2:18].reshape(4, 4)
+        mixing = world.pilot.gains["raw", True][3:19].reshape(4, 4)
         model = sp.linearize(world.vehicle, world.trim)
         matrix = static_decoupling(
             model.to_control(), inputs=["A1", "B1", "theta0T", "theta0"], outputs=["p", "q", "r", "w"]
@@ -98,7 +98,7 @@ def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> Non
 def test_axes_that_first_derivatives_do_not_tell_apart_are_decoupled_a_moment_later() -> None:
     """With the thrust perpendicular to the disc collective pitches at once and the cyclic does not: half a second."""
     world = World(sp.vehicle("lynx"))
-    mixing = world.pilot.gains["raw", True][2:18].reshape(4, 4)
+    mixing = world.pilot.gains["raw", True][3:19].reshape(4, 4)
     model = sp.linearize(world.vehicle, world.trim)
     n, m = model.B.shape
     step = scipy.linalg.expm(0.5 * np.block([[model.A, model.B], [np.zeros((m, n + m))]]))[:n, n:]
@@ -111,11 +111,11 @@ def test_in_the_mode_it_opens_in_short_presses_and_long_ones_end_level(world: Wo
     """Keys are all or nothing: pressed for a second on every axis, then let go, it levels out and flies on."""
     fresh(world, "attitude")
     phi, theta = (world.vehicle.index(name) for name in ("phi", "theta"))
-    ahead = fly(world, 2.0, pitch=1.0)
-    assert -np.radians(14.0) < ahead[theta] < -np.radians(0.5)
-    assert ahead[3] > 0.3
-    right = fly(world, 2.0, pitch=0.0, roll=1.0)
-    assert np.radians(0.5) < right[phi] < np.radians(14.0)
+    ahead = fly(world, 1.0, pitch=1.0)
+    assert -np.radians(15.0) < ahead[theta] < -np.radians(0.5)
+    assert ahead[3] > 0.2
+    right = fly(world, 1.0, pitch=0.0, roll=1.0)
+    assert np.radians(0.5) < right[phi] < np.radians(15.0)
     for axis in ("roll", "pitch", "yaw", "heave"):
         for way in (1.0, -1.0):
             fly(world, 1.0, **{"roll": 0.0, "pitch": 0.0, "yaw": 0.0, "heave": 0.0, axis: way})

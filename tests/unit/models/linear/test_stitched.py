@@ -209,11 +209,11 @@ def test_wind_is_air_speed(stitched: StitchedVehicle) -> None:
 def test_beyond_the_points_it_holds_and_says_so(stitched: StitchedVehicle) -> None:
     x, u = trimmed(18.0)
     x[U] += 4.0
-    told = doubts(stitched, x, u, Environment())
+    told = doubts(stitched, x, u, Environment(air_density=1.225))
     assert len(told) == 1
     assert "outside the points, 0.0 to" in told[0]
     assert "1.0 kg/m^3" not in told[0]
-    assert doubts(stitched, *trimmed(9.0), Environment()) == ()
+    assert doubts(stitched, *trimmed(9.0), Environment(air_density=1.225)) == ()
     assert "not scaled" in doubts(stitched, *trimmed(9.0), Environment(air_density=1.0))[0]
 
 
