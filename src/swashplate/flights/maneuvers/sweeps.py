@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.sweep_tracking import Ridge
@@ -206,20 +206,39 @@ def _scalogram(signal: Array, frequency: Array, *, rate: float, hop: int) -> tup
     apart: a pure tone holds all of it.
     """
     n = signal.size
-    size = int(2 ** np.ceil(np.log2(2 * n)))
+    frames = -(-n // hop)
+    short = int(2 ** np.ceil(np.log2(2 * frames)))
+    size = short * hop  # the inverse transform's every hop-th sample is that of its folded spectrum
     spectrum = np.fft.fft(signal, size)
     bins = np.fft.fftfreq(size, 1.0 / rate)
     spectrum[np.abs(bins) < 0.5 * frequency[0]] = 0.0
-    squared = np.fft.fft(np.real(np.fft.ifft(spectrum))[:n] ** 2, size)
-    amplitude = np.empty((frequency.size, -(-n // hop)))
+    squared = np.fft.rfft(np.real(np.fft.ifft(spectrum))[:n] ** 2, size)
+    squared[1:] *= 2.0  # its real part has both sides
+    amplitude = np.empty((frequency.size, frames))
     power = np.empty_like(amplitude)
+    bins = bins[: size // 2]  # of a real signal's one side
+    step = rate / size
     for i, f in enumerate(frequency):
         spread = _CYCLES / (2.0 * np.pi * f)  # standard deviation of the Gaussian window [s]
-        window = 2.0 * np.exp(-0.5 * (2.0 * np.pi * (bins - f) * spread) ** 2)
-        amplitude[i] = np.abs(np.fft.ifft(spectrum * window))[:n:hop]
-        gauss = np.exp(-0.5 * (2.0 * np.pi * bins * spread / np.sqrt(2.0)) ** 2)
-        power[i] = np.real(np.fft.ifft(squared * gauss))[:n:hop]
+        wide = _NOTHING / (2.0 * np.pi * spread)
+        here = slice(max(0, int((f - wide) / step)), min(bins.size, int((f + wide) / step) + 2))
+        window = 2.0 * np.exp(-0.5 * (2.0 * np.pi * (bins[here] - f) * spread) ** 2)
+        amplitude[i] = np.abs(_sampled(spectrum[here] * window, here.start, short, hop))[:frames]
+        here = slice(0, min(bins.size, int(np.sqrt(2.0) * wide / step) + 2))
+        gauss = np.exp(-0.5 * (2.0 * np.pi * bins[here] * spread / np.sqrt(2.0)) ** 2)
+        power[i] = np.real(_sampled(squared[here] * gauss, 0, short, hop))[:frames]
     return amplitude, np.maximum(power, 0.0)
+
+
+_NOTHING = 8.5
+"""Standard deviations at which a Gaussian is 2e-16."""
+
+
+def _sampled(part: Complex, first: int, short: int, hop: int) -> Complex:
+    """Every hop-th sample of an inverse transform of `short * hop` bins, zero but for a part from `first` on."""
+    folded = np.zeros(-(-(first + part.size) // short) * short, dtype=np.complex128)
+    folded[first : first + part.size] = part
+    return np.asarray(np.fft.ifft(folded.reshape(-1, short).sum(axis=0)) / hop)
 
 
 def _best_path(gain: Array) -> tuple[int, NDArray[np.int64]] | None:

@@ -26,8 +26,9 @@ def answer_words(pieces: Sequence[Signals], inputs: Sequence[str], outputs: Sequ
         inputs, outputs: names.
     """
     words = []
+    of_pieces = [_shares(piece, len(inputs), len(outputs)) for piece in pieces]
     for i, name in enumerate(inputs):
-        shares = [_shares(piece, i, len(inputs), len(outputs)) for piece in pieces]
+        shares = [share[i] for share in of_pieces]
         told = [share for share in shares if share is not None]
         if told and all(past >= _ANSWER and 1.0 - past <= _LATER * (1.0 - later) for past, later in told):
             least = 100.0 * min(past for past, _ in told)
@@ -40,28 +41,29 @@ def answer_words(pieces: Sequence[Signals], inputs: Sequence[str], outputs: Sequ
     return words
 
 
-def _shares(piece: Signals, which: int, n_in: int, n_out: int) -> tuple[float, float] | None:
-    """Shares of an input's variance that the outputs until then and from then on explain; None where it is still."""
+def _shares(piece: Signals, n_in: int, n_out: int) -> list[tuple[float, float] | None]:
+    """Of each input, the shares of its variance that the outputs until then and from then on explain; None: still."""
     step = max(1, round(_STEP / piece.dt))
     reach = step * round(_SPAN / _STEP)
     values = np.asarray(piece.values[:, : n_in + n_out], dtype=np.float64)
     if len(values) < 20 * reach:
-        return None
-    target = values[reach:-reach, which]
-    if np.ptp(target) == 0.0:
-        return None
+        return [None] * n_in
+    targets = values[reach:-reach, :n_in]
 
     def shifted(shifts: Sequence[int]) -> Array:
         last = len(values) - reach
         return np.concatenate([values[reach + k : last + k, n_in:] for k in shifts], axis=1)
 
-    past = _explained(target, shifted(range(-reach, 1, step)))
-    later = _explained(target, shifted(range(step, reach + 1, step)))
-    return past, later
+    past = _explained(targets, shifted(range(-reach, 1, step)))
+    later = _explained(targets, shifted(range(step, reach + 1, step)))
+    still = np.ptp(targets, axis=0) == 0.0
+    return [None if still[i] else (float(past[i]), float(later[i])) for i in range(n_in)]
 
 
-def _explained(target: Array, by: Array) -> float:
-    by = by - by.mean(axis=0)
-    off = target - target.mean()
-    rest = off - by @ np.linalg.lstsq(by, off, rcond=None)[0]
-    return 1.0 - float(rest @ rest) / float(off @ off)
+def _explained(targets: Array, by: Array) -> Array:
+    """Share of each target's variance that lies in the span of some columns, by one triangular factor of them all."""
+    both = np.concatenate([by, targets], axis=1)
+    factor = np.asarray(np.linalg.qr(both - both.mean(axis=0), mode="r"), dtype=np.float64)
+    triangle = factor[:, by.shape[1] :] ** 2
+    total = triangle.sum(axis=0)
+    return np.asarray(triangle[: by.shape[1]].sum(axis=0) / np.where(total > 0.0, total, 1.0))
