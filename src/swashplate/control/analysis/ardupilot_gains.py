@@ -359,9 +359,3 @@ def _with_words(s: Suggestion) -> Suggestion:
     if s.loop.unstable:
         words += f" The slow mode that grows ({s.loop.unstable:.2g} rad/s) is left to the attitude loop."
     return replace(s, words=words, buys=buys, costs=costs)
-
-
-def loop_of(model: StateSpaceModel, suggestion: Suggestion, omega: Array) -> Complex:
-    """The broken rate loop of a suggestion on a model, shape (n,)."""
-    loop = RateLoop(model, suggestion.axis, *AXES[suggestion.axis], _FILTER, 0.0)
-    return np.asarray(loop.controller(suggestion.parameters, omega) * loop.plant(omega), dtype=np.complex128)

@@ -37,9 +37,9 @@ from swashplate.identification.responses.own_references import own_references
 from swashplate.identification.responses.references import reference_columns, sweeps_of
 from swashplate.identification.responses.resolution import LONGER, TWICED, blur, first_guess, without
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, signals, spectral_matrix
+from swashplate.identification.responses.window_lengths import Windows, choose_windows
 
 LINES_PER_DECADE = 50
-WINDOWS = 5
 OVERLAP = 0.75
 """Hann windows that overlap so weigh every sample alike; less loses data, more only repeats."""
 SLOW = 1.0 / 3.0
@@ -49,39 +49,6 @@ SHORTEST = 0.2
 PERIODS = 4.0
 """Periods that a window must hold for it to count beside longer ones. The book trusts it from one period on; measured
 on an R-50 in hover, it is off by 3 dB at two periods and by 0.1 dB at four. Only the longest goes down to one."""
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Lengths [s] of the windows, longest first, with what was bent to get them."""
-
-    lengths: tuple[float, ...]
-    warnings: tuple[str, ...]
-
-
-def choose_windows(durations: Sequence[float], highest: float, *, count: int = WINDOWS) -> Windows:
-    """Window lengths by the book's rules (Tischler and Remple 2012, ch. 10).
-
-    The longest is at most half the shortest record and a fifth of all; the shortest holds at least 20 periods of the
-    highest frequency.
-
-    Args:
-        durations: of the records [s].
-        highest: highest frequency [Hz].
-        count: how many lengths, spread geometrically.
-    """
-    longest = min(min(durations) / 2.0, sum(durations) / 5.0)
-    shortest = min(20.0 / highest, longest)
-    warned: tuple[str, ...] = ()
-    if 20.0 / highest > longest:
-        warned = (
-            f"the records are short: a window of {longest:.3g} s holds {longest * highest:.0f} periods of the highest "
-            f"frequency ({highest:.3g} Hz), expected 20. Fly longer for a trustworthy response.",
-        )
-    shortest = max(shortest, longest / 10.0)
-    number = count if longest > 1.2 * shortest else 1
-    lengths = np.geomspace(longest, shortest, number) if number > 1 else np.array([longest])
-    return Windows(tuple(float(length) for length in lengths), warned)
 
 
 def respond(
