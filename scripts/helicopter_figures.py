@@ -264,7 +264,7 @@ def trex_figure(file: Path) -> None:
     columns = {name: np.interp(time, rows["time"], rows[name]) for name in rows.dtype.names if name != "time"}
     cut = round(0.66 * time.size)
     here = slice(cut, cut + round(SHOWN * RATE))
-    card = conventional(new_card("T-Rex 550, scaled", mass=3.2, radius=0.594))
+    card = conventional(new_card("T-Rex 550, scaled", mass=3.2, radius=0.594, like="raptor50"))
     model = paper_model(sp.linearize(card))
     geometry = behind_sticks(model, columns, here)
     lines: list[tuple[str, Array, list[Line]]] = []

@@ -90,6 +90,42 @@ SETPOINT, RAMP, RUN_UP = 0.66, 8.0, 15.0
 
 EKF_WAIT = 40.0
 """s from the start until the firmware's EKF has aligned and found its place, before which it refuses to be armed."""
+STILL, GPS_SPEED, GPS_CHECKED = 0.02, 0.3, 10.0
+"""rad/s that gyros may read while they are calibrated; m/s that EK3_GPS_CHECK allows on the ground; s for which its
+checks must hold without a break."""
+
+
+@dataclass
+class Ekf:
+    """What stands between power-up and arming: gyro calibration, alignment, GPS checks.
+
+    It is aligned once and stays so: a helicopter that has landed and rocks under a rotor that still turns is no fault.
+    """
+
+    begun: float = 0.0
+    still_since: float | None = None
+    calibrated: bool = False
+    good_since: float | None = None
+    aligned: bool = False
+
+    def watch(self, state: dict[str, list[float]]) -> None:
+        now = state["timestamp"][0]
+        if self.aligned:
+            return
+        still = max(map(abs, state["gyro"])) < STILL
+        self.still_since = (now if self.still_since is None else self.still_since) if still else None
+        if self.still_since is not None and now - self.still_since >= 2.0:
+            self.calibrated = True
+        good = self.calibrated and max(map(abs, state["velocity"])) < GPS_SPEED
+        self.good_since = (now if self.good_since is None else self.good_since) if good else None
+        checked = self.good_since is not None and now - self.good_since >= GPS_CHECKED
+        self.aligned = checked and now - self.begun >= EKF_WAIT
+
+    @property
+    def refusal(self) -> str:
+        if not self.calibrated:
+            return "Gyros still settling"
+        return "" if self.aligned else "Need Position Estimate"
 
 
 class LowPass:
@@ -143,6 +179,7 @@ class HeliAutopilot:
     answers: list[dict[str, list[float]]] = field(default_factory=list)
     place: tuple[float, float] = (0.0, 0.0)
     collective: float = 0.0
+    ekf: Ekf = field(default_factory=Ekf)
     _sums: np.ndarray = field(default_factory=lambda: np.zeros(3))
     _lift: float = 0.0
     _pulses: list[int] = field(default_factory=lambda: [1460, 1460, 1460, 1500, 0, 0, 0, 1000])
@@ -164,6 +201,7 @@ class HeliAutopilot:
         # Every hundredth answer is read the slow way that ArduPilot reads them all.
         state = read_line(answer) if self.count % 100 == 1 else _quickly(answer)
         self.answers.append(state)
+        self.ekf.watch(state)
         if self.count % self.every == 0:
             self._control(state)
         return state
@@ -173,21 +211,32 @@ class HeliAutopilot:
             state = self.exchange()
         return state
 
-    def wait_for_ekf(self, seconds: float = EKF_WAIT, *, seed: int = 0) -> dict[str, list[float]]:
-        """Disarmed on the ground for as long as the EKF takes, at 100 frames a second; the pilot stirs the sticks.
-
-        What moves meanwhile is refused, as the firmware does ("gyros still settling", "EKF velocity variance").
-        """
+    def wait_for_ekf(self, longest: float = 2.0 * EKF_WAIT, *, seed: int = 0) -> dict[str, list[float]]:
+        """Disarmed on the ground until the firmware may be armed, at 100 frames a second, the sticks stirred."""
         flown, random = self.rate, np.random.default_rng(seed)
         self.rate = 100
-        for _ in range(round(2.0 * seconds)):
+        for _ in range(round(2.0 * longest)):
             roll, pitch, yaw, collective = random.uniform((-1.0, -1.0, -1.0, 0.0), 1.0).tolist()
             self.sticks = (roll, pitch, yaw, collective)
             state = self.fly(0.5)
             moving = max(map(abs, state["gyro"] + state["velocity"]))
-            assert moving < 0.02, f"the EKF does not settle: {moving:.3g} rad/s or m/s on the ground"
+            assert moving < STILL or not self.ekf.calibrated, f"{moving:.3g} rad/s or m/s with the rotor at rest"
+            if self.ekf.aligned:
+                break
         self.rate, self.sticks = flown, (0.0, 0.0, 0.0, 0.0)
+        assert self.ekf.aligned, f"the EKF does not settle in {longest:g} s: {self.ekf.refusal}"
         return state
+
+    def arm(self) -> str:
+        """Arm, or the firmware's reason why not."""
+        if self.ekf.refusal:
+            return self.ekf.refusal
+        if self.interlock:
+            return "Motor Interlock Enabled"
+        if self.sticks[3] > 0.0:
+            return "Throttle too high"
+        self.armed = True
+        return ""
 
     def begin_sweep(self, axis: int, signal: Callable[[float], float]) -> None:
         self.sweep, self._since = (axis, signal), self.answers[-1]["timestamp"][0]

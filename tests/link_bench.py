@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from swashplate.export.stepping_c import CompiledEngine, can_compile
 from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
@@ -15,6 +16,10 @@ from swashplate.models.catalogue import vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
+from swashplate.simulation.stepping import MakeEngine
+
+QUICK: MakeEngine | None = CompiledEngine if can_compile() else None
+"""What `swash link` steps with here."""
 
 
 @dataclass
@@ -44,6 +49,7 @@ def bench(
     sag: float = 0.0,
     record: Path | None = None,
     record_rate: float = 200.0,
+    engine: MakeEngine | None = None,
 ) -> Bench:
     made = standing(vehicle(name))
     around = Surroundings(environment or Environment(), sag)
@@ -51,7 +57,7 @@ def bench(
     recorder = None
     if record is not None:
         recorder = Recorder(record, like=unflown(made, record_rate=record_rate), say=said.append)
-    plant = Plant(made, servo_mapping(name, made), around, recorder=recorder, record_rate=record_rate)
+    plant = Plant(made, servo_mapping(name, made), around, recorder=recorder, record_rate=record_rate, engine=engine)
     return Bench(
         ArduPilotSession(plant, Sensing(plant, unit=unit, seed=seed), Notices(said.append)), plant, said, recorder
     )

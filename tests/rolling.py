@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,16 +91,40 @@ A = {value = 0.4}
 """
 
 
-def gusty(seed: int = 11) -> Flight:
+OUTPUTS_OF_ROLL = ("p", "pdot", "ay")
+
+
+class BiasedNumbers(NamedTuple):
+    """The same, and where the stick stands that does nothing."""
+
+    Lb: Any
+    tau: Any
+    A: Any
+    offset: Any
+
+
+def biased_rates(state: Roll, inputs: Stick, par: BiasedNumbers, env: Environment, xp: Backend) -> Roll:
+    return rates(state, Stick(inputs.stick + par.offset), Numbers(par.Lb, par.tau, par.A), env, xp)
+
+
+def biased() -> Vehicle:
+    """`rolling` with a stick that may stand off centre; at zero the equations are the same."""
+    usual = rolling()
+    numbers = {**usual.card.parameters, "offset": Parameter(0.0, "1", "a test", "assumed")}
+    card = Card("roll", "two states in roll", "nowhere", {}, numbers)
+    return replace(usual, card=card, parameters=BiasedNumbers, derivatives=biased_rates)
+
+
+def gusty(seed: int = 11, offset: float = 0.0) -> Flight:
     """Six seconds at 50 Hz in gusts that act on the roll rate."""
     random, dt, n = np.random.default_rng(seed), 0.02, 300
     stick = np.sign(np.sin(2.0 * np.arange(n) * dt)) * 0.2 + 0.05 * random.standard_normal(n)
     x, rows = np.zeros(2), []
     for k in range(n):
-        dx = np.array(rates(Roll(*x), Stick(stick[k]), Numbers(**TRUTH), Environment(), None))  # type: ignore[arg-type]
+        dx = np.array(rates(Roll(*x), Stick(stick[k] + offset), Numbers(**TRUTH), Environment(), None))  # type: ignore[arg-type]
         rows.append([x[0], dx[0], 9.81 * x[1]])
         for _ in range(20):
-            dx = np.array(rates(Roll(*x), Stick(stick[k]), Numbers(**TRUTH), Environment(), None))  # type: ignore[arg-type]
+            dx = np.array(rates(Roll(*x), Stick(stick[k] + offset), Numbers(**TRUTH), Environment(), None))  # type: ignore[arg-type]
             x = x + dt / 20 * dx + np.array([0.5, 0.01]) * np.sqrt(dt / 20) * random.standard_normal(2)
     seen = np.array(rows) + random.standard_normal((n, 3)) * [0.01, 0.3, 0.02]
     columns = {"stick": stick, "p": seen[:, 0], "pdot": seen[:, 1], "ay": seen[:, 2]}

@@ -19,6 +19,7 @@ from swashplate import public
 
 if TYPE_CHECKING:
     from swashplate.api.bench import evaluate_bench, simulate_bench
+    from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
     from swashplate.api.compare import compare
     from swashplate.api.controllers import load_controller
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from swashplate.api.link import link_ardupilot, link_px4, write_ardupilot_parameters
     from swashplate.api.live import live, show_replay
     from swashplate.api.monte_carlo import monte_carlo
+    from swashplate.api.nested import identify_nested
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
@@ -124,6 +126,7 @@ __all__ = [
     "Vehicle",
     "__version__",
     "autopilot",
+    "check_autopilot",
     "check_controller",
     "compare",
     "compare_derivatives",
@@ -158,6 +161,7 @@ __all__ = [
     "hover_trim",
     "identify",
     "identify_and_validate",
+    "identify_nested",
     "in_form",
     "inspect",
     "linearize",

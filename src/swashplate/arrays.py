@@ -7,3 +7,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+_SAME = 1e-6
+
+
+def largest_first(sizes: Array) -> NDArray[np.int64]:
+    """Places of `sizes` (n,), none negative, from the largest down; what is equal but for rounding keeps its order.
+
+    Rounding differs from processor to processor: by `argsort` alone, states that share a mode equally would change
+    places from machine to machine.
+    """
+    relative = sizes / max(float(np.max(sizes, initial=0.0)), np.finfo(float).tiny)
+    return np.argsort(-np.round(relative / _SAME), kind="stable")

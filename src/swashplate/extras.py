@@ -15,6 +15,8 @@ EXTRA_OF: Mapping[str, str] = {
     "jaxtyping": "model",
     "diffrax": "model",
     "equinox": "model",
+    "control": "model",
+    "matplotlib": "plot",
     "casadi": "export",
     "pymavlink": "link",
     "imageio_ffmpeg": "live",

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("starlette", reason="the extra `live` is not installed")
@@ -234,12 +235,30 @@ def test_a_real_log_has_its_sweep_modes_and_parameters(browser: Any, shared_data
         visit.page.select_option("#spectrum select", "p")
         visit.until("document.getElementById('spectrum').dataset.drawn === 'p'")
         assert "omega_rotor at 25.0" in visit.text("#spectrum")
+        assert "no harmonic stands out" in visit.text("#spectrum")  # the simulated autopilot's rotor does not shake
         visit.view("track")
         visit.until("document.getElementById('track').dataset.drawn > 10")
         first = visit.text("#clock")
         visit.page.click("#play")
         visit.until(f"document.getElementById('clock').textContent !== '{first}'")
         visit.close()
+
+
+def test_a_shaken_gyro_gets_notches_to_copy(browser: Any, address: str, tmp_path: Path) -> None:
+    time = np.arange(0.0, 20.0, 0.005)
+    p = 0.1 * np.sin(2.0 * np.pi * 50.0 * time) + 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    rows = zip(time.tolist(), p.tolist(), strict=True)
+    text = "t [s],p [rad/s],omega_rotor [rpm]\n" + "\n".join(f"{t:.3f},{rate:.6f},1500" for t, rate in rows)
+    (tmp_path / "shaken.csv").write_text(text + "\n")
+    visit = Visit(browser, address, "telephone")
+    visit.drop(tmp_path / "shaken.csv")
+    drawn(visit)
+    visit.view("spectrum")
+    visit.until("document.querySelector('#spectrum .code pre')")
+    assert visit.text("#spectrum .code pre").split() == [
+        f"INS_HNTCH_{line}" for line in ("ENABLE,1", "MODE,2", "REF,1", "FREQ,22.5", "BW,11.2", "HMNCS,2")
+    ]
+    visit.close()
 
 
 def test_from_a_dropped_log_to_gains_in_two_clicks(

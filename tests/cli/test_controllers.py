@@ -246,14 +246,20 @@ def test_a_loop_that_does_not_stand_ends_with_2_and_is_still_reported(tmp_path: 
 
 def test_the_papers_figure_as_a_report(tmp_path: Path) -> None:
     page = tmp_path / "path.html"
-    outcome = swash("decouple", "coax", "--report", page, "--json")
+    outcome = swash("decouple", "coax", "--report", page, "--gusts", "indoor=0.05", "--draws", "12", "--json")
     assert outcome.code == 0, outcome.err
     found = json.loads(outcome.out)["step"]
+    assert found["gusts"]["sigma"][0] == pytest.approx(0.05)
+    assert found["with, 5 %"]["drift"] < found["with, 50 %"]["drift"] < found["with, 95 %"]["drift"]
+    assert found["nearer_than"]["without"] == [12, 12]
+    wins, of = found["nearer_than"]["by the paper"]
+    assert wins > 0.5 * of + np.sqrt(of)  # beyond chance
     assert found["with"]["speed"] == pytest.approx(1.8, abs=0.01)
     assert found["without"]["rightmost"] > 0.6
     assert found["without"]["drift"] < -0.6
     text = page.read_text()
     assert "SIMULATED FLIGHT" in text
+    assert "each in gusts of its own (0.05 m/s)" in text
     assert f"{found['with']['drift']:+.2f} m with it" in text
     assert abs(found["with"]["drift"]) < 0.05 < 0.4 < found["by the paper"]["drift"]
 

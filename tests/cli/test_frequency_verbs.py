@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal as signals
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,7 @@ import pytest
 from commands import one_message, swash
 from scipy import signal
 
+from swashplate.cli.console import Progress
 from swashplate.identification.time.linear_simulation import delayed
 from swashplate.models.linear.state_space_file import structure
 from swashplate.simulation.discretisation import first_order_hold
@@ -324,6 +328,41 @@ def test_a_model_is_fitted_in_time_and_verified_on_another_log(folder: Path, flo
     assert "NOT A HOLD-OUT" not in page
     assert "is no method" in one_message(swash("fit-time", "rotor_body", short, "--method", "magic"))
     assert "is no parameter" in one_message(swash("fit-time", "rotor_body", short, "--start", "Lbb=3"))
+
+
+@pytest.mark.parametrize("number", [signals.SIGINT, signals.SIGTERM])
+def test_a_stopped_fit_is_kept_as_far_as_it_came(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, number: signals.Signals
+) -> None:
+    short = log(folder / "short.csv", seed=8, seconds=12.0)
+    ask = ("fit-time", "rotor_body", short, "--no-shifts", "--start", "Lb=2000", "--start", "Blat=0.15")
+    two, out, none = folder / "two", folder / f"stopped_{number}", folder / f"none_{number}"
+    assert swash(*ask, "--iterations", "2", "--out", two).code == 0
+    before = signals.signal(signals.SIGTERM, lambda *_: sys.exit(128 + signals.SIGTERM))  # as the console script has it
+
+    def stopping_at(words: str) -> Callable[..., None]:
+        def say(self: Progress, what: str, *, note: str = "", **_: object) -> None:
+            if words in (note.partition(",")[0], what if not note else ""):
+                signals.raise_signal(number)
+
+        return say
+
+    try:
+        monkeypatch.setattr(Progress, "say", stopping_at("iteration 2"))
+        done = swash(*ask, "--out", out)
+        monkeypatch.setattr(Progress, "say", stopping_at("fitting"))
+        ended = swash(*ask, "--out", none)
+    finally:
+        signals.signal(signals.SIGTERM, before)
+    assert done.code == 128 + number
+    assert f"stopped after 2 iterations by {number.name}" in done.err
+    fit, same = (json.loads((place / "fit.json").read_text(encoding="utf-8")) for place in (out, two))
+    assert [p["value"] for p in fit["estimates"]] == [p["value"] for p in same["estimates"]]
+    assert not fit["converged"]
+    assert fit["problems"][0].startswith("stopped after 2 iterations")
+    assert (out / "model.toml").read_bytes() == (two / "model.toml").read_bytes()
+    assert ended.code == 128 + number
+    assert not none.exists()
 
 
 def test_a_channel_of_another_name_is_flown_along_where_asked_or_where_the_responses_say_so(

@@ -187,6 +187,22 @@ def test_a_new_card_is_commented_and_flies(tmp_path: Path) -> None:
     assert "exists already" in one_message(swash("vehicles", "new", mine, "--mass", "8", "--radius", "0.78"))
 
 
+def test_a_new_cards_class_is_said_and_can_be_chosen(tmp_path: Path) -> None:
+    sized = ("--mass", "8", "--radius", "0.78")
+    outcome = swash("vehicles", "new", tmp_path / "a.toml", *sized)
+    assert "Numbers of class 90 (the largest model helicopters" in outcome.out
+    assert "because of its mass of 8 kg and rotor radius of 0.78 m" in outcome.out
+    assert not outcome.err
+    outcome = swash("vehicles", "new", tmp_path / "b.toml", *sized, "--class", "600")
+    assert "Numbers of class 600, as asked." in outcome.out
+    assert outcome.err.startswith("Careful: mass and radius ask for class 90")
+    areas = [read_card(tmp_path / name).values()["fuselage_area_x"] for name in ("a.toml", "b.toml")]
+    assert areas[0] != areas[1]
+    assert "not both" in one_message(
+        swash("vehicles", "new", tmp_path / "c.toml", *sized, "--class", "600", "--like", "lynx")
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -50,6 +50,16 @@ def test_a_port_in_use_is_exit_2(verb: str, kind: socket.SocketKind) -> None:
     assert f"port {port} on 127.0.0.1 is in use by another program" in message
 
 
+@pytest.mark.parametrize("verb", ["ardupilot", "px4"])
+def test_a_check_without_an_autopilot_is_exit_2(verb: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"udp:127.0.0.1:{taken.getsockname()[1]}"
+        command = ["link", verb, "--vehicle", "coax", "--check", "--timeout", "0.3", "--mavlink"]
+        assert "is in use by another program" in one_message(swash(*command, address))
+    assert "no autopilot was heard within 0.3 s" in one_message(swash(*command, address))
+
+
 def test_a_link_in_a_process_of_its_own(tmp_path: Path) -> None:
     """Only this machine is listened to, packets are answered, an interrupt ends it well and the flight is kept."""
     record = tmp_path / "flown.nc"

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from commands import one_message, swash
 
 import swashplate as sp
 from swashplate.api import identification
+from swashplate.cli.app import app
 from swashplate.cli.console import as_json
 from swashplate.cli.outputs import folder_when_complete, place_of
 from swashplate.errors import SwashError
@@ -275,3 +277,16 @@ def test_what_was_meant_comes_before_a_long_list(tmp_path: Path) -> None:
     assert told.index("Did you mean 'servo_roll'?") < told.index("It has phi, servo_roll.")
     done = swash("plot", log, "-o", tmp_path / "a.png")
     assert (done.code, (tmp_path / "a.png").is_file()) == (0, True)
+
+
+def test_every_output_has_its_short_name() -> None:
+    """In the help too, so that it need not be guessed."""
+
+    def outputs(command: Any) -> Iterator[tuple[str, Any]]:
+        for verb in getattr(command, "commands", {}).values():
+            yield from outputs(verb)
+        yield from ((command.name, parameter) for parameter in command.params if "--out" in parameter.opts)
+
+    found = list(outputs(typer.main.get_command(app)))
+    assert len(found) > 15
+    assert [name for name, parameter in found if "-o" not in parameter.opts] == []

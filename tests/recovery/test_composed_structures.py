@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 from coupled_helicopter import LAG, PITCH, ROLL, THRUST_BY_W, matrices, measured
+from proof_page import leave
+from swashplate.arrays import Array
 from swashplate.identification.frequency.state_space_fit import fit_state_space
 from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.frequency.structure_search import search_structures
 from swashplate.identification.responses.frequency_response import FrequencyResponse
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import structure
 
 RIGHT = "compose:body+flap+inflow+torque"
@@ -72,3 +76,46 @@ def test_the_search_picks_the_parts_that_are_there(kind: dict[str, bool], parts:
     assert time.process_time() - began < 12.0 * right
     assert {c.name for c in found.tried if c.abandoned} == {"body", "body+flap_decoupled"}
     assert all(c.fit.seconds < 1.0 * found.seconds / 5.0 for c in found.tried if c.abandoned)
+
+
+@pytest.mark.proof
+def test_a_wrong_structure_costs_no_eight_times_the_right_one(
+    responses: FrequencyResponse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the responses with all their derivatives that a fit looks at, which no load on the machine changes."""
+    looked: list[int] = []
+    own = StateSpaceModel.sensitivities
+
+    def counted(self: StateSpaceModel, free: tuple[str, ...], numbers: Array, pairs: Any) -> Any:
+        looked.append(len(pairs))
+        return own(self, free, numbers, pairs)
+
+    monkeypatch.setattr(StateSpaceModel, "sensitivities", counted)
+    wrong = {
+        "no engine": "compose:body+flap+inflow",
+        "no inflow": "compose:body+flap+torque",
+        "no rotor": "compose:body+inflow+torque",
+        "rotor without coupling": "compose:body+flap_decoupled+inflow+torque",
+        "a lead-lag for the inflow": "compose:body+flap+lead+torque",
+        "an engine's speed for its torque": "compose:body+flap+inflow+droop",
+        "a bar that is not there": "compose:body+flap+bar+inflow+torque",
+    }
+    spent = {}
+    for name in ("right", *wrong):
+        looked.clear()
+        fit = fit_state_space(structure(wrong.get(name, RIGHT)), responses)
+        spent[name] = (sum(looked), fit.cost)
+    right = spent["right"][0]
+    worst = max(count / right for count, _ in spent.values())
+    leave(
+        "wrong_structures",
+        {
+            "title": "What a wrong structure costs",
+            "text": "A coupled helicopter with flapping, inflow and engine, four starting points each. Counted are "
+            f"responses with all their derivatives. The dearest costs {worst:.1f} times the right one (8 allowed).",
+            "columns": ["structure", "evaluations", "over the right one", "J_ave"],
+            "rows": [[name, count, count / right, cost] for name, (count, cost) in spent.items()],
+            "passed": bool(worst < 8.0),
+        },
+    )
+    assert worst < 8.0, spent

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import swashplate as sp
 from heli_autopilot import HeliAutopilot
-from link_bench import bench
+from link_bench import QUICK, bench
 from swashplate.cli.app import app
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
@@ -28,10 +28,11 @@ SWEEPS = tuple(Chirp.planned(axis, 0.08, (0.4, 8.0), record=30.0, fade=1.0) for 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """From rest on the ground to a hover, a roll and a pitch sweep in System ID mode, and the log of each."""
-    at = bench("raptor50")
+    at = bench("raptor50", engine=QUICK)
     pilot = HeliAutopilot(at.send, rate=RATE)
-    pilot.fly(0.2)
-    pilot.armed = pilot.interlock = True
+    pilot.wait_for_ekf()
+    assert pilot.arm() == ""
+    pilot.interlock = True
     pilot.fly(8.0)
     pilot.height, pilot._lift = 3.0, 0.5
     pilot.fly(8.0)

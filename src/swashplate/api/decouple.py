@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ import numpy as np
 from swashplate.api.design_controller import margins_document
 from swashplate.control.analysis.margins import Margins
 from swashplate.control.analysis.stability import loop_margins, loop_modes, require_stable
-from swashplate.control.analysis.straightness import StepRun, command_for_speed, step_run
+from swashplate.control.analysis.straightness import DURATION, StepRun, command_for_speed, nearer, step_run
 from swashplate.control.controller_file import save_controller
 from swashplate.control.draws.robustness import draw_models
 from swashplate.control.lateness import lateness
@@ -31,6 +31,7 @@ from swashplate.reporting.straightness import compose_straightness
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.simulation.trim import Trim, trim
+from swashplate.simulation.wind import Gusts, dryden
 from swashplate.text_table import text_table
 
 Fitted = Result[Any, Any] | str | Path
@@ -48,7 +49,9 @@ class FlownStep:
     Attributes:
         command: the step.
         runs: "without" and "with"; "by the paper" between them where the lag was chosen by flying.
-        draws: how many models were drawn.
+        draws: how many models were drawn, or flights flown in gusts.
+        many: what the many flights are, in words; empty where there are none.
+        gusts: that each of them had of its own, None for still air; the first run of the model has none.
         sources: of the drift's variance over them: numbers and their shares.
         explained: share of it that a line explains.
     """
@@ -58,6 +61,14 @@ class FlownStep:
     draws: int
     sources: tuple[tuple[str, float], ...] = ()
     explained: float = 0.0
+    many: str = ""
+    gusts: Gusts | None = None
+
+    def nearer_than(self) -> dict[str, tuple[int, int]]:
+        """By other law, on how many of the same flights this one ends nearer to straight ahead, and of how many."""
+        law = self.runs["with"].drawn
+        others = {name: run.drawn for name, run in self.runs.items() if name != "with"}
+        return {} if law is None else {name: nearer(law, path) for name, path in others.items() if path is not None}
 
     def figures(self) -> dict[str, dict[str, Any]]:
         """Paths on the step: of the model itself, and percentiles over drawn models."""
@@ -83,6 +94,9 @@ class FlownStep:
             for name, entry in self.figures().items()
         ]
         lines = [f"step of the pitch command: {self.command:.3f}", text_table(head, cells)]
+        told = ", ".join(f"than {name} on {wins} of {of}" for name, (wins, of) in self.nearer_than().items())
+        if told:
+            lines.append(f"\nof {self.draws} {self.many}, the law ends nearer to straight ahead {told}")
         if self.sources:
             told = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in self.sources[:4])
             lines.append(
@@ -151,6 +165,9 @@ class DecouplingDesign(Shown):
         if self.step is not None:
             sources = dict(self.step.sources)
             found["step"] = {"command": self.step.command, **self.step.figures(), "drift_sources": sources}
+            if against := self.step.nearer_than():
+                gusts = None if self.step.gusts is None else asdict(self.step.gusts)
+                found["step"] |= {"nearer_than": against, "gusts": gusts}
         return found
 
     def page(self, *, title: str | None = None) -> Report:
@@ -167,6 +184,8 @@ class DecouplingDesign(Shown):
             command=self.step.command,
             lag=self.lag(),
             sources=self.step.sources,
+            many=self.step.many,
+            nearer_than=self.step.nearer_than(),
             title=title,
         )
 
@@ -203,6 +222,7 @@ def decouple(
     to_speed: float | None = None,
     drift: float | None = None,
     fit: Fitted | None = None,
+    gusts: Gusts | None = None,
     draws: int = 500,
     seed: int = 0,
 ) -> DecouplingDesign:
@@ -222,13 +242,15 @@ def decouple(
         to_speed: the same with the step that reaches this speed [m/s].
         drift: seen on the step with this law [m to the right after 6 m]: take it out.
         fit: what an identification found, or its file: fly the step also on models drawn from its covariance.
+        gusts: fly these in gusts, each in its own; without a fit the model itself. `INDOOR` or others of
+            `swashplate.simulation.wind`.
         draws, seed: how many, and of which seed.
 
     Raises:
         ControllerError: where the loop does not stand, or a step does not get there.
         SwashError: for a vehicle with other inputs, or options that contradict each other.
     """
-    _check(step, to_speed, drift, fit)
+    _check(step, to_speed, drift, fit, gusts)
     nominal = vehicle.card.values().get("voltage_nominal")
     hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
     rule = ("straight" if mode == "manual" else "battery") if lag is None else lag
@@ -263,12 +285,28 @@ def decouple(
         None if made.mode == "manual" else loop_margins(vehicle, made, hover),
         None
         if step is None
-        else _flown(vehicle, made, hover, step, fit, draws, seed, papers if made is not papers else None),
+        else _flown(vehicle, made, papers if made is not papers else None, hover, step, _Many(fit, gusts, draws, seed)),
         lateness(vehicle, made, given=None),
     )
 
 
-def _check(step: float | None, to_speed: float | None, drift: float | None, fit: Fitted | None) -> None:
+@dataclass(frozen=True)
+class _Many:
+    """What is flown besides the model in still air."""
+
+    fit: Fitted | None
+    gusts: Gusts | None
+    draws: int
+    seed: int
+
+    def words(self) -> str:
+        what = "flights of the model" if self.fit is None else "models drawn from the fit's covariance"
+        return what if self.gusts is None else f"{what}, each in gusts of its own ({self.gusts.sigma[0]:.2g} m/s)"
+
+
+def _check(
+    step: float | None, to_speed: float | None, drift: float | None, fit: Fitted | None, gusts: Gusts | None
+) -> None:
     flown = step is not None or to_speed is not None
     if step is not None and to_speed is not None:
         raise SwashError("are two steps.", channel="--step and --to-speed", hint="Give one.")
@@ -276,6 +314,8 @@ def _check(step: float | None, to_speed: float | None, drift: float | None, fit:
         raise SwashError(f"is {to_speed:g} m/s, expected a positive speed.", channel="--to-speed")
     if fit is not None and not flown:
         raise SwashError("is for the paths of a --step.", channel="--fit", hint="Add --step 0.2.")
+    if gusts is not None and not flown:
+        raise SwashError("blow on a flown --step.", channel="--gusts", hint="Add --step 0.2 or --to-speed 1.8.")
     if drift is not None and not flown:
         raise SwashError("was seen on a step.", channel="--drift", hint="Add that step: --step 0.4 or --to-speed 1.8.")
     if drift is not None and not abs(drift) <= _FURTHEST:
@@ -296,25 +336,22 @@ def _on_estimates(vehicle: Vehicle, made: Autopilot, sensors: str, voltage: floa
 
 
 def _flown(
-    vehicle: Vehicle,
-    made: Autopilot,
-    hover: Trim,
-    step: float,
-    fit: Fitted | None,
-    draws: int,
-    seed: int,
-    papers: Autopilot | None,
+    vehicle: Vehicle, made: Autopilot, papers: Autopilot | None, hover: Trim, step: float, many: _Many
 ) -> FlownStep:
     bare = autopilot(vehicle, hover, mode="manual", rate=made.rate, decoupled=False)
-    drawn = None if fit is None else draw_models(vehicle, fit, count=draws, seed=seed)
+    drawn = None if many.fit is None else draw_models(vehicle, many.fit, count=many.draws, seed=many.seed)
+    wind = None
+    if many.gusts is not None:  # of another seed than the draws
+        samples = round(DURATION * made.rate) + 1
+        wind = dryden(many.gusts, samples=samples, rate=made.rate, seed=many.seed + 1_000_003, count=many.draws)
     flown = {"without": bare, "by the paper": papers, "with": made}
     runs = {
-        name: step_run(vehicle, controller, hover, command=step, parameters=drawn)
+        name: step_run(vehicle, controller, hover, command=step, parameters=drawn, wind=wind)
         for name, controller in flown.items()
         if controller is not None
     }
     spread = runs["with"].drawn
-    if drawn is None or spread is None:
-        return FlownStep(step, runs, draws)
-    sources, explained = drift_sources(spread.drift, drawn)
-    return FlownStep(step, runs, draws, tuple(sources), explained)
+    if spread is None:
+        return FlownStep(step, runs, many.draws)
+    sources, explained = ((), 0.0) if drawn is None else drift_sources(spread.drift, drawn)
+    return FlownStep(step, runs, many.draws, tuple(sources), explained, many.words(), many.gusts)

@@ -12,6 +12,7 @@ from swashplate.api.saying import Say, silent
 from swashplate.errors import CardError, SwashError
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
+from swashplate.identification.core import stopping
 from swashplate.identification.frequency.fitted_pairs import PairChoice
 from swashplate.identification.frequency.response_names import under_names_of
 from swashplate.identification.frequency.search_candidates import WIDEST, parameter_names
@@ -126,18 +127,20 @@ def fit_ss(
     else:
         begun = with_given(at_flown_trim(begun, responses), start, fixed)
         say("fitting")
-        fit = fit_state_space(
-            begun,
-            responses,
-            band=band,
-            bands=bands,
-            without=without,
-            least_coherence=least_coherence,
-            starts=starts,
-            seed=seed,
-            progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
-        )
-    if reduce:
+        with stopping.kept():
+            fit = fit_state_space(
+                begun,
+                responses,
+                band=band,
+                bands=bands,
+                without=without,
+                least_coherence=least_coherence,
+                starts=starts,
+                seed=seed,
+                progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
+            )
+    fit, whole = stopping.told(fit), fit
+    if reduce and fit is whole:  # there is nothing to take out of what was stopped
         fit = reduced(
             fit, hold_out=flights, progress=lambda i, cost: say("reducing", note=f"step {i}, J_ave {cost:.4g}")
         )

@@ -9,6 +9,7 @@ from swashplate.api.linear_study import LinearStudy, marked
 from swashplate.api.saying import Say, silent
 from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
+from swashplate.identification.core import stopping
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.validation.verification import verify
@@ -57,17 +58,19 @@ def fit_time(
     begun, channels = with_given(begun, start, fixed), (*begun.inputs, *wanted)
     records = uniform_records(flights, channels, rate=rate, cutoff=cutoff, names=names)
     say("fitting")
-    fit = fit_in_time(
-        begun,
-        records,
-        outputs=wanted,
-        shifts=shifts,
-        biases=biases,
-        method=method,
-        iterations=iterations,
-        horizon=horizon,
-        progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
-    )
+    with stopping.kept():
+        fit = fit_in_time(
+            begun,
+            records,
+            outputs=wanted,
+            shifts=shifts,
+            biases=biases,
+            method=method,
+            iterations=iterations,
+            horizon=horizon,
+            progress=lambda i, cost: say("fitting", note=f"iteration {i}, cost {cost:.5g}"),
+        )
+    fit = stopping.told(fit)
     say("flying the model")
     unseen = uniform_records(hold_out, channels, rate=rate, cutoff=cutoff, names=names) or records
     verification = marked(verify(fit.model, unseen, outputs=wanted), fit.settings["records"])

@@ -160,8 +160,8 @@ def fly_maneuver(
 
 def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
     """Where a simulated flight leaves what its equations hold for."""
-    rows = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
-    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), *rows)
+    x, u, wind = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
+    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), x, u, wind, flight.values("voltage"))
 
 
 def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:

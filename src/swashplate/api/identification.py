@@ -12,6 +12,7 @@ from swashplate import atomic
 from swashplate.api.saying import Say, silent
 from swashplate.flights.flight import Flight
 from swashplate.flights.overlap import check_disjoint
+from swashplate.identification.core import stopping
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, records
 from swashplate.identification.core.result import Result
@@ -125,22 +126,24 @@ def identify_and_validate(
     if method in TRACKED:
         records([*seen, *unseen], vehicle, outputs=outputs or POSE)
     say("preparing the fit (compiling takes longest the first time)")
-    fit = identify(
-        vehicle,
-        seen,
-        free=free,
-        method=method,
-        outputs=outputs,
-        ties=ties,
-        fixed=fixed,
-        priors=priors,
-        prior_card=prior_card,
-        iterations=iterations,
-        keep_unexcited=keep_unexcited,
-        wind=wind,
-        horizon=horizon,
-        progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
-    )
+    with stopping.kept():
+        fit = identify(
+            vehicle,
+            seen,
+            free=free,
+            method=method,
+            outputs=outputs,
+            ties=ties,
+            fixed=fixed,
+            priors=priors,
+            prior_card=prior_card,
+            iterations=iterations,
+            keep_unexcited=keep_unexcited,
+            wind=wind,
+            horizon=horizon,
+            progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
+        )
+    fit = stopping.told(fit)
     validation = None
     if unseen and not fit.failed:
         validating = "validating on what the fit has not seen"

@@ -25,6 +25,7 @@ from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import dispatch_in_line
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
+from swashplate.simulation.stepping import MakeEngine, SteppingEngine, XlaEngine
 from swashplate.simulation.trim import Trim
 
 Say = Callable[[str], None]
@@ -71,7 +72,12 @@ def check_record(record: Path | None) -> None:
         raise SwashError("the folder cannot be written to.", where=record.parent, channel="--record")
 
 
-def _mapping(vehicle: Vehicle, servos: str | Path | None, *, name: str | None, suffix: str) -> ServoMapping:
+def mapping_of(vehicle: Vehicle, servos: str | Path | None, *, name: str | None, suffix: str) -> ServoMapping:
+    """The servo mapping that was asked for, or the packaged one of the vehicle's name and a firmware's suffix.
+
+    Raises:
+        SwashError: where there is none, or it is for another vehicle.
+    """
     if servos is None:
         servos = f"{vehicle.traits.servos or name or vehicle.name}{suffix}"
         if servos not in packaged():
@@ -204,7 +210,7 @@ def write_ardupilot_parameters(
     file = Path(path)
     if not file.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
-    found = parameters(_mapping(vehicle, servos, name=name, suffix=""), vehicle, trim)
+    found = parameters(mapping_of(vehicle, servos, name=name, suffix=""), vehicle, trim)
     return write_text(file, parameter_file(found, title=vehicle.card.title))
 
 
@@ -229,14 +235,30 @@ def _plant(
             raise SwashError(f"is {voltage:g} V, expected 0 to 1000.", channel="--voltage")
         around = around._replace(voltage=voltage)
     aircraft = standing(vehicle)
-    mapping = _mapping(aircraft, servos, name=name, suffix=suffix)
+    mapping = mapping_of(aircraft, servos, name=name, suffix=suffix)
     recorder = None
     if file is not None:
         recover(file, notice)
         recorder = Recorder(file, like=unflown(aircraft, record_rate=rate), say=notice)
-    plant = Plant(aircraft, mapping, Surroundings(around, sag), recorder=recorder, record_rate=rate)
+    made = Surroundings(around, sag)
+    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=_engine(notice))
     plant.prepare()
     return plant, recorder
+
+
+def _engine(notice: Say) -> MakeEngine:
+    """The vehicle's own C where this machine can compile it, which is quicker; XLA elsewhere."""
+    from swashplate.export.stepping_c import CompiledEngine, can_compile
+
+    def make(moved: Vehicle, environment: Environment) -> SteppingEngine:
+        if can_compile():
+            try:
+                return CompiledEngine(moved, environment)
+            except (SwashError, OSError) as error:  # a compiler without headers, a folder that nothing runs from
+                notice(f"The vehicle's C cannot be used here, JAX steps instead: {error}")
+        return XlaEngine(moved, environment)
+
+    return make
 
 
 def _sensing(plant: Plant, *, noisy: bool, seed: int) -> Sensing:

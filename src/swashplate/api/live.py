@@ -7,9 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from swashplate.control.controller_file import read_controller
-from swashplate.control.kinds import kind_of
-from swashplate.control.laws.autopilot import Autopilot
-from swashplate.errors import ControllerError, SwashError
+from swashplate.errors import SwashError
 from swashplate.links.live.replay import Replay, as_json
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import Controller
@@ -36,7 +34,8 @@ def live(
 
     Args:
         vehicle: what flies.
-        controller: one that sticks can move, or its file (`swash decouple`).
+        controller: one, or its file. An autopilot (`swash decouple`) flies in all modes; any other in "position", on
+            its own sensors where it has some, with its commands as late as it takes them to be.
         folder: for recordings and reports; made with the first one.
         host, port: where the page is; port 0 takes any free one.
         allow_remote: let other machines open the page and fly.
@@ -45,7 +44,7 @@ def live(
         ready: told the page's address when it can be opened.
 
     Raises:
-        SwashError: where the address is taken, or the controller needs other sensors.
+        SwashError: where the address is taken, or the controller is for another vehicle.
     """
     from swashplate.links.live import server
     from swashplate.links.live.session import LiveSession
@@ -57,7 +56,7 @@ def live(
         raise SwashError("is a file, expected a folder.", where=place, channel="--out")
     enable_compilation_cache()
     dispatch_in_line()  # another thread would have to wait for a processor of its own at every step
-    chosen = None if controller is None else _for_sticks(controller)
+    chosen = read_controller(controller) if isinstance(controller, str | Path) else controller
     check_page()
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
@@ -105,12 +104,3 @@ def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say
     ready(address)
     if open_page and not webbrowser.open(address):
         say(f"No browser was found; open {address} yourself.")
-
-
-def _for_sticks(controller: Controller | str | Path) -> Autopilot:
-    file, held = (controller, read_controller(controller)) if isinstance(controller, str | Path) else (None, controller)
-    try:
-        made: Autopilot = kind_of(held).for_sticks(held)
-    except ControllerError as error:
-        raise SwashError(error.problem, where=file, channel="--controller", hint=error.hint) from None
-    return made

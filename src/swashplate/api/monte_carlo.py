@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,10 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.monte_carlo import compose_monte_carlo
 from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
-from swashplate.simulation.closed_loop import Controller
+from swashplate.simulation.batch import Batch
+from swashplate.simulation.closed_loop import REFERENCES, Controller
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
-from swashplate.simulation.trim import trim
+from swashplate.simulation.trim import Trim, trim
 from swashplate.simulation.wind import Gusts, dryden
 
 _LEAD, _TAIL = 3.0, 3.0  # s of hover before and after, as `simulate_maneuver` has them
@@ -46,6 +48,7 @@ class MonteCarlo(Shown):
         vehicle, controller: what flew, and what it is called.
         spread: what they did, and which were lost.
         worst: the flight with the number `spread.worst`, up to where it diverged.
+        flights: all of them, 20 samples a second.
         drawn: numbers of the aircraft that differ, by name, shape (flights,).
         late: how late commands were, in words.
         remarks: what may surprise.
@@ -55,6 +58,7 @@ class MonteCarlo(Shown):
     controller: str
     spread: Spread
     worst: Flight
+    flights: Batch
     drawn: Mapping[str, Array]
     late: str
     remarks: tuple[str, ...] = ()
@@ -115,6 +119,7 @@ def monte_carlo(
     vary: Mapping[str, float | str] | None = None,
     payload: float = 0.0,
     delay: float = 0.0,
+    bits: int | None = None,
     limits: Limits | None = None,
     seed: int = 0,
 ) -> MonteCarlo:
@@ -123,7 +128,8 @@ def monte_carlo(
     Args:
         vehicle: the model; of a linear one the parameters of its structure are drawn.
         controller: one, or its file.
-        maneuver: a pilot's commands, only roll and pitch; of a controller that takes none, added to its inputs.
+        maneuver: a pilot's commands, only roll and pitch; of a controller that takes none, added to its inputs. An axis
+            x, y, z, psi, ahead or right is asked of every controller. "hover:20s" moves nothing.
         count: how many flights.
         fit: what an identification found, or its file; aircraft are drawn from its covariance.
         gusts: turbulence, `swashplate.simulation.wind.INDOOR` or `outdoor(...)`; None for still air.
@@ -133,7 +139,8 @@ def monte_carlo(
         vary: standard deviations of the card's numbers by name, in their units or as "5%".
         payload: the most that an aircraft carries [kg].
         delay: the longest further delay of the commands to the actuators [s]; identified ones are flown anyhow.
-        limits: beyond which a flight is lost.
+        bits: in which a command is told over its input's range; None for exact commands.
+        limits: beyond which a flight is lost; a place is not judged where a speed is asked for.
         seed: of draws, gusts and sensor noise; every source has its own from it.
 
     Raises:
@@ -152,10 +159,12 @@ def monte_carlo(
     hover = trim(vehicle, voltage=nominal if battery is None else battery[0])
     pilot, name = flown_by(controller, vehicle, hover, seed=seed)
     kind = kind_of(pilot)
-    strange = [axis for axis in excitation.axes if kind.takes_stick and axis not in ("roll", "pitch")]
+    asked = [axis for axis in excitation.axes if axis in _ASKED]
+    strange = [axis for axis in excitation.axes if kind.takes_stick and axis not in ("roll", "pitch", *asked)]
     if strange:
         raise SwashError(
-            f"moves {', '.join(strange)}; with many flights a maneuver is a pilot's roll or pitch.",
+            f"moves {', '.join(strange)}; with many flights a maneuver is a pilot's roll or pitch, or asks for "
+            f"{', '.join(_ASKED)}.",
             channel="maneuver",
         )
     further = f", and up to {1e3 * delay:g} ms more" if delay else ""
@@ -165,26 +174,32 @@ def monte_carlo(
     fall = sag if battery is None else (battery[0] - battery[1]) / duration
     late = draw_delays(most=delay, count=count, seed=seed + 3_000_003)
     blowing = None if gusts is None else dryden(gusts, samples=samples, rate=pilot.rate, seed=seed, count=count)
+    at_start, signals = hover.states(), excitation.signals(time - _LEAD)
     flown = simulate_closed_loops(
         vehicle,
         pilot,
         duration=duration,
         size=count,
         parameters=drawn or None,
-        reference=excitation.signals(time - _LEAD) if kind.takes_stick else None,
+        reference={n: at_start.get(n, 0.0) * (n not in _SPEEDS) + s for n, s in signals.items() if n in REFERENCES}
+        if kind.takes_stick or asked
+        else None,
         excitation=None
         if kind.takes_stick
-        else excitation.offsets(time - _LEAD, inputs=vehicle.input_names, axes=vehicle.stick_axes),
+        else excitation.offsets(time - _LEAD, inputs=vehicle.input_names, axes=vehicle.stick_axes, without=asked),
         wind=blowing,
         voltage=float(hover.environment.voltage) - fall * time,
         noise=None if kind.own_sensors else SENSOR_NOISE,
         delay=late,
+        bits=bits,
         seed=seed,
         start=hover,
         rate=pilot.rate * max(1, round(_PHYSICS / pilot.rate)),
         keep=max(1, round(pilot.rate / _KEPT)),
     )
-    found = spread(flown, hover, limits=limits)
+    moves_on = any(axis in _SPEEDS for axis in asked)
+    judged = limits or Limits()
+    found = spread(flown, hover, limits=replace(judged, place=math.inf) if moves_on else judged)
     try:
         worst = flown.flight(found.worst)
     except DivergenceError as error:
@@ -192,13 +207,41 @@ def monte_carlo(
             raise
         worst = error.flight  # type: ignore[assignment]
     own = {name: float(values[found.worst]) for name, values in drawn.items()}
-    remarks = () if kind.takes_stick else (_NO_STICK,)
+    remarks: tuple[str, ...] = (_NO_STICK,) if not kind.takes_stick and set(excitation.axes) - set(asked) else ()
+    remarks += (_MOVES_ON,) if moves_on else ()
+    remarks += not_followed(flown, hover, {n: signals[n] for n in asked}, time - _LEAD)
     worst = worst.done("drawn", seed=seed, number=found.worst, delay=float(late[found.worst]), parameters=own)
-    settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall}
+    settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall, "bits": bits}
     told = lateness(vehicle, pilot, given=None) + further
-    return MonteCarlo(vehicle, name, found, worst, drawn, told, remarks, settings)
+    return MonteCarlo(vehicle, name, found, worst, flown, drawn, told, remarks, settings)
 
 
+def not_followed(flown: Batch, start: Trim, asked: Mapping[str, Array], time: Array) -> tuple[str, ...]:
+    """What was asked for and not reached by half of the flights, in words.
+
+    Args:
+        flown: all flights.
+        start: where they started.
+        asked: changes by axis [m, rad, m/s], shape (n,).
+        time: of these, from the maneuver's start [s], shape (n,).
+    """
+    found = []
+    for name, signal in asked.items():
+        last = int(np.flatnonzero(signal)[-1])
+        state = {"ahead": "u", "right": "v"}.get(name, name)
+        at = int(np.searchsorted(flown.time, time[last] + _LEAD, side="right")) - 1
+        reached = float(np.nanmedian(flown[state][at] - start.states()[state]))
+        if not abs(reached - signal[last]) < 0.5 * abs(signal[last]):
+            found.append(
+                f"{name} was asked to change by {signal[last]:g}, and half of the flights reached {reached:.2g}."
+            )
+    return tuple(found)
+
+
+_SPEEDS = ("ahead", "right")
+_ASKED = ("x", "y", "z", "psi", *_SPEEDS)
+"""Axes of a maneuver that are asked of the controller, as changes from the start."""
+_MOVES_ON = "a speed is asked for: the place is not judged."
 _NO_STICK = "this controller takes no pilot's command; the maneuver moves its inputs."
 
 

@@ -44,7 +44,7 @@ def evaluate(
             help="Folder with one file a record, files, or a data set's name (coax_rig, coax56/bench_input_to_rpm).",
         ),
     ],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The card (.toml).")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="The card (.toml).")] = None,
     report: Annotated[Path | None, typer.Option("--report", metavar="FILE", help="The report (.html).")] = None,
     vehicle: _Vehicle = "coax",
     json: options.Json = False,

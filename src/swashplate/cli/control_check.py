@@ -59,7 +59,11 @@ def check(
     ] = None,
     duration: Annotated[float, typer.Option("--duration", help="Of each step [s].", min=5.0, max=300.0)] = 20.0,
     gusts: Annotated[
-        str, typer.Option("--gusts", help="Turbulence to hold against: none, indoor, or Dryden's at a mean wind [m/s].")
+        str,
+        typer.Option(
+            "--gusts",
+            help="Turbulence to hold against: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s].",
+        ),
     ] = "indoor",
     json: options.Json = False,
     quiet: options.Quiet = False,

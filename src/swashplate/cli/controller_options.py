@@ -45,7 +45,7 @@ class Mixing(StrEnum):
     AS_PRINTED = "as_printed"
 
 
-Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the controller (.toml).")]
+Out = Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Write the controller (.toml).")]
 Rate = Annotated[float, typer.Option("--rate", help="Steps of the controller per second [Hz].", min=1.0)]
 Code = Annotated[
     Path | None, typer.Option("--c", metavar="FILE", help="Write one step of it as C99 (needs the extra 'export').")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _LAG = "Phase lag that makes the model's step straight (straight; by default in mode manual), the rotor's from the battery-compensated motor command (battery), the plain one (motor) or the hover's speed (hover), or a constant in degrees."  # fmt: skip # noqa: E501
 _STEP = "Fly this step of the pitch command for 6 m, with and without the decoupling."
 _DRIFT = "Seen on the step with this law [m to the right after 6 m]: take it out."
+_GUSTS = "With a step: fly drawn models, or without --fit this one, in gusts: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s]."  # fmt: skip # noqa: E501
 _SENSORS = "Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."
 
 
@@ -54,6 +55,7 @@ def decouple(
         typer.Option("--fit", metavar="FILE", help="With a step: also on models drawn from a fit.json."),
     ] = None,
     drift: Annotated[float | None, typer.Option("--drift", help=_DRIFT)] = None,
+    gusts: Annotated[str, typer.Option("--gusts", help=_GUSTS)] = "none",
     draws: Annotated[int, typer.Option("--draws", help="How many of them.", min=2)] = 500,
     seed: Annotated[int, typer.Option("--seed", help="Of the draws.", min=0)] = 0,
     json: options.Json = False,
@@ -69,6 +71,7 @@ def decouple(
     import swashplate as sp
     from swashplate.api.decouple import PAPERS_SPEED
     from swashplate.cli.console import doing
+    from swashplate.cli.gusts import turbulence
 
     with doing("designing the controller", quiet=quiet or json):
         made = sp.decouple(
@@ -84,6 +87,7 @@ def decouple(
             to_speed=PAPERS_SPEED if report is not None and step is None and to_speed is None else to_speed,
             drift=drift,
             fit=fit,
+            gusts=turbulence(gusts),
             draws=draws,
             seed=seed,
         )

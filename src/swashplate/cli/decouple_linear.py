@@ -32,7 +32,7 @@ def decouple(
     ] = None,
     at: Annotated[str, typer.Option("--at", metavar="W,...", help="Frequencies of the table [rad/s].")] = "1,3,10,20",
     speed: Annotated[float, typer.Option("--speed", help="Of a vehicle's steady flight [m/s].")] = 0.0,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Matrix and filter (.json).")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Matrix and filter (.json).")] = None,
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE", help="The coupling and steps as HTML.")
     ] = None,

@@ -11,7 +11,7 @@ from swashplate.cli import options
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")] = Path("demo"),
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path("demo"),
     simulated: Annotated[bool, typer.Option("--simulated", help="Simulated flights even where real ones are.")] = False,
     seed: Annotated[int, typer.Option("--seed", help="Of the simulated flights' noise.", min=0)] = 1,
     quiet: options.Quiet = False,

@@ -47,7 +47,7 @@ def export(
     ],
     out: Annotated[
         Path,
-        typer.Option("--out", metavar="DIR|FILE", help="Folder, made if missing; or one file's name."),
+        typer.Option("--out", "-o", metavar="DIR|FILE", help="Folder, made if missing; or one file's name."),
     ] = Path("."),
     speed: Annotated[
         str | None,

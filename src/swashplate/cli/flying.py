@@ -129,13 +129,19 @@ def carried_out(
 ) -> None:
     """Do what is asked, write its files where `--out` says, show it, and end with what could not be computed.
 
+    A fit that is stopped is kept as far as it came; the exit code is then 128 and the signal's number.
     The folder is made first: a place that cannot be written to is found before an hour of computing.
     """
     from swashplate.api.linear_study import FILES
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
+    from swashplate.identification.core.stopping import stoppable
 
-    with progress(quiet=quiet or json) as line, folder_when_complete(out, ours=FILES) as folder:
+    with (
+        stoppable() as stop,
+        progress(quiet=quiet or json) as line,
+        folder_when_complete(out, ours=FILES) as folder,
+    ):
         made = make(line.say)
         if folder is not None:
             line.say("writing the report")
@@ -148,11 +154,11 @@ def carried_out(
         typer.echo(repr(made))
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")
-    end_with(made.problems)
+    end_with(made.problems, code=stop.code or Exit.INPUT)
 
 
-def end_with(problems: Sequence[str]) -> None:
-    """Exit code 2 with one line where something could not be computed; the rest has been written and marked."""
+def end_with(problems: Sequence[str], *, code: int = Exit.INPUT) -> None:
+    """An exit code with one line where something could not be computed; the rest has been written and marked."""
     if problems:
         complain(" ".join(problems))
-        raise typer.Exit(Exit.INPUT)
+        raise typer.Exit(code)

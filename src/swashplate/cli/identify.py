@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from swashplate.cli import flying, options
 from swashplate.cli.guard import Exit
+from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from swashplate.api.identification import Identification
+    from swashplate.api.nested import NestedComparison
+
+
+Made = TypeVar("Made", "Identification", "NestedComparison", "Identification | NestedComparison")
 
 
 def identify(
@@ -55,6 +60,14 @@ def identify(
     wind: Annotated[
         bool, typer.Option("--wind", help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
     ] = False,
+    nested: Annotated[
+        bool,
+        typer.Option(
+            "--nested",
+            help="Fit the model with and without each part of its physics, and say which parts the flights ask for; "
+            "one fit per part.",
+        ),
+    ] = False,
     horizon: options.HorizonAhead = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
@@ -70,7 +83,9 @@ def identify(
     which physics forbids has failed: exit code 2, a report that says so, and no model.
     """
     import swashplate as sp
+    from swashplate.api.nested import NestedComparison
     from swashplate.cli.reading import asked, conditioned
+    from swashplate.identification.core.stopping import stoppable
 
     card, texts = options.prior_card_name(prior)
     names = [name.strip() for name in free.split(",") if name.strip()]
@@ -78,44 +93,67 @@ def identify(
     prior_card, aircraft = None if card is None else sp.vehicle(card).card, sp.vehicle(vehicle)
     called, how = [*flight, *(hold_out or [])], asked(mapping, unit, drop_bad_stamps)
 
-    def make(say: Callable[..., None]) -> Identification:
+    if nested:
+        untold = [
+            name
+            for name, given in (
+                ("--prior CARD", prior_card is not None),
+                ("--horizon", horizon is not None),
+                ("--wind", wind),
+                ("--keep-unexcited", keep_unexcited),
+            )
+            if given
+        ]
+        if untold:
+            raise SwashError("does not go with --nested.", channel=", ".join(untold), hint="Leave it out.")
+
+    def make(say: Callable[..., None]) -> Identification | NestedComparison:
         say("reading flights")
         read = conditioned(called, rate=rate, cutoff=cutoff, how=how)
+        asked_for: dict[str, Any] = {
+            "hold_out": read[len(flight) :],
+            "free": names[0] if len(names) == 1 else names,
+            "method": method,
+            "outputs": None if outputs is None else [name.strip() for name in outputs.split(",") if name.strip()],
+            "ties": tuple(tie or ()),
+            "fixed": held or None,
+            "priors": priors or None,
+            "iterations": iterations,
+            "names": called,
+            "say": say,
+        }
+        if nested:
+            return sp.identify_nested(aircraft, read[: len(flight)], **asked_for)
         return sp.identify_and_validate(
             aircraft,
             read[: len(flight)],
-            hold_out=read[len(flight) :],
-            free=names[0] if len(names) == 1 else names,
-            method=method,
-            outputs=None if outputs is None else [name.strip() for name in outputs.split(",") if name.strip()],
-            ties=tuple(tie or ()),
-            fixed=held or None,
-            priors=priors or None,
             prior_card=prior_card,
-            iterations=iterations,
             keep_unexcited=keep_unexcited,
             wind=wind,
             horizon=options.seconds_ahead(horizon),
-            names=called,
-            say=say,
+            **asked_for,
         )
 
-    made = carried_out(make, out=out, quiet=quiet or json)
+    with stoppable() as stop:
+        made = carried_out(make, out=out, quiet=quiet or json)
     show(made, out=out, json=json, quiet=quiet)
+    if stop.code:
+        flying.end_with([stop.words], code=stop.code)
+    if isinstance(made, NestedComparison):
+        return
     if made.fit.failed:
         typer.echo(f"The fit failed: {' '.join(made.fit.problems) or 'see the report.'}", err=True)
         raise typer.Exit(Exit.INPUT)
 
 
-def carried_out(
-    make: Callable[[Callable[..., None]], Identification], *, out: Path | None, quiet: bool
-) -> Identification:
+def carried_out(make: Callable[[Callable[..., None]], Made], *, out: Path | None, quiet: bool) -> Made:
     """What was asked, with its files, which appear in `out` together when all are complete."""
     from swashplate.api.identification import FILES
+    from swashplate.api.nested import FILES as OF_NESTED
     from swashplate.cli.console import progress
     from swashplate.cli.outputs import folder_when_complete
 
-    with progress(quiet=quiet) as line, folder_when_complete(out, ours=FILES) as folder:
+    with progress(quiet=quiet) as line, folder_when_complete(out, ours=tuple({*FILES, *OF_NESTED})) as folder:
         made = make(line.say)
         if folder is not None:
             line.say("writing the report")
@@ -123,8 +161,9 @@ def carried_out(
     return made
 
 
-def show(made: Identification, *, out: Path | None, json: bool, quiet: bool) -> None:
+def show(made: Identification | NestedComparison, *, out: Path | None, json: bool, quiet: bool) -> None:
     """The result on standard output: JSON, or a table, the report's own five lines and where the report is."""
+    from swashplate.api.nested import NestedComparison
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import fit_table
 
@@ -134,6 +173,7 @@ def show(made: Identification, *, out: Path | None, json: bool, quiet: bool) -> 
         from swashplate.api.identification import FILES
         from swashplate.cli.outputs import place_of
 
-        console().print(fit_table(made.fit) if hasattr(made.fit.model, "card") else repr(made.fit))
+        fit = made.fits.fit if isinstance(made, NestedComparison) else made.fit
+        console().print(fit_table(fit) if hasattr(fit.model, "card") else repr(fit))
         place = place_of(out, "report.html", FILES) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))

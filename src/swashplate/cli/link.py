@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
+
+if TYPE_CHECKING:
+    from swashplate.models.vehicle import Vehicle
 
 app = typer.Typer(help="Fly a vehicle under a running autopilot.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -41,6 +44,18 @@ RecordRate = Annotated[float, typer.Option("--record-rate", help="Samples per se
 IdleExit = Annotated[
     float | None, typer.Option("--idle-exit", help="End after so many seconds without an autopilot.", min=0.1)
 ]
+Check = Annotated[
+    bool,
+    typer.Option("--check", help="Instead: read a running autopilot's parameters and checks over MAVLink, and judge."),
+]
+MavlinkAddress = Annotated[
+    str | None,
+    typer.Option("--mavlink", metavar="ADDRESS", help="Of --check: tcp:HOST:PORT connects, udp:HOST:PORT listens."),
+]
+Timeout = Annotated[
+    float, typer.Option("--timeout", help="Of --check: seconds until an autopilot is heard.", min=0.1, max=600.0)
+]
+CheckJson = Annotated[bool, typer.Option("--json", help="Of --check: print the result as JSON.")]
 
 
 @app.command("ardupilot")
@@ -66,6 +81,10 @@ def ardupilot(
             "--write-parameters", metavar="FILE", help="Write ArduPilot's parameters for this vehicle and end."
         ),
     ] = None,
+    check: Check = False,
+    mavlink: MavlinkAddress = None,
+    timeout: Timeout = 10.0,
+    json: CheckJson = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Be the physics of ArduPilot's SITL (`arducopter-heli --model JSON:127.0.0.1`): lockstep over UDP.
@@ -73,6 +92,10 @@ def ardupilot(
     The vehicle stands on the ground with its rotors stopped until the autopilot starts it, and stands there again when
     the autopilot is restarted. Ctrl-C ends.
     """
+    if check:
+        where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+        _check(where.vehicle, "ardupilot", vehicle, servos, mavlink, timeout, json=json, quiet=quiet)
+        return
     from swashplate.api import link as verbs
     from swashplate.links.sockets import listen_udp
 
@@ -124,12 +147,20 @@ def px4(
     record: Record = None,
     record_rate: RecordRate = 200.0,
     idle_exit: IdleExit = None,
+    check: Check = False,
+    mavlink: MavlinkAddress = None,
+    timeout: Timeout = 10.0,
+    json: CheckJson = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Be the simulator of PX4's SITL (`make px4_sitl none_iris` and the like): MAVLink HIL in lockstep over TCP.
 
     Needs the extra `link`. The vehicle stands on the ground whenever PX4 connects. Ctrl-C ends.
     """
+    if check:
+        where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+        _check(where.vehicle, "px4", vehicle, servos, mavlink, timeout, json=json, quiet=quiet)
+        return
     from swashplate.api import link as verbs
     from swashplate.links.sockets import listen_tcp
 
@@ -154,6 +185,29 @@ def px4(
         notice=_say,
         say=_silent if quiet else _say,
     )
+
+
+def _check(
+    made: Vehicle,
+    firmware: Literal["ardupilot", "px4"],
+    name: str,
+    servos: str | None,
+    mavlink: str | None,
+    timeout: float,
+    *,
+    json: bool,
+    quiet: bool,
+) -> None:
+    import swashplate as sp
+    from swashplate.cli.flying import end_with
+    from swashplate.json_text import as_json
+
+    found = sp.check_autopilot(made, firmware, name=name, servos=servos, mavlink=mavlink, timeout=timeout)
+    if json:
+        typer.echo(as_json(found.to_document()))
+    elif not quiet:
+        typer.echo(repr(found))
+    end_with(found.problems)
 
 
 def _refuse_linear(name: str) -> None:

@@ -26,10 +26,15 @@ def live(
     ],
     controller: Annotated[
         Path | None,
-        typer.Option("--controller", metavar="FILE", help="A controller from `swash decouple`, for a CoaX."),
+        typer.Option(
+            "--controller",
+            metavar="FILE",
+            help="A controller's file: of `swash decouple` for all modes, any other to move its place.",
+        ),
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for recordings and reports; made with the first one.")
+        Path,
+        typer.Option("--out", "-o", metavar="DIR", help="Folder for recordings and reports; made with the first one."),
     ] = Path("live"),
     switched: given.Switch = None,
     port: Port = 8017,

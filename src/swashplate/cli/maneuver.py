@@ -18,7 +18,7 @@ def maneuver(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="The series as .csv; without it the rules are checked only."),
+        typer.Option("--out", "-o", metavar="FILE", help="The series as .csv; without it the rules are checked only."),
     ] = None,
     rate: Annotated[
         float, typer.Option("--rate", help="Of the series and of the log [Hz].", min=1.0, max=10000.0)

@@ -33,7 +33,8 @@ def many(
         Path | None, typer.Option("--fit", metavar="FILE", help="With --monte-carlo: models drawn from this fit.json.")
     ] = None,
     gusts: Annotated[
-        str, typer.Option("--gusts", help="With --monte-carlo: none, indoor, or Dryden's at a mean wind [m/s].")
+        str,
+        typer.Option("--gusts", help="With --monte-carlo: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s]."),
     ] = "none",
     battery: Annotated[
         str | None,
@@ -54,6 +55,10 @@ def many(
     delay: Annotated[
         float, typer.Option("--delay", help="With --monte-carlo: commands later by up to [s].", min=0.0, max=1.0)
     ] = 0.0,
+    command_bits: Annotated[
+        int | None,
+        typer.Option("--command-bits", help="With --monte-carlo: commands are told in so many bits.", min=4, max=24),
+    ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
@@ -77,6 +82,7 @@ def many(
         "--vary": vary,
         "--payload": payload,
         "--delay": delay,
+        "--command-bits": command_bits,
         "--limit": limit,
         "--report": report,
     }
@@ -91,7 +97,8 @@ def many(
     varied = options.assignments(vary, option="--vary")
     for text in varied.values():
         options.numbers(text.removesuffix("%"), option="--vary", count=1)
-    chosen |= {"tolerances": tolerances, "vary": varied, "payload": payload, "delay": delay, "limits": limits(limit)}
+    chosen |= {"tolerances": tolerances, "vary": varied, "payload": payload, "delay": delay, "bits": command_bits}
+    chosen |= {"limits": limits(limit)}
     return Many(monte_carlo, chosen, given, report)
 
 

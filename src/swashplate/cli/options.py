@@ -57,7 +57,7 @@ HorizonAhead = Annotated[
 ]
 FlightName = Annotated[str, typer.Argument(metavar="FLIGHT", help=f"{_FLIGHT}.", autocompletion=_flight_names)]
 OutFolder = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; it is made if missing.")
+    Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results; it is made if missing.")
 ]
 Rate = Annotated[float, typer.Option("--rate", help="Conditioned rate [Hz].", min=1.0, max=2000.0)]
 Cutoff = Annotated[

@@ -25,7 +25,7 @@ def rotor_speed(
         ),
     ] = None,
     per_turn: Annotated[float, typer.Option("--per-turn", help="Vibrations per turn that the line is.")] = 1.0,
-    out: Annotated[Path | None, typer.Option("--out", help="Write the flight with the speeds (netCDF).")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the flight with the speeds (netCDF).")] = None,
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,

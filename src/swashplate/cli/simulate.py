@@ -29,7 +29,7 @@ def simulate(
     maneuver: Annotated[
         str, typer.Option("--maneuver", help='For example "sweep:pitch,0.5-8Hz,60s" or "doublet:roll,0.5s,0.2".')
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The flight: .nc (nothing lost) or .csv.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The flight: .nc (nothing lost) or .csv.")],
     sensors: Annotated[
         SensorSet,
         typer.Option("--sensors", help="The true states, motion capture with noise only, or with gaps and outliers."),

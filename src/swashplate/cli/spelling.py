@@ -1,4 +1,4 @@
-"""One grammar for all verbs: the vehicle is an argument or `--vehicle`, the output is `--out` or `-o`, everywhere."""
+"""One grammar for all verbs: the vehicle is an argument or `--vehicle`, everywhere."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-_VEHICLE, _OUT = "--vehicle", "--out"
+_VEHICLE = "--vehicle"
 
 
 def spelled(command: Any, given: Sequence[str]) -> list[str]:
@@ -24,8 +24,6 @@ def spelled(command: Any, given: Sequence[str]) -> list[str]:
     _refuse_repeated(command, words)
     options = {name for parameter in command.params for name in parameter.opts if name.startswith("-")}
     arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
-    if _OUT in options and "-o" not in options:
-        words = [_OUT if word == "-o" else word for word in words]
     takes_place = bool(arguments) and arguments[0].metavar in ("VEHICLE", "MODEL")
     if takes_place and _VEHICLE not in options:
         return _as_argument(words)

@@ -37,7 +37,9 @@ def show(
     structure: Annotated[
         str, typer.Argument(metavar="STRUCTURE", help="A ready structure, compose:body+flap+..., or a model file.")
     ],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Also write it as a model file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="Also write it as a model file.")
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Show equations and free parameters, with units, start values and where these come from."""

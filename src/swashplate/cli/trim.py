@@ -81,7 +81,7 @@ def linearize(
     plot: given.Page = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="A model file for every speed, with its trim."),
+        typer.Option("--out", "-o", metavar="DIR", help="A model file for every speed, with its trim."),
     ] = None,
     json: options.Json = False,
 ) -> None:

@@ -22,6 +22,14 @@ class Rotation(StrEnum):
     CCW = "ccw"
 
 
+class ClassName(StrEnum):
+    FULL_SIZE = "full-size"
+    RMAX = "rmax"
+    SIX_HUNDRED = "600"
+    NINETY = "90"
+    MICRO = "micro"
+
+
 @app.callback(invoke_without_command=True)
 def main(ctx: typer.Context, json: options.Json = False) -> None:
     """List the vehicles, or show one."""
@@ -52,18 +60,30 @@ def new(
     radius: Annotated[float, typer.Option("--radius", help="Of the main rotor [m].")],
     title: Annotated[str, typer.Option("--title", help="What the aircraft is.")] = "My helicopter",
     rotation: Annotated[Rotation, typer.Option("--rotation", help="Main rotor seen from above.")] = Rotation.CW,
-    like: Annotated[str, typer.Option("--like", help="The packaged helicopter that is scaled.")] = "raptor50",
+    size_class: Annotated[
+        ClassName | None, typer.Option("--class", help="Whose statistics are used; by default by mass and radius.")
+    ] = None,
+    like: Annotated[
+        str | None, typer.Option("--like", help="A packaged helicopter that is scaled, in place of a class.")
+    ] = None,
 ) -> None:
-    """Write a commented card for your own single-rotor helicopter: guesses scaled to its size, to be measured."""
+    """Write a commented card for your own single-rotor helicopter: statistics of its class, to be measured."""
     from swashplate.atomic import write_text
     from swashplate.models.catalogue import from_card
     from swashplate.models.conventional.new_card import commented, new_card
+    from swashplate.models.conventional.size_classes import default_class
 
     if out.exists():
         raise SwashError("exists already; it is not overwritten.", where=out, hint="Choose another name.")
-    card = new_card(title, mass=mass, radius=radius, rotation=rotation.value, like=like)
+    named = None if size_class is None else size_class.value
+    card = new_card(title, mass=mass, radius=radius, rotation=rotation.value, like=like, size_class=named)
     from_card(card)
     write_text(out, commented(card))
+    if like is None:
+        usual = default_class(mass, radius)
+        typer.echo(f"Numbers of {usual.why}." if named is None else f"Numbers of class {named}, as asked.")
+        if named not in (None, usual.name):
+            typer.echo(f"Careful: mass and radius ask for {usual.why}.", err=True)
     typer.echo(f"Written: {out}. Replace the guesses by measurements, then try: swash trim {out}")
 
 

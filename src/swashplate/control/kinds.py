@@ -48,10 +48,12 @@ class ControllerKind(Generic[C]):
     Attributes:
         takes_stick: whether it answers a pilot's roll and pitch commands.
         own_sensors: whether it simulates sensors of its own, with their noise.
+        every_mode: whether other gains make it an autopilot of every mode of the live page; "position" alone if not.
     """
 
     takes_stick: bool = True
     own_sensors: bool = False
+    every_mode: bool = False
 
     def about(self, controller: C, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> C:
         """The same law for that vehicle at that trim; `seed` is of its sensors' noise.
@@ -96,18 +98,6 @@ class ControllerKind(Generic[C]):
             ControllerError: where its step cannot be printed as C.
         """
         raise ControllerError("has no C: its step is written for JAX only.", where=type(controller).__name__)
-
-    def for_sticks(self, controller: C) -> Any:
-        """The `Autopilot` that sticks and the live page move.
-
-        Raises:
-            ControllerError: where it is none.
-        """
-        raise ControllerError(
-            "flies on sensors of its own, and the page has none.",
-            where=type(controller).__name__,
-            hint="Give an autopilot, as `swash decouple` writes it without --sensors.",
-        )
 
 
 PLAIN: ControllerKind[Any] = ControllerKind()

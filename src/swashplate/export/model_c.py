@@ -48,20 +48,34 @@ def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
         model: what to print.
         precision: "double", or "single" for processors without double precision.
     """
-    blanks = {
+    blanks = _blanks(model, precision)
+    guard = {"GUARD": f"{model.name.upper()}_H", "ENUMS": _enums(model)}
+    equations = {**_equations(model, precision), **_functions(model, precision), "ARRAYS": _arrays(model, precision)}
+    return ModelCode(
+        model.name,
+        precision,
+        _filled(_heading(model) + _HEADER, {**blanks, **guard}),
+        _filled(_SOURCE, {**blanks, **equations}),
+        _filled(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
+    )
+
+
+def frame_code(model: Traced) -> str:
+    """C of NAME_frame alone, in double precision: some steps and the rates where they lead, without any header.
+
+    Args:
+        model: what to print; its Jacobians are not needed.
+    """
+    return _filled(_ALONE + _RATES + _STEP + _FRAME, {**_blanks(model, "double"), **_equations(model, "double")})
+
+
+def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
+    return {
         "NAME": model.name,
-        "GUARD": f"{model.name.upper()}_H",
         "REAL": f"{model.name}_real",
         "TYPE": REAL[precision],
         **{f"N_{kind.upper()}S": str(len(variables)) for kind, variables in _variables(model).items()},
     }
-    return ModelCode(
-        model.name,
-        precision,
-        _filled(_heading(model) + _HEADER, {**blanks, "ENUMS": _enums(model)}),
-        _filled(_SOURCE, {**blanks, **_equations(model, precision), "ARRAYS": _arrays(model, precision)}),
-        _filled(_EXAMPLE, {**blanks, "SHOWN": str(min(len(model.states), 12))}),
-    )
 
 
 def _filled(text: str, blanks: Mapping[str, str]) -> str:
@@ -72,26 +86,33 @@ def _variables(model: Traced) -> dict[str, tuple[Variable, ...]]:
     return {kind: getattr(model, f"{kind}s") for kind in _KINDS}
 
 
+_GIVEN = ("x", "u", "s", "p")
+
+
+def _used(text: str, names: Sequence[str]) -> str:
+    """With a nod to what it does not read: strict compilers ask for it."""
+    return text + "".join(f"  (void){name};\n" for name in names if not re.search(rf"\b{name}\b", text))
+
+
 def _equations(model: Traced, precision: Precision) -> dict[str, str]:
-    given = ("x", "u", "s", "p")
-    real = f"{model.name}_real"
-
-    def used(text: str, names: Sequence[str]) -> str:
-        """With a nod to what it does not read: strict compilers ask for it."""
-        return text + "".join(f"  (void){name};\n" for name in names if not re.search(rf"\b{name}\b", text))
-
-    def single(function: object, outputs: Sequence[str]) -> str:
-        return used(body(function, real=real, precision=precision, inputs=given, outputs=outputs), given)
-
-    made = stages(model, real=real, precision=precision)
+    """The bodies of `fixed` and `moving`."""
+    made = stages(model, real=f"{model.name}_real", precision=precision)
     return {
-        "FIXED": used(made.fixed, (*given[1:], "c")),
-        "MOVING": used(made.moving, (*given, "c", "root", "known")),
+        "FIXED": _used(made.fixed, (*_GIVEN[1:], "c")),
+        "MOVING": _used(made.moving, (*_GIVEN, "c", "root", "known")),
         "N_CONSTANTS": str(max(1, made.constants)),
         "N_ROOTS": str(max(1, made.roots)),
-        "OUTPUTS": single(model.readings, ["outputs"]),
-        "JACOBIANS": single(model.jacobians, ["A", "B"]),
     }
+
+
+def _functions(model: Traced, precision: Precision) -> dict[str, str]:
+    """The bodies of what is one evaluation of its own."""
+
+    def single(function: object, outputs: Sequence[str]) -> str:
+        text = body(function, real=f"{model.name}_real", precision=precision, inputs=_GIVEN, outputs=outputs)
+        return _used(text, _GIVEN)
+
+    return {"OUTPUTS": single(model.readings, ["outputs"]), "JACOBIANS": single(model.jacobians, ["A", "B"])}
 
 
 def _enums(model: Traced) -> str:
@@ -179,12 +200,14 @@ void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @
 #endif
 """
 
-_SOURCE = """#include "@NAME@.h"
+_ARRAYS = """#include "@NAME@.h"
 
 #include <math.h>
 
 @ARRAYS@
-/* Of the rates what no state moves, c. */
+"""
+
+_RATES = """/* Of the rates what no state moves, c. */
 static void fixed(const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *c) {
 @FIXED@}
 
@@ -199,6 +222,9 @@ void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL
   moving(x, u, s, p, c, root, 0, rates);
 }
 
+"""
+
+_READINGS = """\
 void @NAME@_outputs(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *outputs) {
 @OUTPUTS@}
 
@@ -212,7 +238,9 @@ void @NAME@_jacobians(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @
   slopes(x, u, s, p, A, B);
 }
 
-void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt) {
+"""
+
+_STEP = """void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt) {
   @REAL@ k[@NAME@_n_states], sum[@NAME@_n_states], at[@NAME@_n_states], c[@N_CONSTANTS@], root[@N_ROOTS@] = {0};
   const @REAL@ half = dt / 2, sixth = dt / 6;
   int i;
@@ -234,6 +262,29 @@ void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @
   }
   moving(at, u, s, p, c, root, 1, k);
   for (i = 0; i < @NAME@_n_states; ++i) x[i] += sixth * (sum[i] + k[i]);
+}
+"""
+
+_SOURCE = _ARRAYS + _RATES + _READINGS + _STEP
+
+_ALONE = """#include <math.h>
+
+typedef @TYPE@ @REAL@;
+#define @NAME@_n_states @N_STATES@
+void @NAME@_rates(const @REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ *rates);
+void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt);
+
+"""
+
+_FRAME = """
+void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt, int steps, @REAL@ *told);
+
+/* Steps under held inputs; told: the states and their derivatives behind them. */
+void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt, int steps, @REAL@ *told) {
+  int i;
+  for (i = 0; i < steps; ++i) @NAME@_step(x, u, s, p, dt);
+  for (i = 0; i < @NAME@_n_states; ++i) told[i] = x[i];
+  @NAME@_rates(x, u, s, p, told + @NAME@_n_states);
 }
 """
 

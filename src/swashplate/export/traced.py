@@ -51,7 +51,7 @@ class Traced:
         states, inputs, surroundings, parameters, outputs: in the order of the arrays. Surroundings are those that the
             equations use; the outputs of a vehicle are what accelerometers at the CG read.
         rates, readings: derivatives of the states, and the outputs.
-        jacobians: A and B, the rates by state and by input.
+        jacobians: A and B, the rates by state and by input; of nothing where they were left out.
         looped: the rates again, with the roots in them found in loops; None where there are none.
         delays: of each input [s]; empty where there are none. The functions do not have them.
         notes: what a user must know.
@@ -161,12 +161,15 @@ class _Remembering(CasadiBackend):
         return found
 
 
-def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Traced:
+def trace_vehicle(
+    vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None, jacobians: bool = True
+) -> Traced:
     """A vehicle's equations, its numbers as parameters, and a trim to start from.
 
     Args:
         vehicle, trim, name: what is traced, where it starts, what its C begins with.
         delays: of inputs by name [s]; none where not given (see `linear.logged_delays`).
+        jacobians: False leaves them out, where only steps are wanted.
 
     Raises:
         ExportError: without CasADi.
@@ -184,7 +187,7 @@ def trace_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[st
         return casadi.vertcat(*vehicle.rates(x, u, parameters, environment, xp))
 
     hiding = _Remembering(casadi)
-    slopes = [casadi.jacobian(rates(hiding), by) for by in (x, u)]
+    slopes = [casadi.jacobian(rates(hiding), by) for by in (x, u)] if jacobians else []
     plain = CasadiBackend()
     right = rates(plain)
     force = casadi.vertcat(*vehicle.specific_force(state, inputs, parameters, environment, plain))

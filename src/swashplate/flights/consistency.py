@@ -18,6 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import interpolate, quaternion_from_euler, rotation
 from swashplate.flights.conditioning.derive import body_rates, differentiate
+from swashplate.flights.conditioning.filters import within
 from swashplate.flights.conditioning.resample import common, unbroken
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
@@ -41,6 +42,7 @@ _SCALED = 0.5  # the same where the ratio is a unit's: noise that large would le
 _SURE = 0.95  # correlation from which a ratio that is no unit's is worth a word
 _APART = 0.8  # of its correlation with another axis: below, a channel does not belong to its own
 _SAME = 0.4  # of the logarithm: a ratio between 0.67 and 1.5 is 1 (real sensors' filters: 0.8 to 1.2)
+_CLOSER = 0.03  # of correlation: more than chance makes between a channel and a copy of it
 _QUIET = 0.15  # of its usual motion: a window in which an axis moves less is not judged
 _STEEPEST = 0.5 * np.pi + 0.02  # rad: no pitch angle is larger
 _MAX_GAP = 0.25  # s
@@ -211,13 +213,17 @@ def _compared(
     found = []
     for home in dict.fromkeys(flight.stream_of(name) for name in names if name):
         here = tuple(name if name and flight.stream_of(name) == home else "" for name in names)
-        both = [_agreements(flight, here, time, reference, axes, band=band, window=window) for band, window in _BANDS]
+        pieces = list(_pieces(flight, [name for name in here if name], time, reference))
+        there = [i for i, name in enumerate(here) if name]
+        both = [_agreements(pieces, there, axes, band=band, window=window) for band, window in _BANDS]
         for i, name in enumerate(here):
             told = [made[i] for made in both if i in made]
             if name and told:
                 # The band in which the two sides know each other best: noise of a derivative, drift of a gyroscope.
                 clearest = max(told, key=lambda by_axis: max(abs(at.correlation) for at in by_axis.values()))
-                found += _judged(flight, here, i, clearest, kind)
+                every = next(agreements for agreements in both if agreements.get(i) is clearest)
+                owners = {j: by_axis[j] for j, by_axis in every.items() if j in by_axis}
+                found += _judged(flight, here, i, clearest, kind, owners)
     return found
 
 
@@ -241,26 +247,25 @@ def _pieces(flight: Flight, names: Sequence[str], time: Array, reference: Refere
 
 
 def _agreements(
-    flight: Flight,
-    names: tuple[str, ...],
-    time: Array,
-    reference: Reference,
+    pieces: Sequence[tuple[float, Array]],
+    there: Sequence[int],
     axes: tuple[int, ...],
     *,
     band: tuple[float, float],
     window: float,
 ) -> dict[int, dict[int, _Agreement]]:
-    """By channel and axis: how they agree in a band [Hz], over windows of that length [s]."""
-    from scipy.signal import butter, sosfiltfilt
+    """By channel and axis: how they agree in a band [Hz], over windows of that length [s].
 
-    there = [i for i, name in enumerate(names) if name]
+    Args:
+        pieces: as `_pieces` gives them.
+        there: the channels' own axes, in the order of their columns.
+    """
     k = len(there)
     spreads, correlations = [], []
-    for rate, columns in _pieces(flight, [names[i] for i in there], time, reference):
+    for rate, columns in pieces:
         if band[1] > 0.4 * rate or columns.shape[0] < max(_SHORTEST, window * rate):
             continue
-        sos = butter(2, band, btype="bandpass", fs=rate, output="sos")
-        smooth = sosfiltfilt(sos, columns - columns.mean(axis=0), axis=0)
+        smooth = within(columns - columns.mean(axis=0), rate=rate, band=band)
         n = int(window * rate)
         for part in smooth[: smooth.shape[0] // n * n].reshape(-1, n, smooth.shape[1]):
             spreads.append(part.std(axis=0))
@@ -286,9 +291,17 @@ def _agreements(
 
 
 def _judged(
-    flight: Flight, names: tuple[str, ...], i: int, by_axis: Mapping[int, _Agreement], kind: _Kind
+    flight: Flight,
+    names: tuple[str, ...],
+    i: int,
+    by_axis: Mapping[int, _Agreement],
+    kind: _Kind,
+    owners: Mapping[int, _Agreement],
 ) -> list[Inconsistency]:
-    """What the agreements of one channel with the three axes say; nothing where all is right or nothing can be told."""
+    """What the agreements of one channel with the three axes say; nothing where all is right or nothing can be told.
+
+    An axis whose own channel follows it more closely (`owners`, by axis) is not exchanged: the two move together.
+    """
     name, own = names[i], by_axis.get(i)
     best = max(by_axis, key=lambda j: abs(by_axis[j].correlation))
     at = by_axis[best]
@@ -297,6 +310,8 @@ def _judged(
     if best != i:
         clear = abs(at.correlation) >= _TOGETHER and unit is not None
         if not clear or own is None or abs(own.correlation) > _APART * abs(at.correlation):
+            return []
+        if best in owners and abs(owners[best].correlation) > abs(at.correlation) + _CLOSER:
             return []
         other = names[best] or f"axis {best + 1}"
         text = (

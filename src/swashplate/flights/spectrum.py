@@ -6,6 +6,7 @@ the variance. The unit is that of the screen: deg/s where the channel is shown s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ ROTORS = ("omega_rotor", "omega_lower", "omega_upper")
 HARMONICS = 8
 _SHORTEST = 32  # samples
 _GAP = (10.0, 0.5)  # usual steps, and seconds: longer than both is a gap
+_STANDS_OUT = 10.0  # dB; averages of 16 windows scatter by a decibel
+_BESIDE, _AVERAGED = 8, 8  # densities between multiples, and windows, from which one may be told to stand out
+_MARGIN = 0.9  # of the lowest speed that was flown: notches follow down to there
 _WIDTH = 0.04  # of a harmonic's frequency, to each side: the rotor's speed is never quite still
 
 
@@ -73,11 +77,42 @@ class Spectrogram:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A multiple of a rotor's speed: its number, frequency [Hz], and the rms around it in the channel's unit."""
+    """A multiple of a rotor's speed: its number, frequency [Hz], and the rms around it in the channel's unit.
+
+    `above` [dB] is how far its power stands above that of the densities between the multiples, None where the stretch
+    is too short to tell the multiples apart.
+    """
 
     number: int
     frequency: float
     rms: float
+    above: float | None
+
+
+@dataclass(frozen=True)
+class Notches:
+    """Notch filters that follow a rotor's speed and take its harmonics out of a gyro.
+
+    Attributes:
+        numbers: the multiples of the speed, each with a notch.
+        lowest: speed below which they no longer follow [Hz]; width: of the first between its -3 dB points there [Hz],
+            of the others as many times that as their number.
+        delay: what all of them cost together at frequencies far below the first, at `speed` [s].
+        parameters: ArduPilot's, for a sensor of the rotor's speed (its page "RPM Sensor Based Dynamic Notch Setup").
+    """
+
+    numbers: tuple[int, ...]
+    lowest: float
+    width: float
+    delay: float
+    parameters: dict[str, float]
+
+    def __str__(self) -> str:
+        every = ", ".join(f"{number} x" for number in self.numbers)
+        return (
+            f"Notches at {every} of the rotor's speed take out what stands out by {_STANDS_OUT:g} dB and more. They "
+            f"delay slow motion by {1e3 * self.delay:.1f} ms: fly with them before you tune gains."
+        )
 
 
 @dataclass(frozen=True)
@@ -89,6 +124,7 @@ class Harmonics:
         rotor: the channel of the rotor's speed; speed: its mean there [Hz].
         harmonics: those that the sample rate shows; total: rms of all above 2 Hz.
         words: what is strongest, or why nothing is seen.
+        notches: for the harmonics that stand out; None where none does.
     """
 
     spectrum: Spectrum
@@ -97,10 +133,26 @@ class Harmonics:
     harmonics: tuple[Harmonic, ...]
     total: float
     words: str
+    notches: Notches | None = None
+
+    @property
+    def about_notches(self) -> str:
+        """Which notches an autopilot needs by this channel, or why it cannot be said."""
+        if self.notches is not None:
+            return str(self.notches)
+        if self.spectrum.unit != "deg/s":
+            return "An autopilot's notches filter its gyros: look at p, q or r."
+        if not self.harmonics or any(h.above is None for h in self.harmonics):
+            return "Notches cannot be judged: the stretch is too short or the samples too slow."
+        return (
+            f"Up to {0.5 * self.spectrum.rate:.4g} Hz no harmonic stands out by {_STANDS_OUT:g} dB, so this channel as "
+            "it was logged needs no notch. Behind a filter it shows only what the filter leaves."
+        )
 
     def __str__(self) -> str:
         unit = self.spectrum.unit
         lines = [f"  {h.number} x: {h.frequency:.2f} Hz, rms {h.rms:.4g} {unit}" for h in self.harmonics]
+        lines.append(f"  {self.about_notches}")
         return "\n".join([f"{self.spectrum.channel} beside {self.rotor} ({self.speed:.2f} Hz): {self.words}", *lines])
 
 
@@ -207,7 +259,8 @@ def harmonics(
     made = []
     for k in seen:
         half = max(_WIDTH * turning, 2.0 * step)
-        made.append(Harmonic(k, k * turning, found.rms(k * turning - half, k * turning + half)))
+        rms = found.rms(k * turning - half, k * turning + half)
+        made.append(Harmonic(k, k * turning, rms, _above(found, k, turning, half, rms)))
     total = found.rms(2.0, highest)
     if not made:
         words = (
@@ -221,7 +274,33 @@ def harmonics(
             f"the strongest is {most.number} x at {most.frequency:.2f} Hz with {most.rms:.3g} {found.unit} rms, "
             f"{100.0 * share:.0f} % of the power above 2 Hz."
         )
-    return Harmonics(found, name, turning, tuple(made), total, words)
+    flown = np.abs(there) / (2.0 * np.pi)
+    return Harmonics(found, name, turning, tuple(made), total, words, _notches(found.unit, flown, made))
+
+
+def _above(found: Spectrum, number: int, turning: float, half: float, rms: float) -> float | None:
+    """How far a harmonic's power is above that of the densities half a multiple around it [dB]."""
+    apart = np.abs(found.frequency - number * turning)
+    floor = found.density[(apart > half) & (apart < 0.5 * turning)]
+    inside = np.count_nonzero(apart <= half) * float(found.frequency[1] - found.frequency[0])
+    if floor.size < _BESIDE or found.windows < _AVERAGED:
+        return None
+    tiny = np.finfo(np.float64).tiny
+    return float(10.0 * np.log10(max(rms**2, tiny) / max(float(np.median(floor)) * inside, tiny)))
+
+
+def _notches(unit: str, flown: Array, harmonics: Sequence[Harmonic]) -> Notches | None:
+    """For what stands out in a gyro; an autopilot's notches filter gyros, and no other channel says what they need."""
+    numbers = tuple(h.number for h in harmonics if h.above is not None and h.above >= _STANDS_OUT)
+    if not numbers or unit != "deg/s":
+        return None
+    lowest = round(_MARGIN * float(np.quantile(flown, 0.05)), 1)
+    width = round(0.5 * lowest, 1)
+    # s^2 + (w/Q) s + w^2 below the line lags by 1/(Q w) at low frequency; width over frequency, 1/Q, is kept.
+    delay = sum(width / lowest / (2.0 * np.pi * number * float(np.median(flown))) for number in numbers)
+    parameters = {"ENABLE": 1, "MODE": 2, "REF": 1, "FREQ": lowest, "BW": width}
+    parameters["HMNCS"] = sum(1 << (number - 1) for number in numbers)
+    return Notches(numbers, lowest, width, delay, {f"INS_HNTCH_{name}": value for name, value in parameters.items()})
 
 
 def _unit(flight: Flight, name: str) -> str:

@@ -19,7 +19,7 @@ from swashplate.physics.frames import Vector
 from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
-from swashplate.simulation.stepping import Motion, Stepping, motion
+from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, motion
 
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
 _FASTEST = 500.0
@@ -54,6 +54,7 @@ class Plant:
         around: wind, air and battery.
         recorder: keeps the flights; None keeps none.
         record_rate: samples per second that it gets [Hz].
+        engine: makes what moves it; None for XLA.
 
     Attributes:
         vehicle, mapping: as given.
@@ -71,13 +72,14 @@ class Plant:
         *,
         recorder: Recorder | None = None,
         record_rate: float = 200.0,
+        engine: MakeEngine | None = None,
     ) -> None:
         self.vehicle, self.mapping = vehicle, mapping
         self._around = replace(around, environment=environment_of(vehicle, around.environment))
         self._rest = at_rest(vehicle, self.environment)
         self.standing_depth = -float(self._rest[vehicle.index("z")])
         self.numbers = vehicle.card.values()
-        self._stepping = Stepping(vehicle, self._rest, self.environment)
+        self._stepping = Stepping(vehicle, self._rest, self.environment, engine=engine)
         self._recorder, self._spacing = recorder, 1.0 / record_rate
         self.restart()
 

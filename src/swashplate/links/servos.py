@@ -27,6 +27,7 @@ class HelicopterMapping:
         channels: outputs that it uses, from 1.
         shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
         type: of the swashplate. swash, tail, throttle: its outputs.
+        angles: of its servos from the nose [deg]; empty where the file has none, or a phase.
         collective_pulse, collective_deg, cyclic_deg, tail_deg, full, spool: as the file has them [us], [deg], [1], [s].
     """
 
@@ -36,10 +37,12 @@ class HelicopterMapping:
         numbers = swash.numbers("channels")
         self.type = swash.text("type")
         self.swash = tuple(swash.servo(number, servos) for number in numbers)
+        angles, phase = swash.numbers("angles", missing=()), swash.number("phase", missing=0.0)
+        self.angles = tuple(angles) if phase == 0.0 else ()
         rows = swashplates.shares(
             self.type,
-            angles=swash.numbers("angles", missing=()),
-            phase=swash.number("phase", missing=0.0),
+            angles=angles,
+            phase=phase,
             matrix=swash.rows("matrix"),
             where=table.where,
         )

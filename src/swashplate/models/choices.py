@@ -47,6 +47,19 @@ class Choice:
     fixed: tuple[tuple[str, float], ...] = ()
 
 
+@dataclass(frozen=True)
+class PhysicalEffect:
+    """A part of a model's physics that its numbers can leave out: what nested structures differ by.
+
+    Attributes:
+        name: in words.
+        without: the parameters that make it, and the values at which it is not there.
+    """
+
+    name: str
+    without: Mapping[str, float]
+
+
 def uncertain_numbers(card: Card) -> Mapping[str, Choice]:
     """The one choice of a model that has none of its own: what its card itself is uncertain of.
 

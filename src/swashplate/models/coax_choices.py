@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swashplate.models.choices import Choice, Free
+from swashplate.models.choices import Choice, Free, PhysicalEffect
 
 _PAPER_TIES = ("a_beta_u = a_alpha_v", "a_beta_v = a_alpha_u", "a_beta_q = a_alpha_p")
 _LINEAR_TIES = (
@@ -100,3 +100,19 @@ INFLOW_CHOICES: dict[str, Choice] = {
     ),
 }
 """The same for rotors with inflow."""
+
+_SHARED_EFFECTS = (
+    PhysicalEffect("gyroscopic moment of the rotors", {"gyroscopic": 0.0}),
+    PhysicalEffect("damping of the discs by roll and pitch rate", {"a_alpha_p_linear": 0.0}),
+    PhysicalEffect("flap-back linear in speed", {"a_alpha_v_linear": 0.0, "a_alpha_u_linear": 0.0}),
+    PhysicalEffect("damping of yaw", {"damping_r": 0.0}),
+    PhysicalEffect("bar that keeps its plane while the heading turns", {"bar_heading_transport": 0.0}),
+    PhysicalEffect(
+        "roll and pitch unlike each other",
+        {"linkage_asymmetry_lower": 0.0, "phase_asymmetry_lower": 0.0, "linkage_asymmetry_upper": 0.0},
+    ),
+)
+EFFECTS = (*_SHARED_EFFECTS, PhysicalEffect("damping of heave", {"damping_w": 0.0}))
+"""What nested structures of the paper's rotors may leave out."""
+INFLOW_EFFECTS = _SHARED_EFFECTS
+"""The same for rotors with inflow, whose heave damping follows from their equations."""

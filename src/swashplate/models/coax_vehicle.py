@@ -23,7 +23,7 @@ from swashplate.models.coax import (
     loads,
     specific_force,
 )
-from swashplate.models.coax_choices import CHOICES, INFLOW_CHOICES
+from swashplate.models.coax_choices import CHOICES, EFFECTS, INFLOW_CHOICES, INFLOW_EFFECTS
 from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
 from swashplate.models.coax_rotors import InflowOptions, balanced_hover, checked_blades
 from swashplate.models.nesting import rebuild
@@ -248,6 +248,7 @@ TRAITS = Traits(
     servos="coax",
     servo_layout="two motors",
     choices=lambda card: CHOICES,
+    effects=lambda card: EFFECTS,
     recording=RecordingFit(),
     switches=("bar",),
     picture=picture,
@@ -261,6 +262,7 @@ TRAITS = Traits(
 INFLOW_TRAITS = replace(
     TRAITS,
     choices=lambda card: INFLOW_CHOICES,
+    effects=lambda card: INFLOW_EFFECTS,
     hover=None,
     settled=None,
     balance=None,

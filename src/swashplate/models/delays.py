@@ -25,18 +25,22 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
         CardError: where an input reaches outputs after different times.
     """
     if apart := vehicle.card.observer.get(BY_OUTPUT):
-        listed = ", ".join(f"{name} {delay:g} s" for name, delay in apart.items())
+        found: dict[str, set[float]] = {}
+        for name, delay in apart.items():
+            found.setdefault(name.partition("/")[2], set()).add(delay)
+        torn = {i for i, each in found.items() if len(each) > 1}
+        listed = ", ".join(f"{n} {d:g} s" for n, d in apart.items() if n.partition("/")[2] in torn)
         raise CardError(
             f"has delays that differ between outputs ({listed}): expected one delay of each input.",
             where=vehicle.card.where,
             hint="Give the file one delay per input.",
         )
-    found = vehicle.card.observer.get(SECTION)
-    if found is None:
+    known = vehicle.card.observer.get(SECTION)
+    if known is None:
         told = vehicle.card.observer.get("nuisance", {})
         names = {i: "delay_motor" if i.startswith("motor") else "delay_servo" for i in vehicle.input_names}
-        found = {i: told.get(name, 0.0) for i, name in names.items()} if told.keys() & set(names.values()) else {}
-    return {name: max(0.0, float(value)) for name, value in found.items()}
+        known = {i: told.get(name, 0.0) for i, name in names.items()} if told.keys() & set(names.values()) else {}
+    return {name: max(0.0, float(value)) for name, value in known.items()}
 
 
 def known_delays(vehicle: Vehicle) -> dict[str, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card
-from swashplate.models.choices import Choice, Free
+from swashplate.models.choices import Choice, Free, PhysicalEffect
 from swashplate.models.multirotor import (
     Battery,
     MultirotorState,
@@ -54,6 +54,16 @@ UNITS: dict[str, str] = {
 BATTERY_UNITS = {"battery_resistance": "ohm", "tau_battery": "s", "drive_efficiency": "1"}
 ROTOR_UNITS = {"rotor_{}_x": "m", "rotor_{}_y": "m", "rotor_{}_z": "m", "gain_{}": "1"}
 """Of each rotor: its place from the centre of gravity, and its thrust and torque against `k_thrust` and `k_torque`."""
+
+EFFECTS = (
+    PhysicalEffect("thrust that falls with climb", {"thrust_damping": 0.0}),
+    PhysicalEffect("drag of the rotors across", {"rotor_drag": 0.0}),
+    PhysicalEffect("flap-back", {"flap_back": 0.0}),
+    PhysicalEffect("reaction and gyroscopic moment of the motors", {"inertia_drive": 0.0}),
+    PhysicalEffect("drag of the body", {"drag_x": 0.0, "drag_y": 0.0, "drag_z": 0.0}),
+    PhysicalEffect("damping of yaw", {"damping_r": 0.0}),
+)
+"""What nested structures may leave out."""
 
 _VOLTAGE_SECONDS = 0.15
 """Averaging of a logged voltage: it is under load and follows the commands, which are shares of it."""
@@ -280,6 +290,7 @@ def multirotor(card: Card) -> Vehicle:
             axes=axes(par, senses),
             observed=True,
             choices=choices,
+            effects=lambda card: EFFECTS,
             recording=RecordingFit(),
             picture=picture,
             pose=pose,

@@ -12,7 +12,7 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.models.card import Card
-from swashplate.models.choices import Choice, uncertain_numbers
+from swashplate.models.choices import Choice, PhysicalEffect, uncertain_numbers
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.environment import Environment
 
@@ -78,6 +78,7 @@ class Traits:
         servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two motors" (and two
             cyclic servos), or "" where no autopilot can be linked.
         choices: a card's ready choices of what a fit may free.
+        effects: parts of a card's physics that numbers can leave out: what a comparison of nested structures tries.
         recording: how the live page fits it to a recording; None where only frequency responses are made.
         switches: options of the card that may be changed in flight on the live page.
         picture: shapes in body axes (forward, right, down) [m] that the live page draws; None for a plain one.
@@ -111,6 +112,7 @@ class Traits:
     servos: str = ""
     servo_layout: str = ""
     choices: Callable[[Card], Mapping[str, Choice]] = uncertain_numbers
+    effects: Callable[[Card], Sequence[PhysicalEffect]] = lambda card: ()
     recording: RecordingFit | None = None
     switches: tuple[str, ...] = ()
     picture: Callable[[Model], dict[str, Any]] | None = None

@@ -35,6 +35,8 @@ def compose_straightness(
     command: float,
     lag: float,
     sources: Sequence[tuple[str, float]] = (),
+    many: str = "",
+    nearer_than: Mapping[str, tuple[int, int]] | None = None,
     title: str | None = None,
 ) -> Report:
     """The report's structure.
@@ -45,6 +47,8 @@ def compose_straightness(
         command: the step of the pitch command.
         lag: that the law takes out at hover [deg].
         sources: of the drawn models' drift, from `drift_sources`.
+        many: what the many flights are, in words.
+        nearer_than: on how many of the same drawn flights the law ends nearer to straight ahead, from `nearer`.
         title: heading.
     """
     bare, law = runs["without"], runs["with"]
@@ -61,13 +65,14 @@ def compose_straightness(
         ("Heading", f"held within {turned[0]:.2g}° without, {turned[1]:.2g}° with it; height within "
          f"{100 * lost[0]:.2g} and {100 * lost[1]:.2g} cm.", "plain"),
         ("Inputs", f"largest servo command with the law {used:.2f} of 1.", "caution" if used >= 0.999 else "good"),
-        ("Models", *_models(runs)),
+        ("Models", *_models(runs, many)),
+        *(("Against", *_against(name, *counts)) for name, counts in (nearer_than or {}).items()),
     ]  # fmt: skip
     return Report(
         title=title or f"{vehicle.name}: the path on a step of the pitch command",
         banners=(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),),
         summary=tuple(summary),
-        picture=_path_figure(runs),
+        picture=_path_figure(runs, many),
         sections=(_numbers(runs, lag, vehicle, sources), _time(runs), _made(vehicle)),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
@@ -79,7 +84,7 @@ def _largest(run: StepRun, name: str) -> float:
     return float(np.max(np.abs(values - values[0] if name in ("z", "psi") else values)))
 
 
-def _models(runs: Mapping[str, StepRun]) -> tuple[str, str]:
+def _models(runs: Mapping[str, StepRun], many: str) -> tuple[str, str]:
     drawn = {name: run.drawn for name, run in runs.items() if run.drawn is not None}
     if not drawn:
         return "flown on the model that the law was made from, where it must work; see --fit.", "caution"
@@ -88,10 +93,18 @@ def _models(runs: Mapping[str, StepRun]) -> tuple[str, str]:
         low, middle, high = np.nanpercentile(paths.drift, _PERCENTILES)
         words.append(f"{name} {middle:+.2f} m ({low:+.2f} to {high:+.2f} m)")
     size = len(next(iter(drawn.values())).drift)
-    return f"{size} drawn from the fit's covariance, drift median (5 to 95 %): {'; '.join(words)}.", "plain"
+    return f"{size} {many}; drift, median (5 to 95 %): {'; '.join(words)}.", "plain"
 
 
-def _path_figure(runs: Mapping[str, StepRun]) -> Figure:
+def _against(name: str, wins: int, of: int) -> tuple[str, str]:
+    """Good where the law wins by two standard deviations of a tossed coin."""
+    ahead = wins - 0.5 * of > math.sqrt(of)
+    verdict = "" if ahead else " No more than chance: on these flights the law is not shown to be better."
+    words = f"on {wins} of {of} flights the law ends nearer to straight ahead than {_WORDS[name]}.{verdict}"
+    return words, "good" if ahead else "caution"
+
+
+def _path_figure(runs: Mapping[str, StepRun], many: str) -> Figure:
     layout = base_layout(380)
     layout["xaxis"] = axis("ahead [m]")
     layout["yaxis"] = axis("to the right [m]", autorange="reversed", zeroline=True, zerolinecolor=GREY)
@@ -110,7 +123,7 @@ def _path_figure(runs: Mapping[str, StepRun]) -> Figure:
         traces.append(line(x, y, name=words, color=color, dash=dash, width=2.4, hover=f"{words}<br>{hover}"))
         keys.append(Key(words, color, dash))
     if any(run.tracks for run in runs.values()):
-        keys.append(Key("models that the data cannot tell apart (thin)", GREY))
+        keys.append(Key(f"thin: {many}", GREY))
     return Figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},

@@ -36,7 +36,8 @@ def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
         reasons = " ".join(fit.problems) or "See the parameters."
         found.append(("bad", f"FAILED FIT: do not use these numbers. {reasons}"))
     elif fit and not fit.converged:
-        found.append(("caution", "NOT CONVERGED: the iterations ran out before the fit settled."))
+        ended = next((text for text in fit.problems if text.startswith("stopped after")), "")
+        found.append(("caution", f"NOT CONVERGED: {ended or 'the iterations ran out before the fit settled.'}"))
     return tuple(found)
 
 

@@ -29,7 +29,7 @@ from swashplate.simulation.dynamics import (
     row_force,
     row_rates,
 )
-from swashplate.simulation.late import steps_late
+from swashplate.simulation.late import quantised, quantum_of, steps_late
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, surroundings_of_start
@@ -58,6 +58,7 @@ def simulate_closed_loops(
     rate: float = 500.0,
     keep: int = 1,
     environment: Environment | None = None,
+    bits: int | None = None,
 ) -> Batch:
     """Fly one controller on many vehicles; without noise it agrees with `simulate_closed_loop` at the same rates.
 
@@ -80,6 +81,7 @@ def simulate_closed_loops(
         rate: of the physics [Hz], a whole multiple of the controller's.
         keep: every how many samples of the controller one is kept.
         environment: air, gravity, and wind and voltage where they are not given.
+        bits: in which a command is told over the range of its input; None for exact commands.
 
     Returns:
         States, inputs and surroundings at the kept samples. A vehicle that is lost has numbers that are not finite.
@@ -118,6 +120,8 @@ def simulate_closed_loops(
     for name, value in (noise or {}).items():
         sigma[vehicle.index(name)] = value
 
+    ranges = np.array(vehicle.input_limits, dtype=np.float64)
+    told = np.stack([*ranges.T, quantum_of(ranges, bits)])[:, :, None]
     count = min(size, getattr(controller.step, "block", BLOCK))
 
     def block(first: int) -> tuple[Array, Array]:
@@ -138,7 +142,7 @@ def simulate_closed_loops(
             wanted,
             added,
             p[:, part],
-            np.array(vehicle.input_limits).T[:, :, None],
+            told,
             sigma[:, None],
             late[:, part],
             begin.inputs,
@@ -187,7 +191,7 @@ def _flying_many(
     wanted: Float[jax.Array, "samples references"],
     added: Float[jax.Array, "samples inputs"],
     p: Float[jax.Array, "parameters vehicles"],
-    limits: Float[jax.Array, "2 inputs ..."],
+    told: Float[jax.Array, "3 inputs ..."],
     sigma: Float[jax.Array, ...],
     late: Int[jax.Array, "inputs vehicles"],
     first: Float[jax.Array, " inputs"],
@@ -223,7 +227,8 @@ def _flying_many(
         felt = [feeling(x, jnp.concatenate([acting, surroundings]), p)] if feels else []
         measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
         memory, command = deciding(memory, k * dt * substeps, measured, reference, gains)
-        inputs = jnp.clip(command + excited[:, None], limits[0], limits[1])
+        low, high, quantum = told
+        inputs = jnp.clip(quantised(command + excited[:, None], quantum), low, high)
         if not waiting:
             w = jnp.concatenate([inputs, surroundings])
             after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)

@@ -27,6 +27,7 @@ from swashplate.simulation.dynamics import (
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_steps
+from swashplate.simulation.step_size import check_step
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def simulate(
     Raises:
         DivergenceError: with the time, the state that went first and the flight up to there.
         FlightError: where an input is missing or not finite.
+        SwashError: steps that are too long for the vehicle's fastest mode at the start.
         CardError: where inputs reach outputs after different times, and `delays` does not say one for each.
     """
     enable_double_precision()
@@ -79,6 +81,7 @@ def simulate(
     time, rows = driving_rows(vehicle, inputs, rate=rate, environment=surroundings, interpolation=interpolation)
     first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True)))
     x0 = start_row(vehicle, start, first)
+    check_step(vehicle, np.asarray(x0), rows[0, : len(vehicle.input_names)], first, rate=rate, substeps=substeps)
     states = np.asarray(
         trajectory(
             equations_of(vehicle),

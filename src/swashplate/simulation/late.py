@@ -1,15 +1,18 @@
-"""Commands that act late in an open-loop flight: a vehicle's known delays, in steps of the simulation."""
+"""What lies between a command and its action: delays, in steps of the simulation, and steps of the command itself."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.errors import CardError
+from swashplate.errors import CardError, SwashError
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -21,6 +24,28 @@ Delays = Mapping[str, float] | float | None
 def steps_late(delays: Array, rate: float) -> NDArray[np.int_]:
     """Delays [s] in steps of a simulation at `rate` [Hz], rounded up: no command acts before it can."""
     return np.asarray(np.ceil(np.asarray(delays) * rate - 1e-6), dtype=np.int_)
+
+
+def quantised(command: Float[jax.Array, ...], quantum: Float[jax.Array, ...]) -> Float[jax.Array, ...]:
+    """A command in whole steps of `quantum`, to the nearest; as it is where that is zero."""
+    step = jnp.where(quantum > 0.0, quantum, 1.0)
+    return jnp.where(quantum > 0.0, step * jnp.round(command / step), command)
+
+
+def quantum_of(limits: Array, bits: int | None) -> Array:
+    """The step of every input whose range is told in `bits` [its unit], shape (inputs,); zero for None.
+
+    Args:
+        limits: lowest and highest of each input, shape (inputs, 2).
+
+    Raises:
+        SwashError: for fewer than 4 or more than 24 bits.
+    """
+    if bits is None:
+        return np.zeros(len(limits))
+    if not 4 <= bits <= 24:
+        raise SwashError(f"is {bits}, expected 4 to 24.", channel="bits of a command")
+    return np.asarray((limits[:, 1] - limits[:, 0]) / (2**bits - 1), dtype=np.float64)
 
 
 def acting_rows(

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eig, schur, solve_sylvester
 
 from swashplate import atomic
-from swashplate.arrays import Array
+from swashplate.arrays import Array, largest_first
 from swashplate.models.delays import known_delays
 from swashplate.models.linear import python_control
 from swashplate.models.linear.matrices_file import state_space_of_matrices
@@ -83,7 +83,10 @@ class LinearModel(Shown):
             value = complex(values[i])
             if value.imag < 0.0:
                 continue
-            order = np.argsort(-share[:, i], kind="stable")[:3]
+            order = largest_first(share[:, i])
+            # Three, and what takes part as much as the third.
+            enough = max(_TAKES_PART, (1.0 - 1e-6) * share[order[:3][-1], i])
+            order = order[: max(3, int(np.count_nonzero(share[:, i] >= enough)))]
             frequency = abs(value)
             found.append(
                 Mode(

@@ -10,8 +10,9 @@ Attitude is carried as a quaternion (`tumbling`): what an autopilot or a hand do
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -60,6 +61,24 @@ class Motion(NamedTuple):
     states: Array
 
 
+class SteppingEngine(Protocol):
+    """What moves a state row of `tumbling`: compiled by XLA here, or C (`export.stepping_c`)."""
+
+    def place(self, row: Array) -> None:
+        """Put the vehicle into a state row of `tumbling`, shape (n_states + 1,)."""
+
+    def advance(self, inputs: Array, around: Array, step: float, steps: int) -> Array:
+        """Take Runge-Kutta steps of `step` [s] under held inputs and surroundings (`SURROUNDINGS`).
+
+        Returns:
+            The state row and its derivative behind it, shape (2 (n_states + 1),); not to be changed.
+        """
+
+
+MakeEngine = Callable[[Vehicle, Environment], SteppingEngine]
+"""From a vehicle of `tumbling` and its constant air to what moves it."""
+
+
 class Stepping:
     """A vehicle and where it is.
 
@@ -67,16 +86,18 @@ class Stepping:
         vehicle: what moves; from `standing` where it may touch the ground.
         state: its state row at the start.
         environment: air and gravity, and wind and voltage at the start.
+        engine: makes what moves it; None for XLA.
     """
 
-    def __init__(self, vehicle: Vehicle, state: Array, environment: Environment) -> None:
-        enable_double_precision()
+    def __init__(
+        self, vehicle: Vehicle, state: Array, environment: Environment, *, engine: MakeEngine | None = None
+    ) -> None:
         self.vehicle, self._moved = vehicle, tumbling(vehicle)
-        self._advance = _compiled(equations_of(self._moved))
-        self._parameters = jax.device_put(parameter_row(vehicle, environment))
+        around = environment_of(vehicle, environment)
+        self._engine: SteppingEngine = (engine or XlaEngine)(self._moved, around)
         self._n = len(self._moved.state_names)
         self._gravity = float(environment.gravity)
-        self._around = np.array([getattr(environment_of(vehicle, environment), name) for name in SURROUNDINGS])
+        self._around = np.array([getattr(around, name) for name in SURROUNDINGS])
         self._low, self._high = np.array(vehicle.input_limits).T
         self.place(state)
 
@@ -88,7 +109,7 @@ class Stepping:
     def place(self, state: Array) -> None:
         """Put the vehicle into a state."""
         self._last = np.array(state, dtype=np.float64)
-        self._state = jax.device_put(from_euler(self._last))
+        self._engine.place(from_euler(self._last))
 
     def surround(self, **values: float) -> None:
         """Change wind or voltage, by name."""
@@ -103,16 +124,31 @@ class Stepping:
         """
         steps = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
         held = np.minimum(np.maximum(inputs, self._low), self._high)
-        row = np.concatenate([held, self._around, (duration / steps, float(steps))])
-        state, told = self._advance(self._state, row, self._parameters)
-        values = np.asarray(told)
-        if not np.isfinite(values).all():
+        values = self._engine.advance(held, self._around, duration / steps, steps)
+        if not math.isfinite(values.sum()) and not np.isfinite(values).all():
             self.place(self._last)
             first = int(np.argmin(np.isfinite(values))) % self._n
             name = self._moved.state_names[first]
             raise DivergenceError("left the finite numbers.", time=float("nan"), state=name)
-        self._state, self._last = state, to_euler(values[: self._n], self._last)
+        self._last = to_euler(values[: self._n], self._last)
         return motion(self._last, Vector(*values[self._n :][_SPEEDS].tolist()), self._gravity)
+
+
+class XlaEngine:
+    """Steps compiled by XLA, a call a frame."""
+
+    def __init__(self, moved: Vehicle, environment: Environment) -> None:
+        enable_double_precision()
+        self._advance = _compiled(equations_of(moved))
+        self._parameters = jax.device_put(parameter_row(moved, environment))
+
+    def place(self, row: Array) -> None:
+        self._state = jax.device_put(row)
+
+    def advance(self, inputs: Array, around: Array, step: float, steps: int) -> Array:
+        row = np.concatenate([inputs, around, (step, float(steps))])
+        self._state, told = self._advance(self._state, row, self._parameters)
+        return np.asarray(told)
 
 
 def motion(states: Array, change: Vector, g: float) -> Motion:

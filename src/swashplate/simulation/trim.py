@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
+from swashplate.models.doubts import nominal_voltage
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
@@ -156,6 +157,14 @@ def trim(
     strange = [name for name, value in (asked | around).items() if not np.isfinite(value)]
     if strange:
         raise TrimError("is not a finite number.", where=vehicle.card.where, channel=", ".join(strange))
+    nominal = nominal_voltage(vehicle)
+    if nominal is not None and around["voltage"] <= 0.0:
+        raise TrimError(
+            f"is {around['voltage']:g} V: no motor turns on that.",
+            where=vehicle.card.where,
+            channel="voltage",
+            hint=f"Give the battery's voltage; the card's is {nominal:g} V.",
+        )
 
     def residual(z: Array, share: float = 1.0) -> tuple[Array, Array]:
         value, slope = _unrest(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
@@ -170,8 +179,7 @@ def trim(
     state, inputs = (np.asarray(part) for part in assemble(equations, z, course))
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
     where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
-    battery = "voltage_nominal" in vehicle.parameter_names
-    if battery:
+    if nominal is not None:
         where += f" at {float(surroundings.voltage):g} V"
     if turn:
         where += f", turning {np.degrees(turn):g} deg/s"

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -45,6 +45,15 @@ class TumblingBody(NamedTuple):
     r: Scalar
 
 
+class Tumbling(Protocol):
+    """A nested state with a tumbling body, whatever else it holds."""
+
+    @property
+    def body(self) -> TumblingBody: ...
+
+    def _replace(self, *, body: TumblingBody | RigidBody) -> Any: ...
+
+
 def tumbling(vehicle: Vehicle) -> Vehicle:
     """The vehicle with a quaternion among its states. Its attitude must be kinematics, as all but linear models' is.
 
@@ -59,6 +68,7 @@ def tumbling(vehicle: Vehicle) -> Vehicle:
         state_names=(*TumblingBody._fields, *vehicle.state_names[count:]),
         state_units=(*vehicle.state_units[:_PHI], *("1",) * 4, *vehicle.state_units[_P:]),
         derivatives=partial(_derivatives, vehicle.derivatives),
+        specific_force=partial(_specific_force, vehicle.specific_force),
     )
 
 
@@ -71,11 +81,24 @@ def _derivatives(
     xp: Backend,
 ) -> Any:
     body: TumblingBody = state.body
-    rotation = Quaternion(body.q0, body.q1, body.q2, body.q3)
-    seen = RigidBody(*body[:_PHI], *euler_of(rotation, xp), body.p, body.q, body.r)
-    rates = free(state._replace(body=seen), inputs, par, env, xp)
-    turned = quaternion_rates(rotation, Vector(body.p, body.q, body.r))
+    rates = free(state._replace(body=_seen(body, xp)), inputs, par, env, xp)
+    turned = quaternion_rates(_rotation(body), Vector(body.p, body.q, body.r))
     return rates._replace(body=TumblingBody._make((*rates.body[:_PHI], *turned, *rates.body[_P:])))
+
+
+def _specific_force(
+    free: Callable[..., Vector], state: Tumbling, inputs: object, par: object, env: Environment, xp: Backend
+) -> Vector:
+    return free(state._replace(body=_seen(state.body, xp)), inputs, par, env, xp)
+
+
+def _rotation(body: TumblingBody) -> Quaternion:
+    return Quaternion(body.q0, body.q1, body.q2, body.q3)
+
+
+def _seen(body: TumblingBody, xp: Backend) -> RigidBody:
+    """The body with roll, pitch and yaw."""
+    return RigidBody(*body[:_PHI], *euler_of(_rotation(body), xp), body.p, body.q, body.r)
 
 
 def from_euler(row: Array) -> Array:

@@ -31,6 +31,19 @@ INDOOR = Gusts((0.15, 0.15, 0.1), (1.0, 1.0, 1.0), 0.5)
 """A room with ventilation and the rotor's own recirculation; assumed, no standard speaks of rooms."""
 
 
+def indoor(sigma: float) -> Gusts:
+    """`INDOOR` at another strength: `sigma` m/s along and across, two thirds of it down, as large as the room.
+
+    Raises:
+        SwashError: for a strength that is not positive.
+    """
+    if not 0.0 < sigma < 20.0:
+        raise SwashError(f"gusts of {sigma:g} m/s in a room: expected more than 0 and less than 20.")
+    share = sigma / INDOOR.sigma[0]
+    along, across, down = (share * part for part in INDOOR.sigma)
+    return Gusts((along, across, down), INDOOR.length, INDOOR.speed)
+
+
 def outdoor(mean: float, *, height: float = 10.0) -> Gusts:
     """Low-altitude Dryden (MIL-F-8785C, sec. 3.7.3.4) for a mean wind of `mean` m/s at 6 m and a height [m]."""
     if mean <= 0.0 or not 0.0 < height < 300.0:

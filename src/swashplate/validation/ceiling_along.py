@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from swashplate.arrays import Array
 from swashplate.validation.black_box import AFTER, CROSSED, Ceiling, best_of_strengths, ridge
@@ -30,6 +29,8 @@ Bank = Callable[[Array, float, float], Array]
 
 def inputs_so_far(inputs: Array, dt: float, after: float) -> Array:
     """Averages of past inputs over steps that grow with age, and averages that fade ever more slowly."""
+    from scipy.signal import lfilter  # half a second to import, and reports import this module
+
     n = len(inputs)
     total = np.concatenate([np.zeros((1, inputs.shape[1])), np.cumsum(inputs, axis=0)])
     at = np.arange(n)

@@ -142,3 +142,20 @@ def test_the_remedy_is_one_whatever_the_file_was_read_with(given: str, mend: str
     if found:
         with pytest.raises(FlightError, match=r"p: .*--unit p=-deg/s"):
             respond(read(path, units={"p": given}), inputs=["theta"], outputs=["p"])
+
+
+@pytest.mark.parametrize(
+    ("copied", "words"), [(False, ""), (True, "moves with what the attitude's change gives for q")]
+)
+def test_axes_that_move_together_are_not_exchanged(copied: bool, words: str) -> None:
+    """A rough roll angle in a motion of both axes: p agrees better with pitch than with roll, and q with pitch best."""
+    rng, time = np.random.default_rng(1), np.arange(6000) / 100.0
+    both, own = (np.convolve(rng.standard_normal(time.size), np.hanning(60), "same") / 5.0 for _ in range(2))
+    angles = {"phi": 0.1 * both + 0.05 * own, "theta": 0.1 * both}
+    rates = {name: np.gradient(angle, time) for name, angle in zip("pq", angles.values(), strict=True)}
+    noise = {"phi": 0.3, "theta": 0.005, "p": 0.05, "q": 0.05}
+    seen = {n: v + noise[n] * rng.standard_normal(time.size) for n, v in (angles | rates).items()}
+    flight = Flight.from_arrays(time, seen | ({"p": seen["q"]} if copied else {}), source="both")
+    told = [str(finding) for finding in consistency(flight)]
+    assert bool(told) == bool(words), told
+    assert all(text.startswith("p: ") and words in text for text in told)

@@ -61,6 +61,22 @@ def test_a_stream_that_is_slower_for_a_while_has_no_gaps_but_two_rates() -> None
     assert (lossy.streams[0].gaps, lossy.streams[0].longest_gap) == (3, pytest.approx(0.7))
 
 
+def test_a_sweep_between_slow_stretches_holds_no_outliers_but_a_glitch_is_one() -> None:
+    """RATE in and out of System ID mode: what moves in the fast part only is no jump of the slow one, nor in it."""
+    steps = np.concatenate([np.full(600, 0.1), np.full(2500, 0.01), np.full(150, 0.1), np.full(2500, 0.01)])
+    time, fast = np.cumsum(steps), steps < 0.05
+    since = time - np.where(time < 95.0, 60.0, 100.0)
+    phase = 2.0 * np.pi * (0.3 * since + 0.154 * since**2)
+    random = np.random.default_rng(0)
+    p = np.where(fast, 0.6 * np.sin(phase), 0.0) + 0.01 * random.standard_normal(time.size)
+    mixer_roll = np.where(fast, 0.15 * np.sin(phase + 0.5), 0.0) + 0.005 * random.standard_normal(time.size)
+    clean = inspect(_flight(time, p=p, mixer_roll=mixer_roll))
+    assert [each.outliers for each in clean.channels] == [0] * len(clean.channels)
+    assert clean.problems == ()
+    p[300] += 3.0
+    assert any("p: 2 jumps" in told for told in inspect(_flight(time, p=p, mixer_roll=mixer_roll)).problems)
+
+
 def test_jitter_is_the_scatter_of_the_steps() -> None:
     steps = 0.01 + 0.001 * np.random.default_rng(3).standard_normal(20_000)
     time = np.cumsum(steps)

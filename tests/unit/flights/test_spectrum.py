@@ -64,6 +64,51 @@ def test_harmonics_are_told_with_their_strength() -> None:
     assert "the strongest is 2 x at 50.00 Hz" in found.words
 
 
+def shaken_gyro(speed: float, *, tone: float, tilt: float = 0.0) -> Flight:
+    """A gyro [rad/s] with noise, a rotor's `tone` at twice its speed [Hz], and a slow drift of strength `tilt`."""
+    made = flight()
+    time = made.time("p")
+    chance = np.random.default_rng(2)
+    p = 0.01 * chance.standard_normal(time.size) + tilt * np.cumsum(chance.standard_normal(time.size)) / 200.0
+    p += tone * np.sin(4.0 * np.pi * speed * time)
+    return made.with_streams({"motion": stream(time, {"p": p}), "rotor": made.streams["rotor"]})
+
+
+def test_notches_are_suggested_where_a_harmonic_stands_out() -> None:
+    found = sp.harmonics(shaken_gyro(25.0, tone=0.05), "p")
+    assert found.notches is not None
+    assert found.notches.numbers == (2,)
+    assert found.notches.parameters == {
+        "INS_HNTCH_ENABLE": 1, "INS_HNTCH_MODE": 2, "INS_HNTCH_REF": 1,
+        "INS_HNTCH_FREQ": 22.5, "INS_HNTCH_BW": 11.2, "INS_HNTCH_HMNCS": 2,
+    }  # fmt: skip
+    # The delay is the slope of the phase of the notch that the parameters describe.
+    centre, low = 2.0 * np.pi * 50.0, 2.0 * np.pi * 0.5
+    width = 2.0 * np.pi * 50.0 * found.notches.width / found.notches.lowest
+    phase = np.angle((centre**2 - low**2) / (centre**2 - low**2 + 1j * low * width))
+    assert found.notches.delay == pytest.approx(-phase / low, rel=1e-3)
+    assert f"{1e3 * found.notches.delay:.1f} ms" in str(found)
+
+
+@pytest.mark.parametrize(("speed", "tone", "tilt"), [(25.0, 0.0, 0.0), (25.0, 0.0, 5.0), (23.0, 0.05, 0.0)])
+def test_no_notch_where_nothing_stands_out_at_a_harmonic(speed: float, tone: float, tilt: float) -> None:
+    """Noise, a drift whose density falls steeply, and a tone of something else (46 Hz beside 50)."""
+    assert sp.harmonics(shaken_gyro(speed, tone=tone, tilt=tilt), "p").notches is None
+
+
+def test_a_stretch_too_short_to_tell_the_multiples_apart_is_not_judged() -> None:
+    found = sp.harmonics(shaken_gyro(25.0, tone=0.05), "p", start=10.0, stop=10.6)
+    assert found.notches is None
+    assert {harmonic.above for harmonic in found.harmonics} == {None}
+    assert "too short" in str(found)
+
+
+def test_an_accelerometer_says_nothing_about_notches_of_gyros() -> None:
+    found = sp.harmonics(flight(), "az")
+    assert max(harmonic.above or 0.0 for harmonic in found.harmonics) > 10.0
+    assert found.notches is None
+
+
 def test_a_rotor_that_the_rate_hides_is_said_to_be_hidden() -> None:
     found = sp.harmonics(flight(rate=40.0), "az")
     assert found.harmonics == ()

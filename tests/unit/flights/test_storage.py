@@ -44,8 +44,8 @@ def test_nothing_is_lost(tmp_path: Path) -> None:
 def test_read_opens_it_by_content(tmp_path: Path) -> None:
     path = _flight().save(tmp_path / "flight.dat")
     assert read(path).provenance == _flight().provenance
-    with pytest.raises(FlightError, match="units and mappings have no meaning"):
-        read(path, units={"x": "mm"})
+    with pytest.raises(FlightError, match="a mapping has no meaning"):
+        read(path, mapping={"rate": 50})
 
 
 def test_a_flight_without_streams(tmp_path: Path) -> None:

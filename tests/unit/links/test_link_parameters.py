@@ -10,7 +10,7 @@ import pytest
 
 import swashplate as sp
 from heli_autopilot import EKF_WAIT, Gains, HeliAutopilot
-from link_bench import bench
+from link_bench import QUICK, bench
 from swashplate.errors import LinkError
 from swashplate.links.ardupilot.parameters import parameter_file, parameters
 from swashplate.links.servos import servo_mapping
@@ -50,7 +50,7 @@ def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[
     axes = ("RLL", "PIT", "YAW")
     angle = tuple(raptor[f"ATC_ANG_{axis}_P"] for axis in axes)
     rate = {k: tuple(raptor[f"ATC_RAT_{axis}_{k}"] for axis in axes) for k in ("FF", "P", "I")}
-    at = bench("raptor50")
+    at = bench("raptor50", engine=QUICK)
     kept = (raptor["ATC_RAT_RLL_ILMI"], raptor["ATC_RAT_PIT_ILMI"])
     gains = Gains(angle, rate["FF"], rate["P"], rate["I"], kept)  # type: ignore[arg-type]
     pilot = HeliAutopilot(at.send, rate=400, gains=gains)
@@ -59,7 +59,8 @@ def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[
     assert np.abs([*still["gyro"], *still["velocity"]]).max() < 1e-3
     assert np.allclose(still["accel_body"], (0.0, 0.0, -9.80665), atol=0.01)
     assert still["rpm_1"] == [0.0]
-    pilot.armed = pilot.interlock = True
+    assert pilot.arm() == ""
+    pilot.interlock = True
     running = pilot.fly(8.0)  # ArduPilot itself would wait for H_RSC_RUNUP_TIME
     assert running["rpm_1"][0] > 1300.0
     pilot.rate, pilot.every = int(raptor["SIM_RATE_HZ"]), 3

@@ -7,8 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from heli_autopilot import EKF_WAIT, HeliAutopilot
-from link_bench import bench
+import swashplate as sp
+from heli_autopilot import EKF_WAIT, Gains, HeliAutopilot
+from link_bench import QUICK, bench
+from swashplate.links.ardupilot.parameters import parameters
+from swashplate.links.plant import Plant, Surroundings
+from swashplate.links.servos import servo_mapping
 from swashplate.models.card import packaged_cards
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
@@ -17,8 +21,8 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.physics.blade_element import FlapMoments
 from swashplate.physics.environment import Environment
 from swashplate.physics.inflow import Inflow
-from swashplate.simulation.standing import at_rest, standing
-from swashplate.simulation.stepping import Stepping
+from swashplate.simulation.standing import at_rest, skids_of, standing
+from swashplate.simulation.stepping import MakeEngine, Motion, Stepping
 
 XP = FloatBackend()
 HELICOPTERS = [name for name, card in packaged_cards().items() if card.vehicle == "conventional"]
@@ -111,13 +115,14 @@ def test_the_wake_falls_behind_as_dynamic_inflow_does(excess: float, lam0: float
     assert share == pytest.approx(in_phase, abs=0.05) or k2 < 9.0
 
 
-def parked(name: str, seconds: float, *, wind: float) -> np.ndarray:
+def parked(name: str, seconds: float, *, wind: float, engine: MakeEngine | None = None) -> np.ndarray:
     """State rows, two a second, of a vehicle with stopped rotors and servos stirred at random."""
     made, around = standing(vehicle(name)), Environment(wind, 0.5 * wind, 0.0)
     low, high = np.array(made.input_limits).T
     motors = [k for k, each in enumerate(made.input_names) if each.startswith(("motor", "throttle"))]
     assert motors
-    stepping, random, rows = Stepping(made, at_rest(made, around), around), np.random.default_rng(1), []
+    stepping = Stepping(made, at_rest(made, around), around, engine=engine)
+    random, rows = np.random.default_rng(1), []
     for _ in range(round(10.0 * seconds)):
         inputs = random.uniform(low, high)
         inputs[motors] = 0.0
@@ -131,9 +136,12 @@ def stands(rows: np.ndarray, name: str) -> None:
     settled = body[2 * len(body) // 3 :]
     assert np.ptp(settled[:, :3], axis=0).max() < 1e-5, "it creeps"
     assert np.ptp(settled[:, 6:9], axis=0).max() < 1e-4, "it turns"
-    assert np.abs(body[:, 6:9]).max() < math.radians(1.0)
+    # Half of what would lift a skid end, which is much for 27 g on assumed skids, and hardly anything for a card's own.
+    skids = skids_of(made)
+    lifts = made.card.values()["mass"] * 9.81 / (4.0 * skids.stiffness) / min(skids.half_width, skids.half_length)
+    assert np.abs(body[:, 6:9]).max() < max(math.radians(1.0), 0.5 * lifts)
     tilts = [k for k, each in enumerate(made.state_names) if each in ("a1", "b1", "alpha_lower", "beta_lower")]
-    assert np.abs(rows[:, tilts]).max() < math.radians(6.0)
+    assert np.abs(rows[:, tilts]).max(initial=0.0) < math.radians(6.0)
 
 
 @pytest.mark.parametrize("name", ["raptor50", "helion", "xcell60", "coax"])
@@ -148,13 +156,15 @@ def test_what_is_parked_stands_still_for_two_minutes(name: str, wind: float) -> 
     stands(parked(name, 120.0, wind=wind), name)
 
 
-def lived(pilot: HeliAutopilot, *, hover: float) -> None:
+def lived(pilot: HeliAutopilot, *, hover: float, expected: float | None) -> None:
     """Run-up, lift-off, hover, landing, and the rotor stopped again."""
-    pilot.armed = pilot.interlock = True
+    assert pilot.arm() == ""
+    pilot.interlock = True
     first = len(pilot.answers)
     pilot.fly(9.0)
-    headings = [answer["attitude"][2] for answer in pilot.answers[first:]]
-    assert math.degrees(np.ptp(headings)) == pytest.approx(1.35, abs=0.1), "as the how-to says"
+    headings = np.unwrap([answer["attitude"][2] for answer in pilot.answers[first:]])
+    turned = math.degrees(np.ptp(headings))
+    assert turned < 2.0 if expected is None else turned == pytest.approx(expected, abs=0.1)
     pilot.height, pilot._lift = 2.0, 0.5
     hovering = pilot.fly(hover)
     assert hovering["position"][2] == pytest.approx(-2.0, abs=0.4)
@@ -166,15 +176,103 @@ def lived(pilot: HeliAutopilot, *, hover: float) -> None:
     assert max(map(abs, down["attitude"][:2])) < math.radians(2.0)
 
 
-@pytest.mark.parametrize("again", [0, pytest.param(2, marks=pytest.mark.proof)])
-def test_a_helicopter_lives_on_the_ground_and_flies(again: int) -> None:
-    at = bench("raptor50")
-    pilot = HeliAutopilot(at.send, rate=200)
-    for round_ in range(1 + again):
-        waited = 3.0 * EKF_WAIT if again else 5.0
-        before = pilot.answers[-1]["rpm_1"][0] if pilot.answers else 0.0
-        pilot.wait_for_ekf(waited, seed=round_)
-        assert pilot.answers[-1]["rpm_1"][0] <= before
+def test_the_firmware_refuses_until_its_ekf_is_ready() -> None:
+    pilot = HeliAutopilot(bench("raptor50", engine=QUICK).send, rate=100)
+    pilot.fly(1.0)
+    assert pilot.arm() == "Gyros still settling"
+    pilot.fly(EKF_WAIT - 2.0)
+    assert pilot.arm() == "Need Position Estimate"
+    pilot.fly(2.0)
+    pilot.interlock = True
+    assert pilot.arm() == "Motor Interlock Enabled"
+    pilot.interlock = False
+    assert pilot.arm() == ""
+
+
+def test_an_ekf_on_ground_that_shakes_never_settles() -> None:
+    shaken = bench("raptor50", engine=QUICK)
+
+    def send(data: bytes) -> bytes | None:
+        answer = shaken.send(data)
+        return answer and answer.replace(b'"gyro":[', b'"gyro":[0.05') if answer else None
+
+    pilot = HeliAutopilot(send, rate=100)
+    with pytest.raises(AssertionError, match="does not settle in 45 s: Gyros still settling"):
+        pilot.wait_for_ekf(45.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "rounds"),
+    [("raptor50", 2), *(pytest.param(name, 3, marks=pytest.mark.proof) for name in ("raptor50", "helion", "xcell60"))],
+)
+def test_a_helicopter_lives_on_the_ground_and_flies(name: str, rounds: int) -> None:
+    """From a cold start, as long as the EKF takes, and again after a landing while the rotor runs down."""
+    at = bench(name, engine=QUICK)
+    pilot = HeliAutopilot(at.send, rate=200, gains=written_gains(name))
+    for round_ in range(rounds):
+        assert round_ > 0 or pilot.arm() != ""
+        if round_ == 0:
+            pilot.wait_for_ekf(seed=round_)
+        random = np.random.default_rng(round_)
+        for _ in range(240 if rounds > 2 else 20):  # 120 s
+            pilot.sticks = tuple(random.uniform((-1.0, -1.0, -1.0, 0.0), 1.0).tolist())
+            parked_still = pilot.fly(0.5)
+        pilot.sticks = (0.0, 0.0, 0.0, 0.0)
+        assert parked_still["position"][2] == pytest.approx(0.0, abs=0.02)
+        assert max(map(abs, parked_still["attitude"][:2])) < math.radians(2.0)
         pilot.place = (pilot.answers[-1]["position"][0], pilot.answers[-1]["position"][1])
-        lived(pilot, hover=6.0)
+        # From rest the how-to says how far; while the rotor still runs down there is less left to spin up.
+        lived(pilot, hover=6.0, expected=1.35 if (name, round_) == ("raptor50", 0) else None)
     assert not at.plant.broken
+
+
+def written_gains(name: str) -> Gains:
+    """Those of `--write-parameters`."""
+    free = vehicle(name, rotor_speed="throttle")
+    found = parameters(servo_mapping(name, free), free, sp.trim(free))
+    rows = {key: [found[f"ATC_RAT_{axis}_{key}"] for axis in ("RLL", "PIT", "YAW")] for key in ("FF", "P", "I")}
+    angle = tuple(found[f"ATC_ANG_{axis}_P"] for axis in ("RLL", "PIT", "YAW"))
+    kept = tuple(found[f"ATC_RAT_{axis}_ILMI"] for axis in ("RLL", "PIT"))
+    return Gains(angle, tuple(rows["FF"]), tuple(rows["P"]), tuple(rows["I"]), kept)
+
+
+@pytest.mark.parametrize("seconds", [10.0, pytest.param(120.0, marks=pytest.mark.proof)])
+@pytest.mark.parametrize("which", ["ardupilot", "px4"])
+def test_a_coaxial_lives_on_the_ground_and_hops(which: str, seconds: float) -> None:
+    """Parked with its servos stirred, spooled up, off the ground, down, stopped, and again; at both links' rates."""
+    made = standing(vehicle("coax"))
+    mapping = servo_mapping("coax" if which == "ardupilot" else "coax_px4", made)
+    plant = Plant(made, mapping, Surroundings(Environment()), engine=QUICK)
+    (lower, upper), (roll, pitch) = mapping.motors, mapping.servos
+    dt, random = 1.0 / (400.0 if which == "ardupilot" else 250.0), np.random.default_rng(2)
+
+    def held(lift: float, tilt: tuple[float, float], duration: float) -> Motion:
+        pulses = [0.0] * 16
+        for servo, value in ((lower, 1000 + 1000 * lift), (upper, 1000 + 1000 * lift)):
+            pulses[servo.channel - 1] = value
+        for servo, value in zip((roll, pitch), tilt, strict=True):
+            pulses[servo.channel - 1] = 1500 + 500 * value
+        for _ in range(round(duration / dt)):
+            moved = plant.advance(pulses, dt)
+        return moved
+
+    for _ in range(2):
+        places = []
+        for _ in range(round(2.0 * seconds)):
+            moved = held(0.0, tuple(random.uniform(-1.0, 1.0, 2).tolist()), 0.5)
+            places.append((*moved.body[:3], *moved.body[6:9]))
+        assert np.ptp(np.array(places)[len(places) // 2 :], axis=0).max() < 1e-4, "it creeps"
+        held(0.3, (0.0, 0.0), 2.0)
+        top = held(0.6, (0.0, 0.0), 1.2)
+        assert -top.body.z - plant.standing_depth > 0.05, "it does not lift off"
+        down = held(0.45, (0.0, 0.0), 2.0)
+        down = held(0.0, (0.0, 0.0), 3.0)
+        assert not plant.broken
+        assert down.body.z == pytest.approx(-plant.standing_depth, abs=0.005)
+
+
+@pytest.mark.parametrize("name", HELICOPTERS)
+def test_exported_c_stands_still(name: str) -> None:
+    """The C that links and exports share, 10 s on the ground at random servo positions."""
+    rows = parked(name, 10.0, wind=3.0, engine=QUICK)
+    stands(rows, name)

@@ -36,3 +36,17 @@ def test_rounding_does_not_change_what_is_said() -> None:
 
 def test_a_stable_model_has_nothing_at_the_origin() -> None:
     assert all(m.frequency > 0.0 for m in chain(-0.5 * np.eye(6)).modes())
+
+
+def test_states_that_share_a_mode_equally_are_all_named_in_the_models_order() -> None:
+    # Roll and pitch of something round, tilted by a late thrust: each of four states has a quarter of each mode.
+    A = np.zeros((4, 4))
+    A[0, 2] = A[1, 3] = 1.0
+    A[2, 0] = A[3, 1] = -100.0
+    A[2, 1], A[3, 0] = -5.0, 5.0
+    none = np.zeros((4, 1))
+    at = cast(Any, SimpleNamespace())
+    for noise in np.random.default_rng(2).standard_normal((5, 4, 4)):
+        whole = (A + 1e-13 * noise, none, np.eye(4), none, none)
+        model = LinearModel(*whole, ("phi", "theta", "p", "q"), ("a",), ("wind",), at)
+        assert [[name for name, _ in mode.states] for mode in model.modes()] == [["phi", "theta", "p", "q"]] * 2

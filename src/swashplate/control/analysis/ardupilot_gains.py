@@ -130,7 +130,9 @@ class Suggestion(Shown):
         """What the loop is worth: a name with its unit, suggested, flown."""
         told = [_told(f) for f in (self.figures_suggested, self.figures_flown)]
         coupled = any(np.isfinite(f.coupling) for f in (self.figures_suggested, self.figures_flown))
-        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*told, strict=True)][: 8 if coupled else 7]
+        return [(name, ours, theirs) for (name, ours), (_, theirs) in zip(*told, strict=True)][
+            : None if coupled else -1
+        ]
 
     def __repr__(self) -> str:
         lines = [f"{self.axis}: {self.words}"]
@@ -152,6 +154,7 @@ def _told(f: LoopFigures) -> list[tuple[str, str]]:
     return [
         ("phase margin [deg]", f"{f.margins.phase_margin!r}"),
         ("gain margin [dB]", f"{f.margins.gain_margin!r}"),
+        ("delay margin [ms]", f.margins.delay_in_words()),
         ("crossover [rad/s]", f"{f.margins.crossover!r}"),
         ("largest sensitivity", number(f.peak)),
         ("bandwidth [rad/s]", number(f.bandwidth)),
@@ -279,7 +282,10 @@ def _loops(loop: RateLoop, grid: Mapping[str, Array], omega: Array) -> Complex:
 
 
 def _keep(loops: Complex) -> NDArray[np.bool_]:
-    """Which loops are stable by Nyquist's count of a stable plant, and far enough from -1 at every crossing, (m,)."""
+    """Which loops are stable by Nyquist's count of a stable plant, and far enough from -1 at every crossing, (m,).
+
+    One whose gain is above one to the end of what is judged has a crossover, and a delay margin, that nobody has seen.
+    """
     around = 1.0 + loops
     turns = np.unwrap(np.angle(around), axis=1)
     size, phase = np.abs(loops), np.degrees(np.angle(loops))
@@ -289,7 +295,7 @@ def _keep(loops: Complex) -> NDArray[np.bool_]:
     loud = (np.abs(np.diff(phase, axis=1)) > 180.0) & (size[:, :-1] >= 10.0 ** (-GAIN_MARGIN / 20.0))
     encircled = np.abs(turns[:, -1] - turns[:, 0]) > np.pi
     near = np.abs(around).min(axis=1) <= 1.0 / PEAK
-    return np.asarray(~encircled & ~narrow & ~loud.any(axis=1) & ~near)
+    return np.asarray(~encircled & ~narrow & ~loud.any(axis=1) & ~near & ~above[:, -1])
 
 
 def _with_coupling(made: Sequence[Suggestion]) -> list[Suggestion]:
@@ -310,6 +316,7 @@ _CHANGES = (
     # what, unit, scale, better if larger, smallest change that is named (of a number, or of its flown size)
     ("phase margin", "deg", 1.0, True, 3.0, False),
     ("gain margin", "dB", 1.0, True, 0.5, False),
+    ("delay margin", "ms", 1e3, True, 0.05, True),
     ("largest sensitivity", "", 1.0, False, 0.05, True),
     ("bandwidth", "rad/s", 1.0, True, 0.05, True),
     ("disturbance rejection", "rad/s", 1.0, True, 0.05, True),
@@ -324,8 +331,8 @@ def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
         return []
     found = []
     columns = [
-        (f.margins.phase_margin.value, f.margins.gain_margin.value, f.peak, f.bandwidth, f.rejection, f.overshoot,
-         f.coupling)
+        (f.margins.phase_margin.value, f.margins.gain_margin.value, f.margins.delay_margin.value, f.peak,
+         f.bandwidth, f.rejection, f.overshoot, f.coupling)
         for f in (s.figures_flown, s.figures_suggested)
     ]  # fmt: skip
     for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):

@@ -56,7 +56,7 @@ class LoopFigures:
     coupling: float = NAN
 
 
-NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 4), NAN, NAN, NAN, NAN)
+NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 5), NAN, NAN, NAN, NAN)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.control.analysis.margins import Margins, crossing_delays, margins
+from swashplate.control.analysis.margins import Margins, margins
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.errors import ControllerError
+from swashplate.identification.responses.crossing_delays import crossing_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim

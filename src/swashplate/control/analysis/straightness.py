@@ -20,6 +20,8 @@ from swashplate.simulation.trim import Trim
 _TRACKS = 60
 """Drawn models whose tracks are kept, for a plot."""
 _HALVINGS = 16
+DURATION = 10.0
+"""s, after which a flight that has not covered the distance is given up."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class StepRun:
     Attributes:
         flight: of the model itself, until the distance is covered.
         path: of it, one entry each.
-        drawn: paths of drawn models, None where there are none.
+        drawn: paths of drawn models, or of the model in many gusts, None where there are none.
         tracks: place ahead and to the right of some of them, until the distance is covered [m].
     """
 
@@ -64,7 +66,7 @@ def step_paths(
     *,
     command: float,
     distance: float = 6.0,
-    duration: float = 10.0,
+    duration: float = DURATION,
     size: int = 1,
     parameters: Mapping[str, ArrayLike] | None = None,
 ) -> Path:
@@ -93,14 +95,16 @@ def step_run(
     *,
     command: float,
     distance: float = 6.0,
-    duration: float = 10.0,
+    duration: float = DURATION,
     parameters: Mapping[str, Array] | None = None,
+    wind: Mapping[str, Array] | None = None,
 ) -> StepRun:
-    """The same with the flights themselves, of the model and of drawn models.
+    """The same with the flights themselves, of the model in still air and of drawn models, or in gusts, or of both.
 
     Args:
         vehicle, controller, trim, command, distance, duration: as in `step_paths`.
         parameters: numbers of the drawn models by name, shape (models,) each.
+        wind: gusts of each drawn flight, from `dryden` at the controller's rate, shape (samples, models).
 
     Raises:
         ControllerError: where no flight covers the distance.
@@ -108,16 +112,26 @@ def step_run(
     own = _fly(vehicle, controller, trim, command, duration, 1, None)
     path = paths_of(own, command, distance)
     flight = own.flight(0).between(0.0, float(path.time[0]))
-    if not parameters:
+    if not parameters and not wind:
         return StepRun(flight, path, None, ())
-    size = len(next(iter(parameters.values())))
-    many = _fly(vehicle, controller, trim, command, duration, size, parameters)
+    size = next(values.shape[-1] for values in (*(parameters or {}).values(), *(wind or {}).values()))
+    many = _fly(vehicle, controller, trim, command, duration, size, parameters, wind)
     drawn = paths_of(many, command, distance)
     tracks = []
     for i in range(min(size, _TRACKS)):
         until = many.time <= (drawn.time[i] if np.isfinite(drawn.time[i]) else duration)
         tracks.append((many["x"][until, i], many["y"][until, i]))
     return StepRun(flight, path, drawn, tuple(tracks))
+
+
+def nearer(one: Path, other: Path) -> tuple[int, int]:
+    """How many of the same flights end nearer to straight ahead on one path than on the other, and of how many.
+
+    A flight that does not cover the distance is the furthest; one that does not on both counts for neither.
+    """
+    ends = [np.where(np.isfinite(path.drift), np.abs(path.drift), np.inf) for path in (one, other)]
+    judged = np.isfinite(np.minimum(*ends))
+    return int(np.sum(ends[0] < ends[1])), int(np.sum(judged))
 
 
 def command_for_speed(
@@ -127,7 +141,7 @@ def command_for_speed(
     *,
     speed: float,
     distance: float = 6.0,
-    duration: float = 10.0,
+    duration: float = DURATION,
 ) -> float:
     """The step of the pitch command after which an aircraft gets this fast before it has covered the distance.
 
@@ -167,6 +181,7 @@ def _fly(
     duration: float,
     size: int,
     parameters: Mapping[str, ArrayLike] | None,
+    wind: Mapping[str, Array] | None = None,
 ) -> Batch:
     return simulate_closed_loops(
         vehicle,
@@ -175,6 +190,7 @@ def _fly(
         size=size,
         parameters=parameters,
         reference={"pitch": command},
+        wind=wind,
         start=trim,
         rate=controller.rate * max(1, round(500.0 / controller.rate)),
     )

@@ -56,6 +56,8 @@ _FILE: Any = msgspec.defstruct(
 class AutopilotKind(ControllerKind[Autopilot]):
     """The autopilot of a coaxial helicopter, fed with the states."""
 
+    every_mode = True
+
     def about(self, controller: Autopilot, vehicle: Vehicle, trim: Trim, *, seed: int = 0) -> Autopilot:
         if controller.vehicle != vehicle.name:
             raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
@@ -109,9 +111,6 @@ class AutopilotKind(ControllerKind[Autopilot]):
             CoaxInputs._fields,
             f"{controller.vehicle}, mode {controller.mode}, designed on: {controller.model}",
         )
-
-    def for_sticks(self, controller: Autopilot) -> Autopilot:
-        return controller
 
 
 KIND = AutopilotKind()

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, largest_first
 from swashplate.errors import SwashError
 
 _SINGULAR = 1e-8
@@ -192,7 +192,7 @@ def dynamic_decoupling(
     values, vectors = np.linalg.eig(closed)
     worst = int(np.argmax(values.real))
     if values[worst].real > _STABLE:
-        order = np.argsort(-np.abs(vectors[:, worst]))[:3]
+        order = largest_first(np.abs(vectors[:, worst]))[:3]
         zero = np.round(values[worst], 6) + 0.0  # chains of integrators leave rounding about the origin
         states = ", ".join(part.state_labels[i] for i in order if abs(vectors[i, worst]) > 0.1)
         raise SwashError(

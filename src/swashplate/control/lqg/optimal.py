@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from swashplate.arrays import Array, Complex
+from swashplate.arrays import Array, Complex, largest_first
 from swashplate.errors import ControllerError
 from swashplate.filtering.riccati import gain_at, settled_covariance, through
 
@@ -102,7 +102,7 @@ def _turned_real(vector: Any) -> Array:
 
 def shares(vector: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
     """The states that take part in a direction most, largest first."""
-    order = np.argsort(-np.abs(vector), kind="stable")
+    order = largest_first(np.abs(vector))
     return tuple((names[i], float(vector[i])) for i in order if abs(vector[i]) >= _NAMED * abs(vector[order[0]]))
 
 

@@ -13,7 +13,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -135,6 +134,8 @@ def _windows(flight: Flight, length: float) -> list[Flight]:
 
 
 def _integral(values: Array, rate: float) -> Array:
+    from scipy.integrate import cumulative_trapezoid  # dear to import, and every conditioning imports this module
+
     return np.asarray(cumulative_trapezoid(values, dx=1.0 / rate, axis=0, initial=0.0), dtype=np.float64)
 
 

@@ -89,6 +89,8 @@ def plan_maneuver(
     if (noise is None) != (gain is None):
         raise ManeuverError("only one of --noise and --gain is given.", hint="The amplitude's check needs both.")
     planned = parse(maneuver) if isinstance(maneuver, str) else maneuver
+    if not planned.axes:
+        raise ManeuverError(f"a {planned.kind} moves nothing: there is nothing to plan.", channel="maneuver")
     chirp = _chirp(planned, sid_axis) if ardupilot else None
     known = ExpectedResponse(noise, gain, coherence, bandwidth, f180)
     return PlannedManeuver(planned, tuple(checks(planned, rate=rate, vehicle=known, chirp=chirp)), rate, chirp)

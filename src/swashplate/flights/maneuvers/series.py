@@ -129,6 +129,13 @@ def _units(*signs: float) -> Callable[[Maneuver, Array], list[Array]]:
     return blocks
 
 
+def _nothing(maneuver: Maneuver, time: Array) -> list[Array]:
+    """No axis is moved."""
+    return []
+
+
+HOVER = "hover"
+"""The kind that moves nothing: the time that a controller is to hold what it was told."""
 KINDS: Mapping[str, Callable[[Maneuver, Array], list[Array]]] = {
     "sweep": _sweep,
     "multisine": _multisine,
@@ -137,6 +144,7 @@ KINDS: Mapping[str, Callable[[Maneuver, Array], list[Array]]] = {
     "step": _units(1.0),
     "pulse": _units(1.0),
     "3211": _units(1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0),
+    HOVER: _nothing,
 }
 """Shapes of unit amplitude by kind; "3211" is DLR's 3-2-1-1 (Jategaonkar 2015, sec. 2.3)."""
 
@@ -167,7 +175,7 @@ def parse(text: str) -> Maneuver:
 
     Items, in any order: a band "0.5-8Hz" (sweep, multisine) or a frequency "2Hz" (sine), a time "60s" (the record of
     these three, one unit of a doublet or 3-2-1-1, the length of a step or pulse), an amplitude "0.3" (optional).
-    Several axes of a multisine are joined by "+".
+    Several axes of a multisine are joined by "+". "hover:20s" moves nothing for so long.
 
     Raises:
         ManeuverError: saying which word was not understood or is missing, with examples.
@@ -176,6 +184,8 @@ def parse(text: str) -> Maneuver:
     kind = {"3-2-1-1": "3211", "collective": "heave"}.get(kind.strip().lower(), kind.strip().lower())
     if not colon or kind not in KINDS:
         raise ManeuverError(f"'{text}' does not begin with one of {', '.join(KINDS)} and a colon.", hint=_EXAMPLE)
+    if kind == HOVER:
+        return _hover(text, rest.strip())
     axes_text, *items = (item.strip() for item in rest.split(","))
     axes = tuple("heave" if axis.strip() == "collective" else axis.strip() for axis in axes_text.split("+"))
     if not all(re.fullmatch(r"[a-z][a-z0-9_]*", axis) for axis in axes):
@@ -196,6 +206,14 @@ def parse(text: str) -> Maneuver:
     (seconds,) = said.get("time", (None,))
     (amplitude,) = said.get("amplitude", (min(DEFAULT_AMPLITUDE.get(axis, 0.1) for axis in axes),))
     return _checked(text, kind, axes, None if band is None else (band[0], band[-1]), seconds, amplitude)
+
+
+def _hover(text: str, rest: str) -> Maneuver:
+    """`hover:20s`."""
+    found = _SECONDS.fullmatch(rest)
+    if found is None or not float(found[1]) > 0.0:
+        raise ManeuverError(f"'{text}' says no time alone.", hint='A hover moves nothing: "hover:20s".')
+    return Maneuver(HOVER, (), float(found[1]), 0.0)
 
 
 def _checked(

@@ -137,7 +137,8 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
     if kept < _STEADY * np.mean(np.abs(_envelope(signal, phase, _FINDING)) ** 2):
         return None
     whole = basis(time, c) @ found
-    rises = np.diff(whole, prepend=2.0 * whole[0] - whole[1]) > 0.0
+    step = np.diff(whole, prepend=2.0 * whole[0] - whole[1])
+    rises = (step > 0.0) & (step < np.pi)  # a law carried far beyond its sweep rises beyond all that samples tell
     first, last = int(np.searchsorted(time, at[0])), int(np.searchsorted(time, at[-1]))
     begin = first - int(np.argmin(rises[first::-1])) + 1 if not rises[: first + 1].all() else 0
     end = last + int(np.argmin(rises[last:])) if not rises[last:].all() else time.size

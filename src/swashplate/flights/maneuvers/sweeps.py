@@ -245,27 +245,27 @@ def _best_path(gain: Array) -> tuple[int, NDArray[np.int64]] | None:
     """First frame and rows of the path with the largest sum of gains that never falls in frequency (Viterbi)."""
     rows, frames = gain.shape
     reach = 3  # rows a frame: 3 octaves a second
-    best = np.full(rows, 0.0)
-    came = np.full((rows, frames), -1, dtype=np.int64)
-    score, end = 0.0, None
-    for k in range(frames):
-        stacked = np.full((reach + 1, rows), -np.inf)
-        for step in range(reach + 1):
-            stacked[step, step:] = best[: rows - step]
-        choice = np.argmax(stacked, axis=0)
-        before = np.take_along_axis(stacked, choice[None, :], axis=0)[0]
+    # Sums of the paths so far, behind a margin from which none comes; [row, step] is that of `step` rows below.
+    padded = np.concatenate([np.full(reach, -np.inf), np.zeros(rows)])
+    best, below = padded[reach:], np.lib.stride_tricks.sliding_window_view(padded, reach + 1)[:, ::-1]
+    own = np.arange(rows)
+    steps = np.empty((frames, rows), dtype=np.int8)
+    tops, scores = np.empty(frames, dtype=np.int64), np.empty(frames)
+    for k, gained in enumerate(np.ascontiguousarray(gain.T)):
+        choice = below.argmax(axis=1)
+        before = below[own, choice]
         on = before > 0.0
-        came[on, k] = (np.arange(rows) - choice)[on]
-        best = np.where(on, before, 0.0) + gain[:, k]
-        top = int(np.argmax(best))
-        if best[top] > score:
-            score, end = float(best[top]), (top, k)
-    if end is None:
+        steps[k] = np.where(on, choice, -1)
+        np.add(np.where(on, before, 0.0), gained, out=best)
+        tops[k] = top = best.argmax()
+        scores[k] = best[top]
+    k = int(np.argmax(scores))
+    if scores[k] <= 0.0:
         return None
-    row, k = end
+    row = int(tops[k])
     path = [row]
-    while came[row, k] >= 0:
-        row = int(came[row, k])
+    while steps[k, row] >= 0:
+        row -= int(steps[k, row])
         k -= 1
         path.append(row)
     return k, np.asarray(path[::-1], dtype=np.int64)

@@ -29,6 +29,7 @@ from swashplate.flights.schema import is_known
 
 NAME = "ardupilot"
 VERSION = "1"
+NAMES_UNITS = True
 
 
 @dataclass(frozen=True)
@@ -112,13 +113,13 @@ def read(source: Source, options: Options) -> Flight:
     run is read.
 
     Raises:
-        FlightError: where nothing in the log can be used, or units or a mapping are given.
+        FlightError: where nothing in the log can be used, or a mapping is given.
     """
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for an ArduPilot log: its units are known.",
+            "a mapping has no meaning for an ArduPilot log: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     text = source.text
     found = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)

@@ -28,6 +28,7 @@ from swashplate.flights.readers.source import Source
 
 NAME = "blackbox"
 VERSION = "1"
+NAMES_UNITS = True
 _KINDS = {14: "message", 15: "disarmed", 30: "mode"}
 
 
@@ -42,14 +43,14 @@ def read(source: Source, options: Options) -> Flight:
     What is damaged is left out and said: see `Provenance.damage`.
 
     Raises:
-        FlightError: where the header says what cannot be, or nothing in the log can be used, or units or a mapping are
+        FlightError: where the header says what cannot be, or nothing in the log can be used, or a mapping is
             given.
     """
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for a Blackbox log: its units are known.",
+            "a mapping has no meaning for a Blackbox log: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     start, stop, number, note = _chosen(source, options.log)
     header = read_header(source.content, start, stop, where=source.name)

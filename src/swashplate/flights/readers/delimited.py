@@ -14,16 +14,18 @@ A mapping file is TOML; with one, only the channels it names are read:
 A value inside is (cell * factor + offset), then converted from `unit`. Axes are not turned: a CSV log is expected in
 the schema's own axes (NED, FRD), or brought there with factors of -1.
 
-Time is read digit by digit, so that Unix time in seconds, milliseconds or nanoseconds loses nothing, or as ISO 8601
-(2026-03-05T14:20:01.25Z). `time [s since 2026-03-05T14:20:00Z]` says where zero lies.
+A header's time column is `time` in any case, or `t` where there is none; a column that is nearly a channel's name gets
+a note. Time is read digit by digit, so that Unix time in seconds, milliseconds or nanoseconds loses nothing, or as
+ISO 8601 (2026-03-05T14:20:01.25Z). `time [s since 2026-03-05T14:20:00Z]` says where zero lies.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -35,12 +37,14 @@ from swashplate.flights.flight import Flight, stream
 from swashplate.flights.readers import checks, tables
 from swashplate.flights.readers.options import Options
 from swashplate.flights.readers.source import Source
-from swashplate.flights.schema import LOGGED_UNIT, channel, is_known
+from swashplate.flights.schema import CHANNELS, LOGGED_UNIT, channel, is_known
+from swashplate.registry import nearest
 
 NAME = "csv"
 VERSION = "1"
 
 _HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))?$", re.DOTALL)
+_TIME_NAMES = ("time", "t")  # in the order in which a header is asked for them; "T" is a temperature
 _COLUMN_KEYS = {"column", "unit", "factor", "offset"}
 _MAPPING_KEYS = {"delimiter", "header", "channels", "mocap", "rate"}
 
@@ -86,7 +90,47 @@ def _from_header(header: Sequence[str], source: Source) -> dict[str, _Column]:
                 "the name stands twice in the header.", where=source.name, channel=name, hint="Rename one of them."
             )
         columns[name] = _Column(index, unit)
-    return columns
+    stamped = _time_name(columns)
+    return {"time" if name == stamped else name: column for name, column in columns.items()}
+
+
+def _time_name(names: Iterable[str]) -> str | None:
+    """The column of a header that holds time: `time`, in other case only where no column is `time`, else `t`."""
+    every = list(names)
+    others = [name for name in every if name.lower() == "time"]
+    asked = [*_TIME_NAMES[:1], *(others if len(others) == 1 else ()), *_TIME_NAMES[1:]]
+    return next((name for name in asked if name in every), None)
+
+
+def _time_hint(names: Iterable[str]) -> str:
+    """What to do where no column holds time."""
+    like = [
+        name for name in names if name.lower() == "t" or get_close_matches(name.lower(), ("time", "timestamp"), n=1)
+    ]
+    asked = f"Did you mean {' or '.join(map(repr, like))}? " if like else ""
+    return f"{asked}Name it 'time [s]' in the header, or in a mapping file."
+
+
+def _units_of(options: Options, columns: Mapping[str, _Column], header: Sequence[str] | None) -> dict[str, str]:
+    """Units by channel; a unit that is given for the time column's own name in the header is the time's."""
+    given = dict(options.units)
+    own = _time_name(_split(cell)[0] for cell in header or ()) if not options.mapping else None
+    if own in given and own not in columns:
+        given.setdefault("time", given[own])
+        del given[own]
+    return given
+
+
+def _near_misses(names: Iterable[str]) -> tuple[str, ...]:
+    """Notes on columns that are no channel of the schema and differ from one by case or by a letter or two."""
+    every = list(names)
+    absent = [known for known in CHANNELS if known not in every]
+    notes = []
+    for name in every:
+        near = get_close_matches(name.lower(), absent, n=1, cutoff=0.85) if not is_known(name) else []
+        if near:
+            notes.append(f"column '{name}' is not in the schema and keeps its name; did you mean '{near[0]}'?")
+    return tuple(notes)
 
 
 def _number_of(entry: Mapping[str, Any], key: str, default: float, *, name: str, where: str) -> float:
@@ -217,6 +261,7 @@ def read(source: Source, options: Options) -> Flight:
             hint="Add a header such as 'time [s],phi [deg]', or use a mapping file with header = false.",
         )
     columns = _from_mapping(options, header, source) if options.mapping else _from_header(header or [], source)
+    options = replace(options, units=_units_of(options, columns, header))
     rate = options.mapping.get("rate")
     if rate is not None and (isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf):
         raise FlightError(f"rate = {rate!r} in the mapping is not a positive number.", where=source.name)
@@ -225,7 +270,7 @@ def read(source: Source, options: Options) -> Flight:
             f"there is no time column; found {', '.join(columns) or 'nothing'}.",
             where=source.name,
             channel="time",
-            hint="Name it 'time [s]' in the header, or in a mapping file.",
+            hint=_time_hint(columns),
         )
     unknown = set(options.units) - set(columns)
     if unknown:
@@ -233,7 +278,7 @@ def read(source: Source, options: Options) -> Flight:
             f"units are given for a column that the file lacks; it has {', '.join(columns)}.",
             where=source.name,
             channel=", ".join(sorted(unknown)),
-            hint="Correct the name that the unit is given for.",
+            hint=nearest(min(unknown), columns) or "Correct the name that the unit is given for.",
         )
     iso = "time" in columns and bool(rows) and _is_date(rows[0], columns["time"].index)
     _check_units({name: c for name, c in columns.items() if not (iso and name == "time")}, options, source)
@@ -264,7 +309,7 @@ def read(source: Source, options: Options) -> Flight:
     keep, dropped = checks.usable(time, where=source.name, bad_stamps=options.bad_stamps)
     channels = {name: values[keep] for name, values in channels.items()}
     foreign = {name: labels[name] for name in channels if not is_known(name)}
-    notes = (*filter(None, (dropped,)), *checks.constant_notes(channels))
+    notes = (*filter(None, (dropped,)), *_near_misses(channels), *checks.constant_notes(channels))
     log = stream(time[keep], channels, foreign)
     for name in channels:
         unit = options.units.get(name, columns[name].unit)

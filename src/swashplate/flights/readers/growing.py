@@ -10,6 +10,7 @@ from swashplate.flights.readers.source import Source
 
 NAME = "growing"
 VERSION = "1"
+NAMES_UNITS = True
 
 
 def recognises(source: Source) -> bool:
@@ -20,12 +21,12 @@ def read(source: Source, options: Options) -> Flight:
     """The flight up to the last whole sample, with the provenance it was begun with.
 
     Raises:
-        FlightError: where its head is damaged, or units or a mapping are given.
+        FlightError: where its head is damaged, or a mapping is given.
     """
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for a recording of swashplate: its units are known.",
+            "a mapping has no meaning for a recording of swashplate: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     return growing.parse(source.content, where=source.name)

@@ -9,6 +9,7 @@ from swashplate.flights.readers.source import Source
 
 NAME = "netcdf"
 VERSION = "1"
+NAMES_UNITS = True
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _CLASSIC = b"CDF"
@@ -23,16 +24,16 @@ def read(source: Source, options: Options) -> Flight:
     """The flight as it was saved, with the provenance it was saved with.
 
     Raises:
-        FlightError: where it is no netCDF file that swashplate wrote, or where units or a mapping are given.
+        FlightError: where it is no netCDF file that swashplate wrote, or where a mapping is given.
     """
     if source.content.startswith(_CLASSIC):
         raise FlightError(
             "is a classic netCDF file, not one that swashplate wrote.", where=source.name, hint="Export it as CSV."
         )
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for a swashplate netCDF file: its units are known.",
+            "a mapping has no meaning for a swashplate netCDF file: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     return Flight.load(source.path)

@@ -23,6 +23,7 @@ from swashplate.flights.readers.source import Source
 
 NAME = "px4log"
 VERSION = "1"
+NAMES_UNITS = True
 
 # message -> (stream, field -> (channel, unit)); a quantity that an earlier message gave is left out.
 _MESSAGES: Mapping[str, tuple[str, Mapping[str, tuple[str, str]]]] = {
@@ -66,13 +67,13 @@ def read(source: Source, options: Options) -> Flight:
     """A log of early PX4 firmware as a flight: one stream a message; parameters and firmware in the provenance.
 
     Raises:
-        FlightError: where nothing in the log can be used, or units or a mapping are given.
+        FlightError: where nothing in the log can be used, or a mapping is given.
     """
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for a PX4 log: its units are known.",
+            "a mapping has no meaning for a PX4 log: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     found = dataflash.messages(source.content)
     notes: list[str] = list(found.notes)

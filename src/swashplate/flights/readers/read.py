@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 from swashplate.errors import FlightError
@@ -11,6 +12,7 @@ from swashplate.flights import datasets
 from swashplate.flights.epoch import rebased
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers import analogue, blackbox
+from swashplate.flights.readers.given_units import with_units
 from swashplate.flights.readers.options import Options, load_mapping
 from swashplate.flights.readers.source import Source, open_source
 from swashplate.flights.readers.windows import cut, split_log, split_window
@@ -18,7 +20,11 @@ from swashplate.registry import Registry
 
 
 class Reader(Protocol):
-    """What a reader module offers."""
+    """What a reader module offers.
+
+    One whose logs name their own units may say `NAMES_UNITS = True`: it gets no units, and those that a user gives are
+    applied to what it read.
+    """
 
     NAME: str
     VERSION: str
@@ -157,6 +163,9 @@ def _whole(
     for name in (*(name for name in READERS if name != _LAST), _LAST):
         reader = READERS[name]
         if reader.recognises(source):
+            if getattr(reader, "NAMES_UNITS", False):
+                flight = reader.read(source, replace(options, units={}))
+                return rebased(with_units(flight, options.units, where=source.name))
             return rebased(reader.read(source, options))
     raise FlightError(
         f"is no flight log that is known; it starts with {source.content[:8]!r}.",

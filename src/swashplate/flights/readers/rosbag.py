@@ -25,6 +25,7 @@ from swashplate.flights.schema import QUATERNION
 
 NAME = "rosbag"
 VERSION = "1"
+NAMES_UNITS = True
 
 Row = dict[str, float]
 
@@ -101,9 +102,9 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where rosbags is not installed, the bag cannot be opened, or nothing in it can be used.
     """
     options = with_mocap_table(options)
-    if options.units or set(options.mapping) - {"mocap"}:
+    if set(options.mapping) - {"mocap"}:
         raise FlightError(
-            "units and channel mappings have no meaning for a ROS bag: its units are known.",
+            "a mapping of channels has no meaning for a ROS bag: its channels are known.",
             where=source.name,
             hint="Leave them out; world_axes and body_axes may be given.",
         )

@@ -34,9 +34,16 @@ def rows_of(text: str, *, where: str, delimiter: str | None = None) -> list[list
     if chosen == " ":
         return [line.split() for line in text.splitlines()]
     try:
-        return [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text, newline=""), delimiter=chosen)]
+        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=chosen))
+        first = 1 if _is_bare(text.partition("\n")[2]) else len(rows)
+        return [[cell.strip() for cell in row] for row in rows[:first]] + rows[first:]
     except (csv.Error, TypeError) as error:  # TypeError: a delimiter that is not one character
         raise FlightError(f"does not read as a table: {error}.", where=where, hint="Export it again.") from None
+
+
+def _is_bare(text: str) -> bool:
+    """Whether there is no space about any cell, as in a large table of numbers; a quoted line end counts as one."""
+    return text.isascii() and not any(mark in text for mark in ' \t\v\f\x1c\x1d\x1e\x1f"')
 
 
 def number(cell: str) -> float:
@@ -59,9 +66,14 @@ def column(rows: Sequence[Sequence[str]], index: int, *, name: str, where: str, 
     Raises:
         FlightError: where a cell is not a number, naming its line.
     """
+    cells = [row[index] if index < len(row) else "" for row in rows]
+    try:
+        if "_" not in "".join(cells):  # see `number`
+            return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
+    except ValueError:  # a blank, or what is no number: which one is told below
+        pass
     values = np.empty(len(rows))
-    for i, row in enumerate(rows):
-        cell = row[index] if index < len(row) else ""
+    for i, cell in enumerate(cells):
         try:
             values[i] = number(cell)
         except ValueError:

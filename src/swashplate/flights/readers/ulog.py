@@ -30,6 +30,7 @@ from swashplate.flights.schema import QUATERNION
 
 NAME = "ulog"
 VERSION = "1"
+NAMES_UNITS = True
 
 _LARGEST = 65535  # bytes of a message: its size is two bytes
 _ARMED = 2
@@ -107,13 +108,13 @@ def read(source: Source, options: Options) -> Flight:
     """A ULog file as a flight: one stream a topic; parameters, messages and dropouts in the provenance.
 
     Raises:
-        FlightError: where pyulog is not installed, nothing in the log can be used, or units or a mapping are given.
+        FlightError: where pyulog is not installed, nothing in the log can be used, or a mapping is given.
     """
-    if options.units or options.mapping:
+    if options.mapping:
         raise FlightError(
-            "units and mappings have no meaning for a ULog file: its units are known.",
+            "a mapping has no meaning for a ULog file: its channels are known.",
             where=source.name,
-            hint="Leave them out.",
+            hint="Leave it out.",
         )
     whole = whole_messages(source.content)
     log = _decoded(whole.content, source.name)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.core import stopping
 from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
 
 _FARTHEST, _STEP, _APART = 3.0, 0.2, 0.6
@@ -30,7 +31,7 @@ def minimise_over_valleys(
     """
     best = minimise(likelihood, iterations=iterations, together=together, progress=progress)
     for place in np.flatnonzero(likelihood.row.column("kinked") > 0.0):
-        start = _elsewhere(likelihood, best, int(place))
+        start = None if stopping.asked() else _elsewhere(likelihood, best, int(place))
         if start is None:
             continue
         done = len(best.history)

@@ -135,7 +135,7 @@ class Result(Shown, Generic[Model, Details]):
             residuals and is NaN where the method has none.
         correlation: of the free parameters (p, p).
         history: cost after each iteration.
-        converged: False where the iterations ran out.
+        converged: False where the iterations ran out or were stopped.
         problems: what is wrong with the fit, in words; a fit with values that physics forbids is a failed fit.
         failed: True where the numbers must not be used.
         warnings: what a reader must know.

@@ -13,6 +13,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.identification.core import stopping
 from swashplate.identification.core.parameter_row import Row
 
 Progress = Callable[[int, float], None]
@@ -47,7 +48,7 @@ class Optimum:
         cost: negative log-likelihood with priors.
         history: cost after each iteration.
         information: Fisher information of the data alone, scaled.
-        converged: False where the iterations ran out.
+        converged: False where the iterations ran out, or a stop ended them (`stopping`).
         at_bound: names of entries that ended on a bound.
     """
 
@@ -101,62 +102,95 @@ def minimise(
     row_of = likelihood.row
     low, high = row_of.bounds()
     row = np.clip(row_of.starts() if start is None else np.array(start, dtype=np.float64), low, high)
-    likelihood.refresh(row)
-    cost, gradient, information = _posterior(likelihood, row)
-    if not np.isfinite(cost):
+    try:
+        at = _point(likelihood, row)
+    except stopping.INTERRUPTS as interrupt:  # an earlier search of this fit may have found something
+        stopping.keep(interrupt)
+        at = _point(likelihood, row)
+    if not np.isfinite(at.cost):
         raise IdentificationError(
             "the model diverges from the flight at the first guess.",
             hint="Check units and signs with 'swash inspect', or start from a card that flies.",
         )
-    history, damping, caution, converged = [cost], 1e-2, 1e-2, False
+    history, damping, caution, converged = [at.cost], 1e-2, 1e-2, False
     small = 0
-    kinked = row_of.column("kinked") > 0.0
-    reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
     for iteration in range(iterations):
-        found = None
-        options = [(damping, caution)]
-        while found is None and damping < _HOPELESS:
-            tried = []
-            for each, careful in options:
-                weights = np.where(kinked, max(each, careful), each)
-                step = _step(row, gradient, information[1], weights, low, high)
-                step = _within(reach, step, gradient, information[1], together=together)
-                if around:
-                    within = np.maximum(low - row, -reach), np.minimum(high - row, reach)
-                    step = _held(within, step, gradient, information[1], weights)
-                trial = np.clip(row + step, low, high)
-                trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
-                if np.isfinite(trial_cost) and trial_cost < cost:
-                    tried.append((trial_cost, trial, each, careful))
-            if tried:
-                found = min(tried, key=lambda one: one[0])
-                break
-            # Either all went too far, or a kinked entry did, which then stands still while the others go on.
-            if len(options) > 1:
-                damping, caution = 10.0 * damping, min(100.0 * caution, _STILL)
-            options = [(10.0 * damping, caution)]
-            if kinked.any() and caution < _STILL:
-                options.append((damping, min(100.0 * caution, _STILL)))
-            else:
-                damping *= 10.0
-        if found is None:
-            converged = True  # no direction goes down any more
+        if stopping.asked():
             break
-        gained, row = cost - found[0], found[1]
-        damping, caution = max(found[2] / 10.0, 1e-12), max(found[3] / 10.0, 1e-12)
-        likelihood.refresh(row)
-        cost, gradient, information = _posterior(likelihood, row)
-        history.append(cost)
-        if progress is not None:
-            progress(iteration + 1, cost)
+        try:
+            found = _descent(likelihood, at, damping, caution, together=together, around=around)
+            if found is None:
+                converged = True  # no direction goes down any more
+                break
+            gained = at.cost - found[0]
+            damping, caution = max(found[2] / 10.0, 1e-12), max(found[3] / 10.0, 1e-12)
+            at = _point(likelihood, found[1])
+            history.append(at.cost)
+            stopping.counted()
+            if progress is not None:
+                progress(iteration + 1, at.cost)
+        except stopping.INTERRUPTS as interrupt:
+            stopping.keep(interrupt)
+            likelihood.refresh(at.row)
+            break
         # One small gain may only mean a short, damped step; three in a row mean that nothing is left.
         small = small + 1 if gained < tolerance else 0
         if small and (damping <= _NEWTON or small == 3):
             converged = True
             break
-    touching = (row <= low + 1e-9) | (row >= high - 1e-9)
+    touching = (at.row <= low + 1e-9) | (at.row >= high - 1e-9)
     at_bound = tuple(name for name, touch in zip(row_of.names, touching, strict=True) if touch)
-    return Optimum(row, cost, tuple(history), information[0], converged, at_bound)
+    return Optimum(at.row, at.cost, tuple(history), at.information[0], converged, at_bound)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A row with its cost, gradient and information, the data's and the posterior's."""
+
+    row: Array
+    cost: float
+    gradient: Array
+    information: tuple[Array, Array]
+
+
+def _point(likelihood: Likelihood, row: Array) -> _Point:
+    likelihood.refresh(row)
+    return _Point(row, *_posterior(likelihood, row))
+
+
+def _descent(
+    likelihood: Likelihood, at: _Point, damping: float, caution: float, *, together: bool, around: bool
+) -> tuple[float, Array, float, float] | None:
+    """The next row with its cost, and the damping and caution that led there; None where nothing goes down."""
+    row_of, row, gradient, information = likelihood.row, at.row, at.gradient, at.information
+    low, high = row_of.bounds()
+    kinked = row_of.column("kinked") > 0.0
+    reach = np.array([_LARGEST_STEP[entry.group] for entry in row_of.entries])
+    options = [(damping, caution)]
+    while damping < _HOPELESS:
+        tried = []
+        for each, careful in options:
+            weights = np.where(kinked, max(each, careful), each)
+            step = _step(row, gradient, information[1], weights, low, high)
+            step = _within(reach, step, gradient, information[1], together=together)
+            if around:
+                within = np.maximum(low - row, -reach), np.minimum(high - row, reach)
+                step = _held(within, step, gradient, information[1], weights)
+            trial = np.clip(row + step, low, high)
+            trial_cost = likelihood.cost(trial) + row_of.prior(trial)[0]
+            if np.isfinite(trial_cost) and trial_cost < at.cost:
+                tried.append((trial_cost, trial, each, careful))
+        if tried:
+            return min(tried, key=lambda one: one[0])
+        # Either all went too far, or a kinked entry did, which then stands still while the others go on.
+        if len(options) > 1:
+            damping, caution = 10.0 * damping, min(100.0 * caution, _STILL)
+        options = [(10.0 * damping, caution)]
+        if kinked.any() and caution < _STILL:
+            options.append((damping, min(100.0 * caution, _STILL)))
+        else:
+            damping *= 10.0
+    return None
 
 
 def _within(reach: Array, step: Array, gradient: Array, hessian: Array, *, together: bool) -> Array:

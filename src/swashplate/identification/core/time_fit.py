@@ -10,7 +10,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.identification.core import accuracy
+from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameter_row import Row
@@ -257,7 +257,7 @@ def _problems(row: Row, optimum: Optimum, k: int) -> tuple[str, ...]:
 
 
 def _words(parameters: Sequence[Estimate], optimum: Optimum) -> tuple[str, ...]:
-    words = [] if optimum.converged else ["the iterations ran out."]
+    words = [] if optimum.converged else [stopping.unfinished()]
     vague = [p.name for p in parameters if not p.sigma_percent <= VAGUE]
     if vague:
         words.append(f"standard deviation above {VAGUE:g} %: {', '.join(vague)}; the records hardly tell them.")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.records import Record
+
+Moved = tuple[NDArray[np.intp], Array, Array]
+"""Places of entries (m,), errors of a record (n_t, n_outputs), their slopes by those entries (m, n_t, n_outputs)."""
 
 _FIRST_GAIN = 0.3
 _DIVERGED = 1e9
@@ -93,8 +97,8 @@ class TimeErrors(ABC):
         """Errors of every record, one after the other, (n_t, n_outputs)."""
 
     @abstractmethod
-    def _with_slopes(self, row: Array) -> tuple[Array, Array]:
-        """The same and their slopes by every scaled entry, (n_entries, n_t, n_outputs)."""
+    def _moved(self, row: Array) -> Iterator[Moved]:
+        """Of each record: places of the entries that move its errors, the errors, their slopes by those entries."""
 
     @abstractmethod
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
@@ -128,12 +132,15 @@ class TimeErrors(ABC):
         return 0.5 * len(errors) * float(np.linalg.slogdet(self._covariance(errors))[1])
 
     def scores(self, row: Array) -> tuple[float, Array, Array]:
-        plain, slopes = self._with_slopes(row)
-        metric = np.linalg.inv(self.covariance)
-        weighted = slopes @ metric
-        gradient = np.einsum("pti,ti->p", weighted, plain)
-        information = np.einsum("pti,qti->pq", weighted, slopes, optimize=True)
-        return self._cost(plain), gradient, information
+        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        gradient, information = np.zeros(len(self._row)), np.zeros((len(self._row), len(self._row)))
+        every = []
+        for places, errors, slopes in self._moved(row):
+            white = (slopes.reshape(-1, errors.shape[1]) @ inverse.T).reshape(places.size, -1)
+            gradient[places] += white @ (errors @ inverse.T).ravel()
+            information[np.ix_(places, places)] += white @ white.T
+            every.append(errors)
+        return self._cost(np.concatenate(every)), gradient, information
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
     def _by_record(self, every: Array) -> list[Array]:
@@ -142,14 +149,14 @@ class TimeErrors(ABC):
 
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
         """Per record: whitened errors (n, outputs) and their sensitivities (p, n, outputs); no other information."""
-        plain, slopes = self._with_slopes(row)
-        Li = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        moved = self._by_record(np.moveaxis(slopes @ Li.T, 0, 1))
-        return (
-            self._by_record(plain @ Li.T),
-            [np.moveaxis(part, 1, 0) for part in moved],
-            np.zeros((len(self._row), len(self._row))),
-        )
+        inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
+        plain, moved = [], []
+        for places, errors, slopes in self._moved(row):
+            whole = np.zeros((len(self._row), *errors.shape))
+            whole[places] = (slopes.reshape(-1, errors.shape[1]) @ inverse.T).reshape(slopes.shape)
+            plain.append(errors @ inverse.T)
+            moved.append(whole)
+        return plain, moved, np.zeros((len(self._row), len(self._row)))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside what the model predicts: from its inputs alone, or one sample ahead with a gain."""

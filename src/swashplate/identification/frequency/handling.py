@@ -12,7 +12,11 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.identification.responses.crossing_delays import crossing_delays
 from swashplate.identification.responses.frequency_response import FrequencyResponse, decibel
+
+_STEP = 0.1
+"""Of a random error, to either side, where its effect is read by differences."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +60,20 @@ class ResponseMargins:
     Attributes:
         crossover: frequency of unit gain [rad/s]. phase_margin: there, -180 to 180 [deg].
         omega_180: frequency of -180 degrees, or whole turns further [rad/s]. gain_margin: there [dB].
+        delay_margin: the least further delay that destabilises [s], at whichever crossing; 0 where a stable plant's
+            loop is unstable already.
     """
 
     crossover: ReadNumber
     phase_margin: ReadNumber
     omega_180: ReadNumber
     gain_margin: ReadNumber
+    delay_margin: ReadNumber
+
+    def delay_in_words(self) -> str:
+        """In milliseconds, or that the loop is unstable as it is."""
+        r = self.delay_margin
+        return "0, it is unstable" if r.value == 0.0 else repr(ReadNumber(1e3 * r.value, 1e3 * r.sigma))
 
 
 @dataclass(frozen=True)
@@ -189,7 +201,7 @@ def _phase_delays(curve: _Curve, w180: float) -> tuple[ReadNumber, ReadNumber]:
 
 
 def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> ResponseMargins:
-    """Crossover, phase and gain margin of a broken loop L, negative feedback (unit gain at -180 degrees is the limit).
+    """Crossover and margins of phase, gain and delay of a broken loop L with negative feedback.
 
     Args:
         omega: [rad/s].
@@ -217,7 +229,28 @@ def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Respo
         slide = curve.slope(curve.gain, at) * curve.sigma(at)
         spread = 20.0 * np.log10(1.0 + curve.at(curve.error, at))
         gm = ReadNumber(-curve.at(curve.gain, at), float(np.hypot(spread, slide)))
-    return ResponseMargins(cross, pm, phase_cross, gm)
+    return ResponseMargins(cross, pm, phase_cross, gm, _delay_margin(omega, loop, error))
+
+
+def _delay_margin(omega: Array, loop: Complex, error: Array | None) -> ReadNumber:
+    """With what the random error makes of it, by its part along the loop and its part across."""
+    value = _least_delay(omega, loop)
+    if error is None or not value > 0.0:
+        return ReadNumber(value)
+    step = _STEP * error
+    moved = [_least_delay(omega, loop * np.exp(way * step)) for way in (1.0, -1.0, 1j, -1j)]
+    return ReadNumber(value, float(np.hypot(moved[0] - moved[1], moved[2] - moved[3]) / (2.0 * _STEP)))
+
+
+def _least_delay(omega: Array, loop: Complex) -> float:
+    """[s]; NaN where the gain never is one, 0 where Nyquist's count of a stable plant says unstable."""
+    curve = _attitude_phase(_curve(omega, loop, None, None))
+    # Net passes through -180 degrees (and whole turns further) with a gain above one; the start counts from the first.
+    turns, above = np.floor((curve.phase + 180.0) / 360.0), curve.gain > 0.0
+    if turns[0] * above[0] + np.sum(np.diff(turns)[above[:-1] & above[1:]]) != 0.0:
+        return 0.0
+    found = crossing_delays(curve.omega, np.asarray(loop)[np.isfinite(loop)][:, None, None])
+    return float(found[0]) if found.size else float("nan")
 
 
 def _wrapped(degrees: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from swashplate.identification.frequency.fitted_pairs import TWINS
-from swashplate.models.linear.composition import PREFIX, nonsense, parts_of
+from swashplate.models.linear.composition import PREFIX, nonsense, pairs_of, parts_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.structure_parts import INPUTS, PARTS
 
@@ -90,10 +90,11 @@ def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
         best = ["flap", *(name for name in best if name != "flap")]
     named = ", ".join(f"'{name}' ({found[name][0]})" for name in best[:_MOST])
     text = f" The parts that may be lacking are {named}."
-    if model.document.get("composed"):
+    if composed := str(model.document.get("composed", "")):
         first = best[0]
         kept = [p for p in parts if not (first == "flap" and p == "flap_decoupled")]
-        text += f" Try {PREFIX}{'+'.join(p for p in PARTS if p in (*kept, first))}, or --search."
+        whole = [*(p for p in PARTS if p in (*kept, first)), *pairs_of(composed)]
+        text += f" Try {PREFIX}{'+'.join(whole)}, or --search."
     else:
         text += " Compose one with it (swash structures list), or let --search find the parts."
     return text

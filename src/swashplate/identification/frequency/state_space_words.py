@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.core import stopping
 from swashplate.identification.core.result import Estimate
 from swashplate.identification.frequency.response_cost import ACCEPTABLE, Target
 
@@ -33,7 +34,7 @@ def words(
         parameters: all of the model. correlation: of those that moved, in their order.
         at_bound: parameters that ended on a bound. converged: False where the iterations ran out.
     """
-    found = [] if converged else ["the iterations ran out."]
+    found = [] if converged else [stopping.unfinished()]
     poor = [f"{t.name} ({cost:.0f})" for t, cost in zip(targets, costs, strict=True) if cost > ACCEPTABLE]
     if poor:
         found.append(f"J above {ACCEPTABLE:g}: {', '.join(poor)}.")

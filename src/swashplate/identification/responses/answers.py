@@ -48,11 +48,12 @@ def _shares(piece: Signals, n_in: int, n_out: int) -> list[tuple[float, float] |
     values = np.asarray(piece.values[:, : n_in + n_out], dtype=np.float64)
     if len(values) < 20 * reach:
         return [None] * n_in
-    targets = values[reach:-reach, :n_in]
+    # A row for every step: those between say the same again.
+    targets = values[reach:-reach:step, :n_in]
 
     def shifted(shifts: Sequence[int]) -> Array:
         last = len(values) - reach
-        return np.concatenate([values[reach + k : last + k, n_in:] for k in shifts], axis=1)
+        return np.concatenate([values[reach + k : last + k : step, n_in:] for k in shifts], axis=1)
 
     past = _explained(targets, shifted(range(-reach, 1, step)))
     later = _explained(targets, shifted(range(step, reach + 1, step)))

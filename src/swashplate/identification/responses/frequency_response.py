@@ -12,6 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
+from swashplate.extras import library
 from swashplate.identification.core.sources import DataSource, sources_named
 from swashplate.identification.responses import response_file
 from swashplate.public import resolve
@@ -133,8 +134,7 @@ class FrequencyResponse:
     # ---- other programs ----------------------------------------------------------------------------------------
     def to_control(self) -> Any:
         """The responses as a `control.FRD` of python-control (coherence and errors stay behind)."""
-        import control
-
+        control = library("control", what="to_control")
         data = np.moveaxis(self.response, 0, -1)
         # python-control's plots fail on responses without a name.
         return control.frd(data, self.omega, inputs=list(self.inputs), outputs=list(self.outputs), name="responses")

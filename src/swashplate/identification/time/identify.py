@@ -11,7 +11,7 @@ from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
-from swashplate.identification.core import accuracy
+from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
@@ -127,7 +127,7 @@ def identify_flight(
         details=FlightDetails(axes),
         history=optimum.history,
         converged=optimum.converged,
-        problems=(*problems, *notes, *(() if optimum.converged else ("the iterations ran out",))),
+        problems=(*problems, *notes, *(() if optimum.converged else (stopping.unfinished(),))),
         failed=bool(problems),
         comparisons=likelihood.comparisons(row),
         data=sources_of(flights),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy.optimize import minimize
 
 from swashplate.arrays import Array
+from swashplate.identification.core import stopping
 from swashplate.identification.core.scoring import Optimum, Progress
 from swashplate.identification.time.output_error import OutputError
 
@@ -26,6 +25,7 @@ def minimise_squares(likelihood: OutputError, *, progress: Progress | None = Non
     places = row.places("parameter")
     low, high = row.bounds()
     history: list[float] = []
+    ends: list[Array] = []
 
     def cost(moved: Array) -> float:
         full = start.copy()
@@ -33,22 +33,30 @@ def minimise_squares(likelihood: OutputError, *, progress: Progress | None = Non
         value = likelihood.cost(full) + row.prior(full)[0]
         return value if np.isfinite(value) else 1e12
 
-    def told(moved: Any) -> None:
-        history.append(cost(np.asarray(moved)))
+    def told(moved: Array) -> None:
+        ends.append(np.array(moved, dtype=np.float64))
+        history.append(cost(ends[-1]))
+        stopping.counted()
         if progress is not None:
             progress(len(history), history[-1])
 
     limit = _EVALUATIONS_PER_PARAMETER * places.size
     options = {"maxfev": limit, "xatol": 1e-3, "fatol": 1e-2}
-    answer = minimize(cost, start[places], method="Nelder-Mead", callback=told, options=options)
+    last, converged = start[places], False
+    try:
+        answer = minimize(cost, last, method="Nelder-Mead", callback=told, options=options)
+        last, converged = answer.x, bool(answer.success)
+    except stopping.INTERRUPTS as interrupt:
+        stopping.keep(interrupt)
+        last = ends[-1]
     best = start.copy()
-    best[places] = np.clip(answer.x, low[places], high[places])
+    best[places] = np.clip(last, low[places], high[places])
     touching = (best <= low + 1e-9) | (best >= high - 1e-9)
     return Optimum(
         row=best,
-        cost=float(answer.fun),
+        cost=float(cost(best[places])),
         history=tuple(history),
         information=likelihood.scores(best)[2],
-        converged=bool(answer.success),
+        converged=converged,
         at_bound=tuple(name for name, touch in zip(row.names, touching, strict=True) if touch),
     )

@@ -8,7 +8,7 @@ is that of continuous time: there a constraint has to keep the gain from passing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,7 +25,7 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Layout, Parameterization
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.time_likelihood import TimeErrors, gain_entries, gust_entries
+from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
@@ -147,14 +147,12 @@ class VehicleErrors(TimeErrors):
         parts = [_errors(p, given, d, numbers) for p, d in zip(self._plans, self._data, strict=True)]
         return np.concatenate([np.asarray(part) for part in parts])
 
-    def _with_slopes(self, row: Array) -> tuple[Array, Array]:
+    def _moved(self, row: Array) -> Iterator[Moved]:
         numbers, scale = jnp.asarray(row * self.row.scale), jnp.asarray(self.row.scale)
-        given = self._given | {"sensors": jnp.asarray(self.covariance)}
-        parts = [_slopes(p, given, d, numbers, scale) for p, d in zip(self._plans, self._data, strict=True)]
-        return (
-            np.concatenate([np.asarray(errors) for errors, _ in parts]),
-            np.concatenate([np.asarray(slopes) for _, slopes in parts], axis=1),
-        )
+        given, every = self._given | {"sensors": jnp.asarray(self.covariance)}, np.arange(len(self.row))
+        for plan, data in zip(self._plans, self._data, strict=True):
+            errors, slopes = _slopes(plan, given, data, numbers, scale)
+            yield every, np.asarray(errors), np.asarray(slopes)
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""

@@ -6,7 +6,7 @@ Names and meanings: ArduPilot's parameter reference of Copter 4.5 (H_, ATC_, SER
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,16 @@ def parameter_file(found: Parameters, *, title: str) -> str:
     """The text of a file that SITL (`--defaults`, `--add-param-file`) and ground stations load."""
     base = " and ".join(BASES[int(found["FRAME_CLASS"])])
     head = f"# {' '.join(title.split())}: on top of ArduPilot's {base}, written by swash link ardupilot\n"
-    return head + "".join(f"{name},{round(value, 4):g}\n" for name, value in found.items())
+    return head + "".join(f"{name},{_digits(value)}\n" for name, value in found.items())
+
+
+def as_written(found: Mapping[str, float]) -> Parameters:
+    """The numbers that an autopilot has after it has read them from a file."""
+    return {name: float(_digits(value)) for name, value in found.items()}
+
+
+def _digits(value: float) -> str:
+    return f"{round(value, 4):g}"
 
 
 def _helicopter(mapping: HelicopterMapping, vehicle: Vehicle, hover: Trim) -> Parameters:

@@ -97,6 +97,8 @@ class Clock:
                 time.sleep(wait)
             start = time.perf_counter()
             with self._lock:
+                if not self._running.is_set():  # stopped during the wait: whoever saw it stand still was right
+                    break
                 self._step()
             done = time.perf_counter()
             steps += 1

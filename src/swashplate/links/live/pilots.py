@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from swashplate.arrays import Array
+from swashplate.control.kinds import kind_of
 from swashplate.control.laws.autopilot import Autopilot, autopilot, row_step
 from swashplate.control.laws.state_hold import state_hold, state_hold_step
 from swashplate.errors import ControllerError
@@ -26,7 +27,7 @@ from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE
 from swashplate.links.live.axes import STICKS, axes_of
 from swashplate.links.live.picture import picture
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.closed_loop import REFERENCES, Step
+from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
 
@@ -51,6 +52,7 @@ class Pilot:
         speed, climb, turn: what a full stick asks for where something is held [m/s], [m/s], [rad/s].
         rate: of the controller [Hz].
         title: what it is, in words.
+        delays: from command to actuator, by input [s]; None for those of a linear model, and none of another.
     """
 
     step: Step
@@ -63,24 +65,36 @@ class Pilot:
     turn: float
     rate: float = 100.0
     title: str = ""
+    delays: Array | None = None
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Those that it flies."""
+        return tuple(mode for mode in MODES if (mode, True) in self.gains)
+
+    @property
+    def decouples(self) -> bool:
+        """Whether it flies otherwise with the decoupling on than off."""
+        return any(not np.array_equal(self.gains[mode, True], self.gains[mode, False]) for mode in self.modes)
 
 
-def pilot(vehicle: Vehicle, trim: Trim, *, controller: Autopilot | None = None) -> Pilot:
+def pilot(vehicle: Vehicle, trim: Trim, *, controller: Controller | None = None) -> Pilot:
     """The law for a vehicle, from its own equations and hover.
 
     Args:
         vehicle: coaxial, single rotor or linear.
         trim: its hover.
-        controller: a designed controller of a coaxial helicopter instead of the default one.
+        controller: a designed controller instead of the default one. An autopilot flies in all modes; another one
+            in "position", where sticks move the place or the speed that it is asked for.
 
     Raises:
         ControllerError: where the controller is for another vehicle, or does not run at a whole part of 500 Hz.
     """
-    if controller is not None and controller.vehicle != vehicle.name:
-        raise ControllerError(f"is for '{controller.vehicle}', not for '{vehicle.name}'.", where=controller.model)
-    if vehicle.traits.coaxial:
-        return _coaxial(vehicle, trim, controller)
-    return _state_feedback(vehicle, trim)
+    if controller is not None:
+        kind = kind_of(controller)
+        flown = kind.about(controller, vehicle, trim)
+        return (_coaxial if kind.every_mode else _designed)(vehicle, trim, flown)
+    return _coaxial(vehicle, trim, None) if vehicle.traits.coaxial else _state_feedback(vehicle, trim)
 
 
 # ---- coaxial ---------------------------------------------------------------------------------------------------------
@@ -109,8 +123,7 @@ def _coaxial(vehicle: Vehicle, trim: Trim, controller: Autopilot | None) -> Pilo
             if mode == "attitude":  # speed is free; the lean that is kept is where the stick balances its feedback
                 chosen = chosen.with_gains(speed=0.0, speed_integral=0.0)
             gains[mode, decoupled] = np.array([*head, *travel, *chosen.gains])
-    if abs(500.0 / base.rate - round(500.0 / base.rate)) > 1e-9:
-        raise ControllerError(f"runs at {base.rate:g} Hz, expected a whole part of 500 Hz.", where=base.model)
+    _check_rate(base.rate, base.model)
     return Pilot(
         coaxial_step,
         base.memory,
@@ -133,6 +146,45 @@ def coaxial_step(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any)
     after, commands = row_step(memory, time, measured, reference, gains[_COAX_HEAD:])
     by_hand = jnp.stack([lower + heave - yaw, upper + heave + yaw, commands[2], commands[3]])
     return jnp.where(raw > 0.5, memory, after), jnp.where(raw > 0.5, by_hand, commands)
+
+
+def _check_rate(rate: float, where: str) -> None:
+    if abs(500.0 / rate - round(500.0 / rate)) > 1e-9:
+        raise ControllerError(f"runs at {rate:g} Hz, expected a whole part of 500 Hz.", where=where)
+
+
+# ---- a designed controller -------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class DesignedStep:
+    """A controller's own step, which knows no raw yaw and heave; with the specific force where it `feels`."""
+
+    step: Step
+    feels: bool
+
+    def __call__(self, memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
+        """As `Pilot.step`."""
+        return self.step(memory, time, measured, wanted[: len(REFERENCES)], gains)
+
+
+def _designed(vehicle: Vehicle, trim: Trim, controller: Controller) -> Pilot:
+    """The aircraft is as late as the controller takes it to be, where its own card says nothing."""
+    name = str(getattr(controller, "type", type(controller).__name__))
+    _check_rate(controller.rate, name)
+    axes = axes_of(vehicle, linearize(vehicle, trim))
+    gains = np.asarray(controller.gains)
+    return Pilot(
+        DesignedStep(controller.step, bool(getattr(controller.step, "feels", False))),
+        np.asarray(controller.memory),
+        {("position", on): gains for on in (True, False)},
+        axes.amplitude,
+        excited=axes.excited,
+        speed=1.0,
+        climb=0.5,
+        turn=0.8,
+        rate=controller.rate,
+        title=f"{name}, as designed",
+        delays=flown_delays(vehicle, controller),
+    )
 
 
 # ---- any other -------------------------------------------------------------------------------------------------------

@@ -11,19 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
-from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.world import World
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.closed_loop import Controller
 
 _BODY = len(RigidBody._fields)
 _SWEEP_SECONDS, _SWEEP_BAND = 30.0, (0.3, 5.0)
@@ -45,11 +44,11 @@ class LiveSession:
 
     Args:
         vehicle: what flies.
-        controller: a designed controller of a coaxial helicopter, or None.
+        controller: a designed controller, or None.
         folder: where recordings and results go; made with the first one.
     """
 
-    def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None, folder: Path) -> None:
+    def __init__(self, vehicle: Vehicle, *, controller: Controller | None, folder: Path) -> None:
         self.folder, self._controller = folder, controller
         self.lock = threading.Lock()
         self.world, self._pose = self._make(vehicle)
@@ -214,7 +213,8 @@ class LiveSession:
             "controller": world.pilot.title,
             "picture": picture(vehicle),
             "inputs": inputs_of(vehicle),
-            "modes": list(MODES),
+            "modes": list(world.pilot.modes),
+            "decoupling": world.pilot.decouples,
             "voltages": None if world.nominal_voltage is None else _voltages(world.nominal_voltage),
             "rate": 1.0 / world.period,
             "folder": str(self.folder),
@@ -226,6 +226,7 @@ class LiveSession:
             now, setting, left = self.world.moment(), self.world.setting, self.world.maneuver_left
             recorded = None if self.world.rows is None else len(self.world.rows) * self.world.period
             around, pose, vehicle = self.world.environment(), self._pose, self.world.vehicle
+            runs = self.clock.runs  # with the time that stands still, where it does
         crafts = {}
         for name, (x, u) in now.crafts.items():
             parts = pose(x.tolist(), u.tolist(), around)
@@ -241,7 +242,7 @@ class LiveSession:
             "stick": now.stick_number,
             "trouble": now.trouble or ("" if failed is None else f"The simulation stopped: {failed}"),
             "notice": self.notice,
-            "runs": self.clock.runs,
+            "runs": runs,
             "speed": self.speed,
             "steps": time.steps,
             "late": time.late,

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
-from swashplate.control.laws.autopilot import Autopilot
-from swashplate.errors import SwashError
+from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.picture import picture
@@ -23,13 +22,14 @@ from swashplate.models.delays import input_delays
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.closed_loop import Controller, Step
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
     enable_double_precision,
     equations_of,
     parameter_row,
+    row_force,
     row_rates,
 )
 from swashplate.simulation.record import check_divergence
@@ -75,7 +75,11 @@ def advance(
         The row y, `past`, controller memory, and the inputs as the actuators got them (limited, excitation included).
     """
     rates = row_rates(equations, padded=True)
-    measured = jnp.concatenate([x, around[-1:]])
+    felt = []
+    if getattr(law, "feels", False):
+        now = jnp.concatenate([past[past.shape[0] - 1 - back[-1], jnp.arange(past.shape[1])], around])
+        felt = [row_force(equations)(y, now, p)]
+    measured = jnp.concatenate([x, *felt, around[-1:]])
     memory, command = law(memory, 0.0, measured, wanted, gains)
     inputs = jnp.clip(command + added, limits[0], limits[1])
     past = jnp.concatenate([past[1:], inputs[None]])
@@ -137,11 +141,11 @@ class World:
 
     Args:
         vehicle: what flies.
-        controller: a designed controller of a coaxial helicopter, or None for the default ones.
+        controller: a designed controller, or None for the default ones.
         seed: of the gusts.
     """
 
-    def __init__(self, vehicle: Vehicle, *, controller: Autopilot | None = None, seed: int = 0) -> None:
+    def __init__(self, vehicle: Vehicle, *, controller: Controller | None = None, seed: int = 0) -> None:
         enable_double_precision()
         self.vehicle = vehicle
         self._linear = vehicle.traits.linear
@@ -152,6 +156,8 @@ class World:
         self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
         self.pilot: Pilot = pilot(vehicle, self.trim, controller=controller)
         self.setting = Setting(voltage=float(around.voltage))
+        if self.setting.mode not in self.pilot.modes:
+            self.setting.mode = self.pilot.modes[-1]
         self.rows: list[Array] | None = None
         self._environment, self._seed = around, seed
         # A linear model's angles are small ones, and their rates its own.
@@ -160,7 +166,7 @@ class World:
         self._limits = np.array(vehicle.input_limits).T
         self._substeps = round(PHYSICS_RATE / self.pilot.rate)
         self.period = self._substeps / PHYSICS_RATE
-        self._back = _steps_back(vehicle, self._substeps)
+        self._back = _steps_back(vehicle, self._substeps, self.pilot.delays)
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
 
@@ -182,7 +188,13 @@ class World:
         return Craft(np.array(self.trim.state), past, np.array(self.pilot.memory), inputs)
 
     def set_mode(self, mode: Mode) -> None:
-        """Another mode in flight: it begins where the aircraft is."""
+        """Another mode in flight: it begins where the aircraft is.
+
+        Raises:
+            ControllerError: a mode that the controller does not fly.
+        """
+        if mode not in self.pilot.modes:
+            raise ControllerError(f"flies {', '.join(self.pilot.modes)} only, not {mode}.", where=self.pilot.title)
         if mode != self.setting.mode:
             self.setting.mode = mode
             for craft in self._crafts.values():
@@ -343,10 +355,12 @@ class World:
         self.reset()
 
 
-def _steps_back(vehicle: Vehicle, substeps: int) -> NDArray[np.int_]:
+def _steps_back(vehicle: Vehicle, substeps: int, delays: Array | None) -> NDArray[np.int_]:
     """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
-    late = input_delays(vehicle) if vehicle.traits.linear else {}  # the page's own pilots are tuned without
-    waits = np.array([round(late.get(name, 0.0) * PHYSICS_RATE) for name in vehicle.input_names], dtype=np.int_)
+    if delays is None:  # the page's own pilots are tuned without
+        late = input_delays(vehicle) if vehicle.traits.linear else {}
+        delays = np.array([late.get(name, 0.0) for name in vehicle.input_names])
+    waits = np.round(delays * PHYSICS_RATE).astype(np.int_)
     return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
 
 

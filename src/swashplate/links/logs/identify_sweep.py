@@ -204,6 +204,7 @@ def _gains(suggestion: Any) -> dict[str, Any]:
                 "overshoot": found.overshoot,
                 "phase_margin": _margin(figures.margins.phase_margin),
                 "gain_margin": _margin(figures.margins.gain_margin),
+                "delay_margin": [1e3 * number for number in _margin(figures.margins.delay_margin)],
                 "crossover": _margin(figures.margins.crossover),
                 "peak": figures.peak,
                 "bandwidth": figures.bandwidth,

@@ -37,6 +37,10 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
             "speed": shaken.speed,
             "words": shaken.words,
             "harmonics": [vars(harmonic) for harmonic in shaken.harmonics],
+            "notches": {
+                "words": shaken.about_notches,
+                "parameters": shaken.notches.parameters if shaken.notches else {},
+            },
         }
     except FlightError as error:
         rotor = {"channel": "", "speed": None, "words": f"{error.problem} {error.hint or ''}", "harmonics": []}

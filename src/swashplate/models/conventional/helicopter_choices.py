@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from swashplate.models.card import Card
-from swashplate.models.choices import Choice, Free
+from swashplate.models.choices import Choice, Free, PhysicalEffect
 
 _ROTOR = ("hub_stiffness", "blade_inertia", "wake_distortion")
 _WHOLE = (
@@ -40,6 +40,21 @@ def helicopter_choices(card: Card) -> Mapping[str, Choice]:
             tuple(_with_tolerance(card, name) for name in (*_WHOLE, *switched)),
         ),
     }
+
+
+def helicopter_effects(card: Card) -> Sequence[PhysicalEffect]:
+    """What nested structures may leave out: the hub's spring, the distorted wake, drag, and what options add."""
+    drag = {f"fuselage_area_{axis}": 0.0 for axis in "xyz"}
+    bar = (PhysicalEffect("stabilizer bar", {"bar_gain": 0.0}),) if card.options.get("bar", False) else ()
+    gyro = (PhysicalEffect("yaw gyro", {"gyro_gain": 0.0}),) if card.options.get("gyro", False) else ()
+    return (
+        PhysicalEffect("spring of the hub", {"hub_stiffness": 0.0}),
+        PhysicalEffect("wake distorted by pitch and roll rate", {"wake_distortion": 0.0}),
+        PhysicalEffect("drag of the fuselage", drag),
+        PhysicalEffect("profile drag that grows with thrust", {"rotor_drag_thrust": 0.0}),
+        *bar,
+        *gyro,
+    )
 
 
 def _tolerance(card: Card, name: str) -> float:

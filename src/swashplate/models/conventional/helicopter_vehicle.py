@@ -20,7 +20,7 @@ from swashplate.models.conventional.helicopter import (
     specific_force,
 )
 from swashplate.models.conventional.helicopter_checks import check_numbers, with_added
-from swashplate.models.conventional.helicopter_choices import helicopter_choices
+from swashplate.models.conventional.helicopter_choices import helicopter_choices, helicopter_effects
 from swashplate.models.conventional.helicopter_limits import doubts_by_kind, shaft_power
 from swashplate.models.conventional.helicopter_options import helicopter_options
 from swashplate.models.conventional.helicopter_parameters import UNITS, HelicopterParameters
@@ -95,6 +95,7 @@ TRAITS = Traits(
     servo_layout="swashplate",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
     choices=helicopter_choices,
+    effects=helicopter_effects,
     recording=RecordingFit(_RECORDED, longest=20.0),
     switches=("bar",),
     picture=picture,

@@ -1,5 +1,7 @@
 """Structures composed of parts: "compose:body+flap+inflow" as the document of a state-space model file.
 
+A pair among the parts ("compose:body+flap+r/pedal") gives that response a delay of its own.
+
 What the parts are is said in `structure_parts`. Quasi-steady body and first-order tip-path plane: Tischler and Remple
 2012, ch. 15, and Mettler, Tischler and Kanade 1999; inflow: Pitt and Peters 1981, Chen and Hindson 1986.
 """
@@ -28,12 +30,12 @@ def is_composed(name: object) -> bool:
 
 
 def parts_of(text: str) -> tuple[str, ...]:
-    """The parts that "compose:body+flap" names, in the order in which they are put together.
+    """The parts that "compose:body+flap" names, in the order in which they are put together; pairs are left out.
 
     Raises:
         CardError: an unknown part (with what it may stand for), or parts that make no sense together.
     """
-    given = [part.strip() for part in text.removeprefix(PREFIX).split("+")]
+    given = [part for part in _named(text) if "/" not in part]
     if not any(given):
         raise CardError("names no part.", where=text, hint=f"An example: {PREFIX}body+flap. {_listed()}")
     for name in given:
@@ -47,6 +49,15 @@ def parts_of(text: str) -> tuple[str, ...]:
     if reason:
         raise CardError(reason, where=text, hint=f"See `swash structures list`. {_listed()}")
     return tuple(name for name in PARTS if name in given)
+
+
+def pairs_of(text: str) -> tuple[str, ...]:
+    """The responses (output/input) with a delay of their own that "compose:body+flap+r/pedal" names."""
+    return tuple(part for part in _named(text) if "/" in part)
+
+
+def _named(text: str) -> list[str]:
+    return [part.strip() for part in text.removeprefix(PREFIX).split("+")]
 
 
 def nonsense(parts: Sequence[str]) -> str:
@@ -70,10 +81,13 @@ def _listed() -> str:
 def document(text: str) -> dict[str, Any]:
     """The model file of "compose:..." as a document.
 
+    Args:
+        text: parts; an output and input among them ("r/pedal") has a delay of its own in that response.
+
     Raises:
-        CardError: an unknown part, or parts that make no sense together.
+        CardError: an unknown part, parts that make no sense together, a pair that they do not have.
     """
-    names = parts_of(text)
+    names, pairs = parts_of(text), pairs_of(text)
     parts = [PARTS[name] for name in names]
     states = {state: unit for part in parts for state, unit in part.states.items()}
     equations: dict[str, dict[str, str]] = {state: {} for state in states}
@@ -108,17 +122,37 @@ def document(text: str) -> dict[str, Any]:
         "name": "+".join(names),
         "title": f"Composed of {', '.join(names)}: {len(states)} states",
         "trust": _trust(names),
-        "composed": PREFIX + "+".join(names),
+        "composed": PREFIX + "+".join((*names, *pairs)),
         "states": states,
         "inputs": inputs,
         "equations": equations,
         "left": left,
         "outputs": outputs,
-        "delays": {name: f"tau_{SHORT[name]}" for name in inputs},
+        "delays": _delays(text, pairs, tuple(inputs), tuple(outputs)),
     }
     if "body" in names:
         found["trim"] = {state: _TRIM_NAMES[state] for state in TRIM}
     return found | {"parameters": _parameters(found)}
+
+
+def _delays(text: str, pairs: Sequence[str], inputs: Sequence[str], outputs: Sequence[str]) -> dict[str, str]:
+    """One delay for each input, and one for each pair that is named; an input whose pairs all are has none left."""
+    own: dict[str, str] = {}
+    for pair in pairs:
+        output, _, name = pair.partition("/")
+        if output not in outputs or name not in inputs:
+            near = nearest(pair, [f"{o}/{i}" for o in outputs for i in inputs])
+            listed = f"Outputs are {', '.join(outputs)}; inputs are {', '.join(inputs)}."
+            raise CardError(
+                f"'{pair}' is no pair output/input of these parts, which could have a delay of its own.",
+                where=text,
+                hint=f"{near} {listed}".strip(),
+            )
+        if pair in own:
+            raise CardError(f"'{pair}' is named twice.", where=text)
+        own[pair] = f"tau_{output}_{SHORT[name]}"
+    shared = [name for name in inputs if any(f"{output}/{name}" not in own for output in outputs)]
+    return {name: f"tau_{SHORT[name]}" for name in shared} | own
 
 
 def _kinematic(expression: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
+from swashplate.extras import library
 
 _HIGHEST = 12
 """Order of a Padé polynomial beyond which its coefficients lose their meaning in double precision."""
@@ -35,8 +36,7 @@ def state_space(
     Raises:
         SwashError: an order that is negative or too high.
     """
-    import control
-
+    control = library("control", what="to_control")
     plain = control.ss(*matrices, states=list(states), inputs=list(inputs), outputs=list(outputs))
     late = {key: value for key, value in delays.items() if value > 0.0}
     if not asked(pade, late, name=name):
@@ -58,8 +58,7 @@ def state_space(
 
 def transfer_function(numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str) -> Any:
     """A `control.TransferFunction`, its delay [s] as a Padé polynomial; see `state_space` for `pade`."""
-    import control
-
+    control = library("control", what="to_control")
     plain = control.tf(list(numerator), list(denominator))
     late = {name: delay} if delay > 0.0 else {}
     return plain * control.tf(*control.pade(delay, pade)) if asked(pade, late, name=name) else plain
@@ -85,8 +84,7 @@ def asked(pade: int | None, late: Mapping[str, float], *, name: str) -> bool:
 
 def _delay(seconds: float, order: int | None) -> Any:
     """A delay as a system of one input and one output."""
-    import control
-
+    control = library("control", what="to_control")
     return control.ss(control.tf(*control.pade(seconds, order))) if seconds > 0.0 else control.ss([], [], [], [[1.0]])
 
 

@@ -309,6 +309,8 @@ def number(name: str) -> StartNumber:
     """The start value of a parameter; quasi-steady derivatives that have none begin at zero."""
     if name in NUMBERS:
         return NUMBERS[name]
+    if name.startswith("tau_"):  # of one response
+        return NUMBERS[f"tau_{name.rpartition('_')[2]}"]
     of_force, column = name[0] in "XYZ", name[1:]
     if column in SHORT.values():
         return StartNumber(0.0, "m/s^2" if of_force else "rad/s^2", _ZERO)

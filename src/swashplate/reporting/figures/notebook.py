@@ -7,6 +7,7 @@ import io
 from html import escape
 from typing import Any
 
+from swashplate.errors import MissingLibraryError
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.views import section_of
 from swashplate.reporting.structure import Figure, Table, Text
@@ -46,6 +47,9 @@ def _table(table: Table) -> str:
 
 def _picture(figure: Figure) -> str:
     drawn = io.BytesIO()
-    still([figure], theme="light").savefig(drawn, format="png", dpi=_DPI)
+    try:
+        still([figure], theme="light").savefig(drawn, format="png", dpi=_DPI)
+    except MissingLibraryError as error:  # words and tables are worth showing without the picture
+        return f"<p><b>!</b> {escape(str(error))}</p>"
     text = base64.b64encode(drawn.getvalue()).decode("ascii")
     return f'<img alt="{escape(figure.alt, quote=True)}" src="data:image/png;base64,{text}">'

@@ -22,20 +22,17 @@ from swashplate.reporting.figures.of_comparison import section_of_comparison, se
 from swashplate.reporting.figures.of_flight import over_time, section_of_flight, section_of_inspection
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
-from swashplate.reporting.figures_fit import eigenvalues
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.sections_responses import gains_section
-from swashplate.reporting.speed_page import by_contributor, controls
-from swashplate.reporting.structure import Block, Cell, Figure, Report, Section, Table, Text
-from swashplate.simulation.derivatives_over_speed import Derivatives
-from swashplate.simulation.linearize import LinearModel
-from swashplate.simulation.trim_curve import TrimCurve
+from swashplate.reporting.structure import Cell, Figure, Report, Section, Table, Text
 from swashplate.validation.compare import ModelComparison
 from swashplate.validation.residuals import Residuals
 from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Still
+
+    from swashplate.simulation.derivatives_over_speed import Derivatives
 
 
 def section_of(shown: Any) -> Section:
@@ -50,18 +47,16 @@ def section_of(shown: Any) -> Section:
         return section_of_inspection(shown)
     if isinstance(shown, FrequencyResponse):
         return _of_responses(shown)
-    if isinstance(shown, TrimCurve):
-        return _of_trims(shown)
-    if isinstance(shown, Derivatives):
-        return _of_derivatives(shown)
     if isinstance(shown, ModelComparison):
         return section_of_comparison(shown)
     if isinstance(shown, Residuals):
         return section_of_residuals(shown)
     if isinstance(shown, Suggestion):
         return gains_section([shown])
-    if isinstance(shown, LinearModel):
-        return Section("modes", "Linear model", (eigenvalues({"model": shown.modes()}), _listing(repr(shown))))
+    if any(kind.__module__.startswith("swashplate.simulation.") for kind in type(shown).__mro__):
+        from swashplate.reporting.figures.of_models import section_of_model  # needs JAX, as whoever has such an object
+
+        return section_of_model(shown)
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
 
 
@@ -88,10 +83,6 @@ def _of_report(page: Report, shown: Any) -> Section:
     return Section("shown", page.title, (*words, *picture, *rest, summary))
 
 
-def _listing(text: str) -> Text:
-    return Text(text)
-
-
 def _of_responses(found: FrequencyResponse) -> Section:
     """Coherent bands of every pair, and Bode plots of those that have one."""
     rows = []
@@ -104,22 +95,6 @@ def _of_responses(found: FrequencyResponse) -> Section:
     table = Table("Where they may be used", ("output / input", "coherent band [Hz]"), tuple(rows))
     title = f"Frequency responses ({found.method}): {found.omega.size} lines"
     return Section("responses", title, (*told, bode_matrix.of_responses(found), table))
-
-
-def _of_trims(curve: TrimCurve) -> Section:
-    columns = curve.columns()
-    rows = tuple(tuple(Cell(f"{v:.3f}", number=True) for v in row) for row in zip(*columns.values(), strict=True))
-    told: tuple[Block, ...] = tuple(Text(text, tone="caution") for text in curve.remarks)
-    title = f"Trims of {curve.vehicle.card.title}"
-    return Section("trims", title, (*told, controls(curve), Table("Trims", tuple(columns), rows)))
-
-
-def _of_derivatives(found: Derivatives, row: str = "M") -> Section:
-    head, rows = found.rows(found.tables[0])
-    title = f"Derivatives of {found.vehicle.card.title} at {found.trims[0].speed:g} m/s"
-    table = Table("Derivatives", tuple(head), tuple(tuple(Cell(cell) for cell in line) for line in rows))
-    others = tuple(by_contributor(found, other) for other in "XYZLMN" if other != row)
-    return Section("derivatives", title, (by_contributor(found, row), *others, table))
 
 
 # ---- the verbs behind the methods ------------------------------------------------------------------------------
@@ -204,9 +179,13 @@ def explore_responses(
 
 def plot_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "paper") -> Still:
     """Derivatives over speed by contributor; see `Derivatives.plot`."""
+    from swashplate.reporting.speed_page import by_contributor
+
     return still([by_contributor(derivatives, row)], theme=theme)
 
 
 def explore_derivatives(derivatives: Derivatives, *, row: str = "M", theme: Theme = "light") -> Any:
     """Derivatives over speed by contributor, to zoom; see `Derivatives.explore`."""
+    from swashplate.reporting.speed_page import by_contributor
+
     return interactive(by_contributor(derivatives, row), theme=theme)

@@ -91,6 +91,23 @@ def test_what_gains_buy_and_cost_is_said_and_a_step_overshoots_little() -> None:
     assert abs(1.0 / (1.0 + own * model.response(s.imag)[:, 0, 0])) == pytest.approx(0.708, rel=0.01)
 
 
+def test_a_loop_with_phase_to_spare_and_a_high_crossover_is_called_out_by_its_delay_margin() -> None:
+    """Yaw nearly an integrator, without delay: any gain keeps its phase, and time is what the suggestion pays with."""
+    model = structure("yaw").with_values({"Nr": -1.3, "Nped": 30.0, "tau_yaw": 0.0})
+    flown = {"ATC_RAT_YAW_P": 0.1, "ATC_RAT_YAW_I": 0.01, "ATC_RAT_YAW_D": 0.0, "ATC_RAT_YAW_FLTE": 0.0}
+    (yaw,) = suggest_gains(model, autopilot=flown)
+    before, after = yaw.figures_flown.margins, yaw.figures_suggested.margins
+    assert after.phase_margin.value > PHASE_MARGIN
+    assert after.crossover.value < 2.0 * np.pi * 40.0  # seen, and not beyond what is judged
+    assert after.delay_margin.value < 0.5 * before.delay_margin.value
+    assert any(words.startswith("delay margin") for words in yaw.costs)
+    assert "delay margin [ms]" in repr(yaw)
+    # The same crossing by hand.
+    at = before.crossover.value
+    lag = np.pi + np.angle(yaw.loop.controller(flown, np.array([at])) * yaw.loop.plant(np.array([at])))[0]
+    assert before.delay_margin.value == pytest.approx(lag / at, rel=1e-3)
+
+
 def test_flown_gains_that_nothing_beats_are_kept() -> None:
     model = structure("rotor_body").with_values(SITL)
     first = suggest_gains(model)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -16,8 +17,9 @@ from swashplate.errors import CardError, DocumentError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
+from swashplate.simulation.late import quantised, quantum_of
 from swashplate.simulation.trim import Trim, trim
-from swashplate.simulation.wind import INDOOR, dryden, outdoor
+from swashplate.simulation.wind import INDOOR, dryden, indoor, outdoor
 
 
 @pytest.fixture(scope="module")
@@ -135,3 +137,21 @@ def test_bad_input_is_named(coax: Vehicle, hover: Trim) -> None:
         simulate_closed_loops(coax, controller, duration=1.0, size=2, parameters={"weight": [1.0, 2.0]})
     with pytest.raises(SwashError, match=r"wind_east: has shape \(7,\), expected \(100, 2\) or \(100,\)"):
         simulate_closed_loops(coax, controller, duration=1.0, size=2, wind={"wind_east": np.zeros(7)})
+
+
+def test_commands_in_bits_are_whole_steps_of_their_range() -> None:
+    limits = np.array([[0.0, 1.0], [-1.0, 1.0]])
+    np.testing.assert_allclose(quantum_of(limits, 8), [1.0 / 255.0, 2.0 / 255.0])
+    np.testing.assert_array_equal(quantum_of(limits, None), 0.0)
+    told = quantised(jnp.array([0.5, 0.1234]), jnp.array([0.25, 0.0]))
+    np.testing.assert_array_equal(told, [0.5, 0.1234])
+    np.testing.assert_allclose(quantised(jnp.array(0.13), jnp.array(0.25)), 0.25)
+    with pytest.raises(SwashError, match="is 2, expected 4 to 24"):
+        quantum_of(limits, 2)
+
+
+def test_gusts_of_a_room_have_the_strength_that_is_asked_for() -> None:
+    assert indoor(0.15) == INDOOR
+    assert indoor(0.3).sigma == pytest.approx((0.3, 0.3, 0.2))
+    with pytest.raises(SwashError, match="expected more than 0"):
+        indoor(0.0)

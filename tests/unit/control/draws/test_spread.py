@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.api.monte_carlo import not_followed
 from swashplate.control.draws.spread import Limits, Spread, spread
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
@@ -96,3 +97,17 @@ def test_a_limit_is_a_positive_number() -> None:
         Limits(lean=0.0)
     with pytest.raises(ControllerError, match="limit of rate: is nan"):
         Limits(rate=math.nan)
+
+
+def test_what_was_asked_for_and_not_flown_is_said(coax: Vehicle, hover: Trim) -> None:
+    """A second of 2 m/s ahead from 3 s on: flights that fly it say nothing, flights that stand still do."""
+    time = np.arange(500) / 100.0
+    asked = np.where((time >= 3.0) & (time < 4.0), 2.0, 0.0)
+    states = np.repeat(np.repeat(hover.state[None, :, None], 100, 0), FLIGHTS, 2)
+    rows = np.zeros((100, len(coax.input_names) + 4, 1))
+    still = Batch(coax, np.arange(100) / 20.0, states, rows)
+    (words,) = not_followed(still, hover, {"ahead": asked}, time - 3.0)
+    assert words == "ahead was asked to change by 2, and half of the flights reached 0."
+    moving = states.copy()
+    moving[60:80, coax.index("u")] += 1.8
+    assert not_followed(Batch(coax, still.time, moving, rows), hover, {"ahead": asked}, time - 3.0) == ()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import swashplate as sp
 from swashplate.errors import ManeuverError
-from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE, KINDS, Maneuver, parse
+from swashplate.flights.maneuvers.series import DEFAULT_AMPLITUDE, HOVER, KINDS, Maneuver, parse
 
 INPUTS = ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")
 
@@ -101,7 +101,7 @@ def test_a_wrong_description_is_explained(text: str, says: str) -> None:
 
 
 @settings(max_examples=50, deadline=None)
-@given(st.sampled_from(sorted(KINDS)), st.floats(0.01, 1.0), st.floats(10.0, 60.0))
+@given(st.sampled_from(sorted(KINDS.keys() - {HOVER})), st.floats(0.01, 1.0), st.floats(10.0, 60.0))
 def test_no_maneuver_exceeds_its_amplitude(kind: str, amplitude: float, duration: float) -> None:
     band = {"sweep": (0.5, 4.0), "multisine": (0.5, 4.0), "sine": (2.0, 2.0)}.get(kind)
     signal = Maneuver(kind, ("roll",), duration, amplitude, band).signals(np.linspace(-1.0, duration + 1.0, 5001))[
@@ -126,3 +126,14 @@ def test_a_multirotor_says_itself_which_motors_an_axis_moves() -> None:
     assert all(values[0] == pytest.approx(0.1) for values in moved.values())
     turned = parse("step:yaw,1s,0.1").offsets(np.array([0.1]), inputs=crazyflie.input_names, axes=crazyflie.stick_axes)
     assert {np.sign(values[0]) for values in turned.values()} == {1.0, -1.0}
+
+
+def test_a_hover_moves_nothing_for_its_time() -> None:
+    hover = parse("hover:20s")
+    assert (hover.axes, hover.duration) == ((), 20.0)
+    assert hover.signals(np.zeros(3)) == {}
+    added = hover.offsets(np.arange(3.0), inputs=("a",))
+    np.testing.assert_array_equal(added["a"], 0.0)
+    for text in ("hover:roll,20s", "hover:", "hover:0s"):
+        with pytest.raises(ManeuverError, match="says no time alone"):
+            parse(text)

@@ -66,6 +66,18 @@ def test_a_lawful_sweep_is_followed_from_its_first_to_its_last_cycle() -> None:
     assert law == pytest.approx(0.1 + 5.9 * np.expm1(4.0 * at / 90.0) / np.expm1(4.0), rel=0.05)
 
 
+def test_a_law_is_not_carried_far_beyond_its_sweep() -> None:
+    """Two sweeps in one log of 600 s: an exponential law, carried on to its end, would turn more than 1e9 times."""
+    long = np.arange(60_000) / 100.0
+    signal = sum(np.asarray(parse("sweep:roll,0.1-10Hz,110s,0.1").signals(long - at)["roll"]) for at in (5.0, 200.0))
+    ridge = rising(long[:15_000], signal[:15_000])
+    assert ridge is not None
+    course = course_of(long, signal, ridge)
+    assert course.lawful
+    assert course.phase.size == course.inside.sum() < 15_000
+    assert np.all(np.diff(course.phase) < np.pi)
+
+
 def test_a_course_at_another_frequency_or_time_follows_nothing() -> None:
     sweep = program() + gusts(1, 0.05)
     ridge = rising(TIME, sweep)

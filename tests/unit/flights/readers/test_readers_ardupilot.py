@@ -182,8 +182,8 @@ def test_a_log_without_a_flight_and_needless_options_are_refused(tmp_path: Path)
     with pytest.raises(FlightError, match=r"a\.bin: holds no flight: no known message has two samples"):
         _flight(tmp_path, dataflash(ardupilot_rows(until=20.0)))
     (tmp_path / "b.bin").write_bytes(dataflash(ardupilot_rows()))
-    with pytest.raises(FlightError, match="units and mappings have no meaning"):
-        read(tmp_path / "b.bin", units={"p": "deg/s"})
+    with pytest.raises(FlightError, match="a mapping has no meaning"):
+        read(tmp_path / "b.bin", mapping={"rate": 50})
 
 
 def test_a_forged_description_is_not_believed() -> None:

@@ -370,6 +370,11 @@ def test_only_blackbox_files_hold_several_logs(tmp_path):
         sp.read(tmp_path / "a.csv", log=1)
 
 
-def test_units_have_no_meaning(tmp_path):
+def test_a_mapping_has_no_meaning(tmp_path):
     with pytest.raises(FlightError, match="no meaning for a Blackbox log"):
-        sp.read(saved(tmp_path, log_of(20)), units={"p": "deg/s"})
+        sp.read(saved(tmp_path, log_of(20)), mapping={"rate": 50})
+
+
+def test_a_given_unit_stands_in_place_of_the_logs(tmp_path):
+    path = saved(tmp_path, log_of(20))
+    assert sp.read(path, units={"p": "-rad/s"}).values("p").tolist() == (-sp.read(path).values("p")).tolist()

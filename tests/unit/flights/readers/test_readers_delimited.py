@@ -51,6 +51,17 @@ def test_separators_comments_and_byte_order_mark(tmp_path: Path, mark: str) -> N
     assert read(_file(tmp_path, text.replace("\n\n", "\n") + rows)).values("u").tolist() == [1.0, 2.5]
 
 
+def test_a_table_without_spaces_reads_as_one_with_them(tmp_path: Path) -> None:
+    """Bare tables are read faster; blanks, underscores and words are seen in both."""
+    rows = ["0,1.5,7", "0.5,2.5e-3,8", "1,-3,9"]
+    bare = read(_file(tmp_path, "time [s],u [m/s],v [m/s]\n" + "\n".join(rows)))
+    wide = read(_file(tmp_path, "time [s],u [m/s],v [m/s]\n" + "\n".join(row.replace(",", " , ") for row in rows)))
+    assert [bare.values(n).tolist() for n in "uv"] == [wide.values(n).tolist() for n in "uv"]
+    for cell in ("1_0", "five", ""):
+        with pytest.raises(FlightError, match=r"line 3 is not a number|not finite|missing|NaN"):
+            read(_file(tmp_path, f"time [s],u [m/s],v [m/s]\n0,1,7\n0.5,{cell},8\n1,3,9\n"))
+
+
 def test_a_mapping_file_names_units_factors_and_columns(tmp_path: Path) -> None:
     path = _file(tmp_path, "TimeUS,Roll,Ch7\n0,90,1500\n10000,45,2000\n")
     mapping = _file(
@@ -98,6 +109,54 @@ def test_units_as_an_argument(tmp_path: Path) -> None:
     assert read(path, units={"time": "s", "phi": "deg"}).values("phi")[0] == pytest.approx(np.pi / 2)
 
 
+@pytest.mark.parametrize("head", ["t [ms]", "Time (ms)", "TIME [ms]"])
+def test_a_time_column_by_its_other_names(tmp_path: Path, head: str) -> None:
+    flight = read(_file(tmp_path, f"{head},u [m/s]\n0,1\n20,2\n"))
+    assert flight.time("u").tolist() == [0.0, 0.02]
+    assert flight.channels == ("u",)
+
+
+@pytest.mark.parametrize("named", ["t", "time"])
+def test_the_unit_of_a_column_t_is_found_as_that_of_time(tmp_path: Path, named: str) -> None:
+    path = _file(tmp_path, "t,u [m/s]\n1600000000000,1\n1600000000020,2\n")
+    with pytest.raises(UnitError, match=r"time: has no unit.*--unit time=s"):
+        read(path)
+    flight = read(path, units={named: "ms"})
+    assert np.diff(flight.time("u")) == pytest.approx([0.02], abs=1e-12)
+    assert flight.epoch + flight.start == pytest.approx(1.6e9)
+    with pytest.raises(UnitError, match="'m' is a unit of"):
+        read(path, units={named: "m"})
+    dated = _file(tmp_path, "t,u [m/s]\n2026-03-05T14:20:00Z,1\n2026-03-05T14:20:01Z,2\n", "dated.csv")
+    assert np.diff(read(dated).time("u")) == pytest.approx([1.0])
+
+
+def test_beside_a_column_time_t_is_a_channel(tmp_path: Path) -> None:
+    flight = read(_file(tmp_path, "t [degC],time [s],u [m/s]\n20,0,1\n21,1,2\n"))
+    assert flight.values("t").tolist() == [20.0, 21.0]
+    assert flight.time("u").tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("head", "asked"), [("T [s]", "'T'"), ("timestamp [s]", "'timestamp'"), ("Time [s],TIME [s]", "'Time' or 'TIME'")]
+)
+def test_a_column_that_may_be_time_is_asked_about(tmp_path: Path, head: str, asked: str) -> None:
+    """A capital T is a temperature as often, and of two times neither is chosen."""
+    with pytest.raises(FlightError, match=f"no time column.*Did you mean {asked}\\?"):
+        read(_file(tmp_path, f"{head},u [m/s]\n0,1,2\n1,2,3\n"))
+
+
+def test_a_column_near_a_channels_name_is_asked_about(tmp_path: Path) -> None:
+    path = _file(tmp_path, "t [s],servo_rol,Phi [deg],phi_ref,u [m/s],omega_3 [rpm]\n0,1,2,3,4,5\n1,2,3,4,5,6\n")
+    flight = read(path)
+    notes = [note for note in flight.provenance.notes if "did you mean" in note]
+    assert [note.split("'")[1::2] for note in notes] == [["servo_rol", "servo_roll"], ["Phi", "phi"]]
+    assert flight.values("servo_rol").tolist() == [1.0, 2.0]  # kept, and under the name that it has
+    with pytest.raises(UnitError, match="Did you mean 'servo_rol'"):
+        read(path, units={"servo_rl": "1"})
+    both = read(_file(tmp_path, "t [s],Phi,phi [deg]\n0,1,2\n1,2,3\n"))
+    assert not any("did you mean" in note for note in both.provenance.notes)
+
+
 def test_a_channel_outside_the_schema_keeps_a_unit_nobody_knows(tmp_path: Path) -> None:
     flight = read(_file(tmp_path, "time [s],temperature [degC],wheel [deg],qdot [deg/s^2]\n0,20,180,90\n1,21,0,0\n"))
     assert flight["qdot"].attrs["units"] == "rad/s^2"
@@ -111,7 +170,7 @@ def test_a_channel_outside_the_schema_keeps_a_unit_nobody_knows(tmp_path: Path) 
 BAD_TABLES = {
     "unknown unit": ("time [s],phi [grad]\n0,1\n1,2\n", "phi: unit 'grad' is not known"),
     "wrong unit": ("time [s],phi [m]\n0,1\n1,2\n", r"phi: unit 'm' is a unit of \[m\], expected one of \[rad\]"),
-    "no time": ("t [s],phi [deg]\n0,1\n1,2\n", "time: there is no time column; found t, phi"),
+    "no time": ("tau [s],phi [deg]\n0,1\n1,2\n", "time: there is no time column; found tau, phi"),
     "only time": ("time [s],\n0,\n1,\n", "no channel beside time"),
     "no rows": ("time [s],x [m]\n", "time: has no samples"),
     "one sample": ("time [s],x [m]\n0,1\n", "time: has one sample"),

@@ -139,8 +139,8 @@ def test_a_bag_that_was_not_closed_or_has_nothing_known_is_refused(tmp_path: Pat
         writer.write(connection, BEGIN, raw)
     with pytest.raises(FlightError, match=r"its topics are /chatter \(std_msgs/msg/String\)"):
         read(tmp_path / "c.bag")
-    with pytest.raises(FlightError, match="have no meaning for a ROS bag"):
-        read(tmp_path / "a.bag", units={"p": "deg/s"})
+    with pytest.raises(FlightError, match="has no meaning for a ROS bag"):
+        read(tmp_path / "a.bag", mapping={"rate": 50})
     (tmp_path / "folder").mkdir()
     with pytest.raises(FlightError, match="is a folder"):
         read(tmp_path / "folder")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import swashplate as sp
@@ -115,3 +116,17 @@ def test_a_fit_says_what_its_structure_may_lack(responses: FrequencyResponse) ->
     (words,) = (text for text in fit.warnings if "not all of the aircraft" in text)
     assert "may be lacking are 'torque' (r / collective)" in words
     assert "Try compose:heave+yaw+torque, or --search." in words
+
+
+def test_a_response_that_comes_later_than_the_others_of_its_input_is_fitted(responses: FrequencyResponse) -> None:
+    values = {"Zw": -0.7, "Zcol": -20.0, "Nr": -2.0, "Nped": 30.0, "Ncol": 8.0, "tau_col": 0.02, "tau_r_col": 0.06}
+    own = structure("compose:heave+yaw+r/collective")
+    truth = own.with_values(values)
+    rows = [truth.outputs.index(name) for name in responses.outputs]
+    columns = [truth.inputs.index(name) for name in responses.inputs]
+    scatter = np.exp(0.01 * np.random.default_rng(0).standard_normal(responses.response.shape))
+    there = replace(responses, response=truth.response(responses.omega)[:, rows][:, :, columns] * scatter)
+    found = sp.fit_state_space(own, there, starts=1)
+    for name in ("tau_col", "tau_r_col"):
+        assert found.model.numbers()[name] == pytest.approx(values[name], abs=3e-3)
+    assert found.cost < 0.2 * sp.fit_state_space(HEAVE_YAW, there, starts=1).cost

@@ -51,7 +51,7 @@ def test_bounds_of_margins_are_those_of_drawn_models(lag: tuple[FrequencyRespons
     assert isinstance(line.read, ResponseMargins)
     omega = np.geomspace(0.3, 300.0, 800)
     others = [margins(omega, model.response(omega)) for model in drawn(fit, 300)]
-    for name in ("crossover", "phase_margin", "gain_margin", "omega_180"):
+    for name in ("crossover", "phase_margin", "gain_margin", "omega_180", "delay_margin"):
         read: ReadNumber = getattr(line.read, name)
         scatter = 10.0 * np.std([getattr(m, name).value for m in others])
         assert read.sigma == pytest.approx(scatter, rel=0.15), name
@@ -69,7 +69,7 @@ def test_errors_of_margins_are_those_of_drawn_responses() -> None:
     found = margins(omega, loop, error=np.full(omega.size, error))
     random = np.random.default_rng(2).standard_normal((400, 2)) * error
     others = [margins(omega, loop * (1.0 + a + 1j * b)) for a, b in random]
-    for name in ("crossover", "phase_margin", "gain_margin", "omega_180"):
+    for name in ("crossover", "phase_margin", "gain_margin", "omega_180", "delay_margin"):
         scatter = np.std([getattr(m, name).value for m in others])
         assert getattr(found, name).sigma == pytest.approx(scatter, rel=0.12), name
 
@@ -83,6 +83,44 @@ def test_the_least_margin_counts_where_a_loop_crosses_often() -> None:
     assert abs(found.phase_margin.value) < 45.0
     assert found.gain_margin.value == pytest.approx(20 * np.log10(60.0 * 0.04 / 3.0), abs=0.1)  # it has none
     assert repr(margins(omega, 0.001 * loop).phase_margin) == "none"
+
+
+def test_a_good_phase_margin_at_a_high_crossover_is_called_out_by_the_delay_margin() -> None:
+    """An integrator has 90 degrees at every gain; what it stands of delay is a quarter of a period of its crossover."""
+    omega = np.geomspace(0.1, 300.0, 3000)
+    slow, fast = (margins(omega, gain / (1j * omega)) for gain in (2.0, 200.0))
+    assert slow.phase_margin.value == pytest.approx(90.0, abs=0.1)
+    assert fast.phase_margin.value == pytest.approx(90.0, abs=0.1)
+    assert slow.delay_margin.value == pytest.approx(np.pi / 4.0, rel=1e-3)
+    assert fast.delay_margin.value == pytest.approx(np.pi / 400.0, rel=1e-3)
+    # With that delay it is at its limit, with a little more it stands none, and with a little less a little.
+    late = {
+        share: margins(omega, 200.0 * np.exp(-1j * omega * share * np.pi / 400.0) / (1j * omega))
+        for share in (0.9, 1.1)
+    }
+    assert late[0.9].delay_margin.value == pytest.approx(0.1 * np.pi / 400.0, rel=0.02)
+    assert late[1.1].delay_margin.value == 0.0
+
+
+def test_the_delay_margin_is_that_of_the_crossing_with_the_least_and_not_of_the_least_phase() -> None:
+    """A slow crossing of 49 degrees and a resonance at 60 rad/s with more phase in hand: the second stands less."""
+    s = 1j * (omega := np.geomspace(0.1, 1000.0, 20000))
+    slow = 3.0 / s / (1.0 + s / 3.0)
+    loop = slow + 5.0 * s / (s**2 + s + 60.0**2)
+    found, alone = margins(omega, loop), margins(omega, slow)
+    assert found.crossover.value == pytest.approx(alone.crossover.value, rel=0.02)
+    assert found.phase_margin.value == pytest.approx(alone.phase_margin.value, abs=2.0)
+    assert found.delay_margin.value < 0.2 * alone.delay_margin.value
+
+
+@pytest.mark.parametrize(("gain", "stands"), [(3.0, True), (0.01, True), (9.0, False)])
+def test_a_loop_that_is_unstable_already_stands_no_delay(gain: float, stands: bool) -> None:
+    """By the roots of the closed loop of gain / (s (s + 1) (s + 4)) times three: Routh's limit is 20."""
+    omega = np.geomspace(1e-3, 300.0, 3000)
+    s = 1j * omega
+    found = margins(omega, 3.0 * gain / (s * (s + 1.0) * (s + 4.0)))
+    assert (np.roots([1.0, 5.0, 4.0, 3.0 * gain]).real.max() < 0.0) == stands
+    assert (found.delay_margin.value > 0.0) == stands
 
 
 def test_every_axis_is_judged_by_its_own_input() -> None:

@@ -14,7 +14,9 @@ import scipy.linalg
 import swashplate as sp
 from flown_by_hand import U, X, Y, Z, fly, fresh, holds_what_is_held, moves_its_way
 from swashplate.control.laws.linear_decoupling import static_decoupling
+from swashplate.control.lqg.design import design
 from swashplate.errors import ControllerError, FlightError
+from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.links.live.axes import STICKS
@@ -226,6 +228,29 @@ def test_a_recording_is_a_flight(world: World, tmp_path: Path) -> None:
     ]
     assert {(tmp_path / f"recording-{k}.nc").read_text() for k in range(1, 6)} == {"mine"}
     assert not list(tmp_path.glob("*.growing"))
+
+
+def test_a_controller_on_its_own_sensors_flies_where_the_sticks_move_its_place() -> None:
+    coax = sp.vehicle("coax")
+    made = design(coax, sensors=suite("imu@100,mocap@50+20ms"), rate=100.0)
+    world = World(coax, controller=made)
+    assert world.setting.mode == "position"
+    with pytest.raises(ControllerError, match="flies position only, not attitude"):
+        world.set_mode("attitude")
+    world.setting.sticks["pitch"] = 1.0
+    for _ in range(100):
+        world.step()
+    world.setting.sticks["pitch"] = 0.0
+    for _ in range(500):
+        world.step()
+    assert world.trouble == ""
+    own = world.moment()
+    assert own.target[0] == pytest.approx(1.0)
+    np.testing.assert_allclose(own.crafts["own"][0][:3], own.target[:3], atol=0.1)
+    # Noise of its own sensors is in what it does: without it a hover's commands rest.
+    before = own.crafts["own"][1].copy()
+    world.step()
+    assert np.any(world.moment().crafts["own"][1] != before)
 
 
 def test_a_controller_of_another_vehicle_is_refused() -> None:

@@ -100,6 +100,10 @@ def test_a_rotor_takes_the_place_of_quasi_steady_derivatives_and_leaves_the_trim
         ("compose:body+heave", "'body' and 'heave' cannot stand together: 'body' has that axis already"),
         ("compose:body+body", "'body' is named twice"),
         ("compose:", "names no part. An example: compose:body+flap"),
+        ("compose:yaw+r/pedals", "'r/pedals' is no pair output/input of these parts, which could have a delay"),
+        ("compose:yaw+p/pedal", "Outputs are r; inputs are pedal, collective"),
+        ("compose:yaw+r/pedal+r/pedal", "'r/pedal' is named twice"),
+        ("compose:r/pedal", "names no part"),
         ("body+flap", "Did you mean 'compose:body+flap'?"),
     ],
 )
@@ -107,6 +111,22 @@ def test_what_makes_no_sense_is_refused_with_the_reason(text: str, words: str) -
     with pytest.raises(CardError) as caught:
         structure(text)
     assert words in str(caught.value)
+
+
+def test_a_pair_among_the_parts_has_a_delay_of_its_own() -> None:
+    model = structure("compose:cyclic+q/lateral").with_values({"tau_lat": 0.02, "tau_q_lat": 0.06})
+    plain = structure("compose:cyclic").with_values({"tau_lat": 0.02})
+    omega = np.geomspace(1.0, 30.0, 9)
+    later = np.exp(-0.04j * omega)
+    for output, factor in (("p", 1.0), ("q", later)):
+        at = model.outputs.index(output), model.inputs.index("lateral")
+        model_h, plain_h = (one.with_values({"Mlat": 3.0}).response(omega)[:, *at] for one in (model, plain))
+        np.testing.assert_allclose(model_h, plain_h * factor, rtol=1e-12)
+    again = parse(to_toml(model))
+    assert again.delay("q", "lateral") == 0.06
+    assert again.document["composed"] == "compose:cyclic+q/lateral"
+    # An input whose responses all have their own has no other delay, which nothing could tell.
+    assert set(structure("compose:yaw+r/pedal").delays) == {"r/pedal", "collective"}
 
 
 def test_order_of_the_parts_does_not_matter() -> None:

@@ -94,6 +94,8 @@ export class Panel {
     for (const row of document.querySelectorAll(".wind")) row.hidden = !hello.wind; // what the equations do not have
     $("air").hidden = !hello.wind && !hello.voltages;
     $("bar").parentElement.hidden = !hello.bar;
+    for (const button of document.querySelectorAll("[data-mode]")) button.hidden = !hello.modes.includes(button.dataset.mode);
+    for (const name of ["decoupled", "ghost"]) $(name).parentElement.hidden = !hello.decoupling; // both would be alike
     for (const option of $("how").options) option.hidden = option.disabled = !hello.hows.includes(option.value);
     if (!hello.hows.includes($("how").value)) $("how").value = hello.hows[0];
     $("about").hidden = !hello.about;

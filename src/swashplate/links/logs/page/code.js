@@ -18,7 +18,7 @@ async function copy(text, button) {
   setTimeout(() => (button.textContent = "Copy"), 1500);
 }
 
-function lines(what, text) {
+export function lines(what, text) {
   return text && make("div", { class: "lines" }, make("span", {}, what),
     make("button", { onclick: (event) => copy(text, event.target) }, "Copy"), make("pre", { "data-code": what }, text));
 }

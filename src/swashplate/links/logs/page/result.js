@@ -21,7 +21,7 @@ function gains(home, found) {
     const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
     const margin = (name, key, unit) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key], unit)) : "–")));
     home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
-      margin("phase margin", "phase_margin", "°"), margin("gain margin", "gain_margin", "dB"), margin("crossover", "crossover", "rad/s"), margin("largest sensitivity", "peak", ""), margin("bandwidth [rad/s]", "bandwidth", ""), margin("disturbance rejection [rad/s]", "rejection", ""), overshoot(axis))));
+      margin("phase margin", "phase_margin", "°"), margin("gain margin", "gain_margin", "dB"), margin("delay margin", "delay_margin", "ms"), margin("crossover", "crossover", "rad/s"), margin("largest sensitivity", "peak", ""), margin("bandwidth [rad/s]", "bandwidth", ""), margin("disturbance rejection [rad/s]", "rejection", ""), overshoot(axis))));
     home.append(make("p", {}, axis.words));
     answers(home, axis, found);
   }

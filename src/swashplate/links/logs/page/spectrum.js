@@ -1,6 +1,6 @@
 // Density, spectrogram and rotor harmonics of one channel over the stretch of time that the plots show.
 import uPlot from "/page/vendor/uPlot.esm.js";
-import { note } from "./code.js";
+import { lines, note } from "./code.js";
 import { $, colour, ink, make, short } from "./make.js";
 import { post } from "./server.js";
 import { spectrogram } from "./spectrogram.js";
@@ -9,9 +9,12 @@ import { attempt } from "./trouble.js";
 
 let plot = null, wished = "", last = null, timer = 0;
 
+// What was asked for, else of the channels that a rotor shakes the one with the most samples a second.
 const chosen = () => {
   const known = channels();
-  return known.has(wished) ? known.get(wished) : (known.get("az") ?? known.get("p") ?? known.values().next().value);
+  if (known.has(wished)) return known.get(wished);
+  const shaken = ["p", "az"].map((name) => known.get(name)).filter(Boolean);
+  return shaken.sort((a, b) => (b.rate ?? 0) - (a.rate ?? 0))[0] ?? known.values().next().value;
 };
 
 const open = () => document.body.dataset.view === "spectrum";
@@ -75,14 +78,23 @@ function density(home) {
   }, [frequency, values], home);
 }
 
+function notches(found) {
+  const parameters = Object.entries(found.parameters).map(([name, value]) => `${name},${value}`).join("\n");
+  return [
+    make("h3", {}, "Notch filters"), make("p", parameters ? {} : { class: "soft" }, found.words),
+    ...(parameters ? [make("div", { class: "code" }, lines("ArduPilot, with a sensor of the rotor's speed", parameters))] : []),
+  ];
+}
+
 function harmonics() {
   const { rotor, unit } = last;
   const words = make("p", { class: rotor.harmonics.length ? "" : "soft" }, rotor.words.charAt(0).toUpperCase() + rotor.words.slice(1));
   if (!rotor.harmonics.length) return [make("h3", {}, "Rotor vibration"), words];
   return [
     make("h3", {}, `Rotor vibration: ${rotor.channel} at ${rotor.speed.toFixed(2)} Hz`), words,
-    make("table", {}, make("thead", {}, make("tr", {}, make("th", {}, "multiple"), make("th", { class: "number" }, "frequency [Hz]"), make("th", { class: "number" }, `rms [${unit}]`))),
-      make("tbody", {}, ...rotor.harmonics.map((h) => make("tr", {}, make("td", {}, `${h.number} ×`), make("td", { class: "number" }, h.frequency.toFixed(2)), make("td", { class: "number" }, short(h.rms)))))),
+    make("table", {}, make("thead", {}, make("tr", {}, make("th", {}, "multiple"), make("th", { class: "number" }, "at [Hz]"), make("th", { class: "number" }, `rms [${unit}]`), make("th", { class: "number" }, "above [dB]"))),
+      make("tbody", {}, ...rotor.harmonics.map((h) => make("tr", {}, make("td", {}, `${h.number} ×`), make("td", { class: "number" }, h.frequency.toFixed(2)), make("td", { class: "number" }, short(h.rms)), make("td", { class: "number" }, h.above === null ? "–" : String(Math.round(h.above) + 0)))))),
+    ...notches(rotor.notches),
   ];
 }
 

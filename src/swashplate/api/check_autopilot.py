@@ -1,0 +1,215 @@
+"""The verb `check_autopilot`: whether a running autopilot is set up for a vehicle, would arm, and how fast it runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from swashplate.api.link import mapping_of
+from swashplate.errors import LinkError, SwashError
+from swashplate.links.ardupilot.parameters import as_written
+from swashplate.links.ardupilot.parameters import parameters as for_ardupilot
+from swashplate.links.mavlink.comparison import ComparedParameter, compared, rate_problems
+from swashplate.links.mavlink.connection import Connection
+from swashplate.links.mavlink.health import Health, listen_to_health
+from swashplate.links.mavlink.parameter_reading import ask_by_name, read_parameters
+from swashplate.links.px4.parameters import parameters as for_px4
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.trim import trim
+from swashplate.text_table import text_table
+
+Firmware = Literal["ardupilot", "px4"]
+ADDRESSES: Mapping[Firmware, str] = {"ardupilot": "tcp:127.0.0.1:5762", "px4": "udp:127.0.0.1:14540"}
+"""Where a simulated autopilot speaks MAVLink and no ground station is: SERIAL1 of ArduPilot's SITL, PX4's port for
+programs aboard."""
+_NAMES = {3: "ArduPilot", 12: "PX4"}
+_AUTOPILOTS: Mapping[Firmware, int] = {"ardupilot": 3, "px4": 12}
+"""MAV_AUTOPILOT."""
+_NO_AUTOPILOT = 8
+_ROTORCRAFT = (0, 2, 3, 4, 13, 14, 15, 29, 35)
+"""MAV_TYPE that copter firmware has: no frame yet, and 2 to 12 rotors, coaxial, helicopter."""
+_RATES = ("SCHED_LOOP_RATE", "INS_GYRO_RATE", "INS_GYRO_FILTER", "IMU_GYRO_RATEMAX", "IMU_INTEG_RATE")
+"""Told where there are such parameters; no vehicle asks for a value."""
+
+_STILL = 1e-3
+"""Real-time factor below which nothing moves."""
+
+
+@dataclass(frozen=True)
+class AutopilotCheck:
+    """A running autopilot beside the vehicle that it is to fly.
+
+    Attributes:
+        firmware: that answered. address: where.
+        parameters: those that the vehicle needs, compared.
+        rates: the firmware's own rates, as it has them.
+        refusals: why it refuses to be armed, in its words.
+        sick: sensors that it calls unhealthy.
+        ready: whether its checks before arming passed; None where it did not say.
+        armed: whether it is armed.
+        real_time: simulated seconds a second, and their bound; None where too little was heard.
+        problems: everything that is wrong, in words; empty where the check passes.
+    """
+
+    firmware: Firmware
+    address: str
+    parameters: tuple[ComparedParameter, ...]
+    rates: Mapping[str, float]
+    refusals: tuple[str, ...]
+    sick: tuple[str, ...]
+    ready: bool | None
+    armed: bool
+    real_time: tuple[float, float] | None
+    problems: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the parameters are right and the autopilot can be armed."""
+        return not self.problems
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        return asdict(self) | {"passed": self.passed}
+
+    def __repr__(self) -> str:
+        right = sum(p.verdict == "right" for p in self.parameters)
+        lines = [f"{_NAMES[_AUTOPILOTS[self.firmware]]} at {self.address}: {'pass' if self.passed else 'FAIL'}"]
+        lines.append(f"parameters: {right} of {len(self.parameters)} as the vehicle needs them")
+        rows = [(p.name, f"{p.expected:g}", "-" if p.found is None else f"{p.found:g}", p.verdict) for p in self._odd()]
+        if rows:
+            lines.append(text_table(("parameter", "expected", "found", "verdict"), rows, left=(0, 3)))
+        lines += [f"{name}: {value:g}" for name, value in self.rates.items()]
+        said = {True: "its checks pass", False: "refused", None: "not known"}[self.ready]
+        lines.append(f"arming: {'it is armed' if self.armed else said}")
+        lines += [f"  {text}" for text in self.refusals]
+        if self.sick:
+            lines.append(f"  not healthy: {', '.join(self.sick)}")
+        lines.append(f"real-time factor: {_factor(self.real_time)}")
+        return "\n".join([*lines, *(f"problem: {text}" for text in self.problems)])
+
+    def _odd(self) -> list[ComparedParameter]:
+        return [p for p in self.parameters if p.verdict != "right"]
+
+
+def check_autopilot(
+    vehicle: Vehicle,
+    firmware: Firmware,
+    *,
+    name: str | None = None,
+    servos: str | Path | None = None,
+    mavlink: str | None = None,
+    timeout: float = 10.0,
+    listen: float = 4.0,
+) -> AutopilotCheck:
+    """Compare a running autopilot's parameters with what a vehicle needs, and hear why it refuses to be armed.
+
+    The physics (`swash link`) has to run at the same time. Nothing is changed in the autopilot but how often it sends
+    two messages.
+
+    Args:
+        vehicle: what it is to fly.
+        firmware: which is expected.
+        name, servos: as of `link_ardupilot`.
+        mavlink: "tcp:HOST:PORT" connects, "udp:HOST:PORT" listens; `ADDRESSES` where None.
+        timeout: for the first sign of an autopilot [s].
+        listen: how long its checks and clock are heard [s].
+
+    Raises:
+        SwashError: no answer, a port that is taken, another firmware or another kind of vehicle; a vehicle without
+            servo mapping; pymavlink missing.
+    """
+    if firmware not in ADDRESSES:
+        raise SwashError(f"'{firmware}' is none, expected {' or '.join(ADDRESSES)}.", channel="firmware")
+    if not (0.0 < timeout <= 600.0 and 0.0 < listen <= 600.0):
+        raise SwashError("expected seconds above 0 and up to 600.", channel="--timeout")
+    expected = _expected(vehicle, firmware, name, servos)
+    packed = firmware == "px4"
+    with Connection(mavlink or ADDRESSES[firmware], timeout=timeout) as connection:
+        _greet(connection, firmware, timeout)
+        reading = read_parameters(connection, packed=packed)
+        ask_by_name(connection, reading, expected, packed=packed)
+        health = listen_to_health(connection, duration=listen)
+    found = compared(expected, reading)
+    problems = [p.problem for p in found if p.problem]
+    if not reading.complete:
+        told = f"{len(reading.missing)} of {reading.count} parameters never came, although they were asked for again"
+        problems.append(
+            f"{told}: is the connection too slow?" if reading.count else "the autopilot lists no parameters."
+        )
+    problems += [*rate_problems(reading.values), *_arming(health)]
+    return AutopilotCheck(
+        firmware,
+        connection.address,
+        found,
+        {key: reading.values[key] for key in _RATES if key in reading.values},
+        tuple(health.refusals),
+        health.sick,
+        health.ready,
+        health.armed,
+        health.real_time_factor(),
+        tuple(problems),
+    )
+
+
+def _expected(vehicle: Vehicle, firmware: Firmware, name: str | None, servos: str | Path | None) -> dict[str, float]:
+    if firmware == "px4":
+        return as_written(for_px4(mapping_of(vehicle, servos, name=name, suffix="_px4")))
+    return as_written(for_ardupilot(mapping_of(vehicle, servos, name=name, suffix=""), vehicle, trim(vehicle)))
+
+
+def _greet(connection: Connection, firmware: Firmware, timeout: float) -> None:
+    """Wait for the autopilot's heartbeat, and refuse what is not the vehicle.
+
+    Raises:
+        LinkError: naming what is there.
+    """
+    until, wanted = time.monotonic() + timeout, _AUTOPILOTS[firmware]
+    while (left := until - time.monotonic()) > 0.0:
+        connection.send("heartbeat", 6, _NO_AUTOPILOT, 0, 0, 4)  # a ground station; TCP ports of SITL wait for bytes
+        for _, message in connection.receive(min(left, 0.5)):
+            if message.get_type() != "HEARTBEAT" or message.autopilot == _NO_AUTOPILOT:
+                continue
+            if message.autopilot != wanted:
+                other = _NAMES.get(message.autopilot, f"autopilot number {message.autopilot}")
+                raise LinkError(f"{other} answers, expected {_NAMES[wanted]}.", where=connection.address)
+            if message.type not in _ROTORCRAFT:
+                told = f"a vehicle of MAVLink's type {message.type} answers, expected a helicopter or a multicopter."
+                raise LinkError(told, where=connection.address, hint="Is it ArduCopter's binary?")
+            connection.system = message.get_srcSystem()
+            return
+    raise LinkError(
+        f"no autopilot was heard within {timeout:g} s.",
+        where=connection.address,
+        channel="--mavlink",
+        hint="Is it running, and its physics (swash link) too? A ground station may hold the port; give another one.",
+    )
+
+
+def _arming(health: Health) -> list[str]:
+    found = []
+    if health.restarted:
+        found.append("the autopilot restarted during the check.")
+    factor = health.real_time_factor()
+    if factor is not None and factor[0] <= max(factor[1], _STILL):
+        found.append("its simulated time stands still: is its physics (swash link) running?")
+    if health.refusals and not health.armed:
+        found.append(f"arming is refused: {'; '.join(health.refusals)}.")
+    elif health.ready is False and not health.armed:
+        why = (
+            f"it calls unhealthy: {', '.join(health.sick)}"
+            if health.sick
+            else "it does not say why; wait and ask again"
+        )
+        found.append(f"arming is refused: {why}.")
+    elif health.ready is None and not health.armed:
+        found.append("whether it can be armed is not known: it did not tell the result of its checks (SYS_STATUS).")
+    return found
+
+
+def _factor(real_time: tuple[float, float] | None) -> str:
+    if real_time is None:
+        return "not known (its clock was heard for less than a second)"
+    return f"{real_time[0]:.2f} ± {real_time[1]:.1g}"

@@ -1,0 +1,45 @@
+"""Slopes of a linear model's errors along records, by every kind of entry, against differences of the cost itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+from swashplate.identification.time.linear_filter import FilterErrors
+from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_time_fit import linear_records
+from swashplate.models.linear.state_space_file import structure
+
+MODEL = structure("rotor_body").with_values(
+    {"Lb": 300.0, "Ma": 80.0, "tau_f": 0.07, "Ba": 0.5, "Ab": -0.5, "Blat": 0.2, "Blon": -0.05, "Alat": 0.05,
+     "Alon": 0.25, "tau_roll": 0.053, "tau_pitch": 0.047}
+)  # fmt: skip
+
+
+def _flight(seed: int, seconds: float) -> Flight:
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 0.02)
+    table = {name: random.standard_normal(time.size) for name in (*MODEL.inputs, *MODEL.outputs)}
+    units = dict.fromkeys(MODEL.inputs, "1")
+    return Flight({"uniform": stream(time, table, units)}, Provenance(source=f"log {seed}", simulated=True))
+
+
+@pytest.mark.parametrize("method", ["output-error", "prediction-error", "filter-error"])
+def test_the_gradient_is_the_slope_of_the_cost_by_every_entry(method: str) -> None:
+    outputs, biases = MODEL.outputs, MODEL.outputs[:1]
+    pieces, delays = linear_records(MODEL, [_flight(1, 3.0), _flight(2, 2.4)], outputs, biases=biases)
+    kind = FilterErrors if method == "filter-error" else OutputErrors
+    likelihood = kind(MODEL, outputs, pieces, True, biases, delays=delays, gain=method != "output-error")
+    row = likelihood.row.starts() + 0.01 * np.random.default_rng(3).standard_normal(len(likelihood.row))
+    for _ in range(1 if method != "filter-error" else 50):  # its gain depends on the covariance
+        likelihood.refresh(row)
+    gradient = likelihood.scores(row)[1]
+    step = 1e-5
+    slopes = [
+        (likelihood.cost(row + step * e) - likelihood.cost(row - step * e)) / (2 * step) for e in np.eye(row.size)
+    ]
+    np.testing.assert_allclose(gradient, slopes, rtol=1e-4, atol=1e-5 * np.max(np.abs(gradient)))
+    groups = {entry.group for entry in likelihood.row.entries}
+    assert groups >= {"parameter", "initial", "nuisance"} | (set() if method == "output-error" else {"noise"})
