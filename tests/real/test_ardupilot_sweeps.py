@@ -21,7 +21,7 @@ from swashplate.identification.frequency.transfer_function_fit import fit_transf
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space_file import structure
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 A = np.array([[0, 0, 3588.6, 0], [0, 0, 0, 617.5], [-1, 0, -14.6559, 18.9984], [0, -1, -19.6418, -14.6559]])
 B = np.array([[0, 0], [0, 0], [3.58967, -1.24391], [1.06772, 3.95150]])

@@ -13,7 +13,7 @@ from swashplate.flights.provenance import Provenance
 from swashplate.identification.frequency.response_cost import cost_of, target
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.responses.respond import respond
-from swashplate.validation.verification import verify_inside
+from swashplate.validation.verify import verify_inside
 
 
 def x8(folder: Path, part: slice) -> Flight:

@@ -16,7 +16,7 @@ from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 BAND = (0.05, 6.0)
 

@@ -24,7 +24,7 @@ from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.noise_filter import Piece
 from swashplate.validation.refutation import OPEN, REFUTED, STANDS, Judgement, judge
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 BAND = (0.05, 6.0)
 GUST = 0.5

@@ -28,7 +28,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.registry import nearest
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.validation.structure_reduction import reduce as reduced
-from swashplate.validation.verification import verify, verify_inside
+from swashplate.validation.verify import verify, verify_inside
 
 Linear: TypeAlias = Vehicle | StateSpaceModel | str | Path
 """A linear model, or its name or file."""

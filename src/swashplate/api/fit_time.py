@@ -12,7 +12,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core import stopping
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 
 def fit_time(

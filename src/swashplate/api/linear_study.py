@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from swashplate import atomic
+from swashplate.api.study import Study
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling_readings import Line
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
-from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
 from swashplate.validation.verification import Verification
 
-FILES = ("report.html", "fit.json", "model.toml", "verification.json")
-"""What `save` may write."""
-
 
 @dataclass(frozen=True, repr=False)
-class LinearStudy:
+class LinearStudy(Study):
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:
@@ -37,6 +33,8 @@ class LinearStudy:
         model: that can be flown and saved; None where there is none.
         remarks: what the user must know beside the fit's own warnings.
     """
+
+    files: ClassVar[tuple[str, ...]] = ("report.html", "fit.json", "model.toml", "verification.json")
 
     material: ResponseMaterial
     fitted: tuple[Flight, ...] = ()
@@ -80,15 +78,8 @@ class LinearStudy:
         """What `sp.report` writes."""
         return compose_responses(self.material, title=title)
 
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write report.html, and fit.json, model.toml and verification.json where there are such, into a folder."""
-        with atomic.folder_when_complete(folder, ours=FILES) as place:
-            self.write(place)
-        return Path(folder)
-
     def write(self, folder: Path) -> None:
-        """The files of `save` into a folder that is there."""
-        write_page(folder / "report.html", self.page())
+        super().write(folder)
         if self.fit is not None:
             self.fit.save(folder / "fit.json")
         if self.model is not None:

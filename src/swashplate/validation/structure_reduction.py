@@ -18,7 +18,8 @@ from swashplate.identification.frequency.state_space_result import ReductionStep
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.refutation import REFUTED
-from swashplate.validation.verification import Verification, verify
+from swashplate.validation.verification import Verification
+from swashplate.validation.verify import verify
 
 GROWTH, LEAST_GROWTH = 0.05, 0.5
 """J_ave may grow by this share, or by this much, in the whole reduction."""

@@ -25,7 +25,7 @@ from swashplate.models.linear.state_space_file import parse, structure, structur
 from swashplate.simulation.discretisation import first_order_hold
 from swashplate.validation import structure_reduction
 from swashplate.validation.structure_reduction import moved_modes, reduce
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 12.0, 80)
 

@@ -18,7 +18,7 @@ from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.frequency.unnoticeable_dynamics import envelopes, mismatch
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form, TransferFunction
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 10.0, 90)
 
