@@ -123,6 +123,14 @@ def test_a_loop_that_is_unstable_already_stands_no_delay(gain: float, stands: bo
     assert (found.delay_margin.value > 0.0) == stands
 
 
+def test_the_phase_margin_of_an_unstable_loop_never_reads_as_a_good_one() -> None:
+    """5 / s behind 0.8 s of delay turns by -319 degrees at its crossover: wrapped, that was +131 degrees of margin."""
+    omega = np.geomspace(0.1, 50.0, 800)
+    found = margins(omega, 5.0 / (1j * omega) * np.exp(-0.8j * omega))
+    assert found.delay_margin.value == 0.0
+    assert found.phase_margin.value == pytest.approx(90.0 - np.degrees(4.0), abs=0.2)
+
+
 def test_every_axis_is_judged_by_its_own_input() -> None:
     model = structure("rotor_body").with_values(TRUTH)
     omega = np.geomspace(0.6, 80.0, 120)
