@@ -147,10 +147,10 @@ def fit_ss(
     verification = None
     if flights:
         say("flying the model along what the fit has not seen")
-        verification = marked(verify_inside(fit.model, flights, band=band), responses.sources)
+        verification = marked(verify_inside(fit.solution, flights, band=band), responses.sources)
     advice = suggest_gains(fit, responses) if gains else ()
     material = ResponseMaterial(responses, fit=fit, search=found, verification=verification, gains=advice)
-    return LinearStudy(material, model=fit.model, remarks=remarks)
+    return LinearStudy(material, structure=fit.solution, remarks=remarks)
 
 
 def _listed(model: Linear | Sequence[Linear] | None) -> Sequence[Linear]:

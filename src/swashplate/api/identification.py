@@ -60,11 +60,11 @@ class Identification(Study):
         if self.validation is not None:
             self.validation.save(folder / "validation.json")
         if not self.fit.failed:
-            self.fit.vehicle.save(folder / "model.toml")
+            self.fit.model.save(folder / "model.toml")
 
     def lines(self) -> list[str]:
         """The report's own warnings and five lines, in words."""
-        if not isinstance(self.fit.model, Vehicle):
+        if not isinstance(self.fit.solution, Vehicle):
             return []
         told = [f"! {text}" for _, text in banners(self.fit, self.validation)]
         return told + [f"{label + ':':11} {words}" for label, words, _ in summary(self.fit, self.validation)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,8 +15,10 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling_readings import Line
 from swashplate.identification.responses.response_warnings import damaged
+from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
@@ -30,7 +33,7 @@ class LinearStudy(Study):
         material: responses, fits, trials, search, verification, rival and gains, as far as there are any.
         fitted: flights that the fit was made from, where it was made from flights.
         margins: read off the responses and the model.
-        model: that can be flown and saved; None where there is none.
+        structure: matrices of named expressions, which `model` is made of; None where there is no model.
         remarks: what the user must know beside the fit's own warnings.
     """
 
@@ -39,7 +42,7 @@ class LinearStudy(Study):
     material: ResponseMaterial
     fitted: tuple[Flight, ...] = ()
     margins: tuple[Line, ...] = ()
-    model: StateSpaceModel | None = None
+    structure: StateSpaceModel | None = None
     remarks: tuple[str, ...] = ()
 
     @property
@@ -47,6 +50,11 @@ class LinearStudy(Study):
         """The fit: of a state-space model or of transfer functions."""
         m = self.material
         return m.fit or m.time_fit or (m.transfer_functions[0] if m.transfer_functions else None)
+
+    @cached_property
+    def model(self) -> Vehicle | None:
+        """The vehicle, as `swashplate.vehicle` loads it; None where there is none."""
+        return None if self.structure is None else linear_vehicle(self.structure)
 
     @property
     def verification(self) -> Verification | None:
@@ -82,8 +90,8 @@ class LinearStudy(Study):
         super().write(folder)
         if self.fit is not None:
             self.fit.save(folder / "fit.json")
-        if self.model is not None:
-            atomic.write_text(folder / "model.toml", to_toml(self.model))
+        if self.structure is not None:
+            atomic.write_text(folder / "model.toml", to_toml(self.structure))
         if self.verification is not None:
             self.verification.save(folder / "verification.json")
 

@@ -49,7 +49,7 @@ def validate_linear(
         return verify_inside(one, flown, band=band)
 
     found, rival = along(identified), None if compared is None else along(compared)
-    return LinearStudy(ResponseMaterial(verification=found, rival=rival), model=identified)
+    return LinearStudy(ResponseMaterial(verification=found, rival=rival), structure=identified)
 
 
 def _other(vehicle: Vehicle) -> StateSpaceModel:

@@ -174,6 +174,6 @@ def show(made: Identification | NestedComparison, *, out: Path | None, json: boo
         from swashplate.cli.outputs import place_of
 
         fit = made.fits.fit if isinstance(made, NestedComparison) else made.fit
-        console().print(fit_table(fit) if hasattr(fit.model, "card") else repr(fit))
+        console().print(fit_table(fit) if hasattr(fit.solution, "card") else repr(fit))
         place = place_of(out, "report.html", made.files) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))

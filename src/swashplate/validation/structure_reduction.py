@@ -60,7 +60,7 @@ def reduce(
         return verify(model, hold_out, band=limits) if hold_out else None
 
     allowed = fit.cost + max(LEAST_GROWTH, GROWTH * fit.cost)
-    whole = along(fit.model)
+    whole = along(fit.solution)
     history: list[ReductionStep] = list(fit.details.reduction)
     tried: set[str] = set()
     present = fit
@@ -78,10 +78,10 @@ def reduce(
         for remark, value in ways:
             new = _without(present, name, value)
             after = float("inf") if new is None else new.cost
-            modes, gone = ("", False) if new is None else moved_modes(fit.details.modes, new.model.eigenvalues())
+            modes, gone = ("", False) if new is None else moved_modes(fit.details.modes, new.solution.eigenvalues())
             veto = "a mode has gone or moved beyond its bounds" if gone else ""
             if new is not None and after <= allowed and not veto and whole is not None:
-                veto = _worse(whole, along(new.model))
+                veto = _worse(whole, along(new.solution))
             kept = new is not None and after <= allowed and not veto
             history.append(ReductionStep(name, reason + remark, present.cost, after, kept, veto, modes))
             if progress is not None:
@@ -146,7 +146,7 @@ def _worse(before: Verification, after: Verification | None) -> str:
 
 def _without(fit: StateSpaceFit, name: str, value: float) -> StateSpaceFit | None:
     """The fit again with one parameter held at a value; None where nothing answers then."""
-    model = fit.model.with_values({name: value}, free=False)
+    model = fit.solution.with_values({name: value}, free=False)
     if not model.free:
         return None
     try:

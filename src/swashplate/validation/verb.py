@@ -84,7 +84,7 @@ def validate(
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     flown = as_flights(flights)
-    held = model.model if isinstance(model, Result) else model
+    held = model.solution if isinstance(model, Result) else model
     rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
     # What flies nonlinear vehicles compiles; linear models need none of it, and it takes a second to import.
     if rigid and outputs is None:
@@ -120,7 +120,7 @@ def along_inputs(
     Raises:
         FlightError: an input that the flights lack, or no output that both have.
     """
-    held = model.model if isinstance(model, Result) else model
+    held = model.solution if isinstance(model, Result) else model
     if isinstance(held, Vehicle) and held.structure is None:
         from swashplate.validation.vehicle_verification import verify_vehicle
 

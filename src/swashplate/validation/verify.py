@@ -85,6 +85,8 @@ def verify(
         FlightError: an input that the flights lack, no output that both have, or flights at different rates.
     """
     flights, model = as_flights(flights), structure_of(model)
+    if not flights:
+        raise FlightError("there is no flight to verify the model on.", where=model.name)
     shared = tuple(n for n in (outputs or model.outputs) if all(n in f for f in flights) and n in model.outputs)
     if not shared:
         raise FlightError(

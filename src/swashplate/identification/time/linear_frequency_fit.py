@@ -115,7 +115,7 @@ def fit_in_frequency(
     )
     return Result(
         method=METHOD,
-        model=model.with_values(dict(zip(model.free, map(float, start[:k]), strict=True))),
+        solution=model.with_values(dict(zip(model.free, map(float, start[:k]), strict=True))),
         start=model,
         estimates=estimates,
         names=model.free,

@@ -69,7 +69,7 @@ def section_of_gains(suggestion: Suggestion) -> Section:
 
 def _has_modes(shown: Any) -> bool:
     """Whether its report would look for modes at hover, which a figure does not wait for."""
-    return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.model, "card"))
+    return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.solution, "card"))
 
 
 def _of_report(page: Report, shown: Any) -> Section:
