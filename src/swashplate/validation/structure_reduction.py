@@ -70,7 +70,7 @@ def reduce(
             break
         name, reason = choice
         tried.add(name)
-        p = present.model.parameters[name]
+        p = present.solution.parameters[name]
         # A time constant of zero, say, is no structure with one parameter less.
         ways = [("", p.dropped)] if p.lower <= p.dropped <= p.upper else []
         if present[name].sigma_percent > HOPELESS:
@@ -90,7 +90,7 @@ def reduce(
                 present = new
                 break
     estimates = tuple(replace(p, start=fit[p.name].start) for p in present.estimates)
-    total, _ = moved_modes(fit.details.modes, present.model.eigenvalues())
+    total, _ = moved_modes(fit.details.modes, present.solution.eigenvalues())
     return replace(
         present,
         start=fit.start,

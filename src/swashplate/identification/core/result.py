@@ -18,6 +18,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.sources import DataSource
+from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
 from swashplate.shown import Shown
 
@@ -219,13 +220,14 @@ class Result(Shown, Generic[Model, Details]):
         return str(getattr(self.solution, "name", "transfer functions"))
 
     @cached_property
-    def model(self) -> Any:
+    def model(self) -> Vehicle:
         """The identified vehicle, as `swashplate.vehicle` loads it from its file: it trims, flies and is controlled.
 
         Raises:
             IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
         """
-        return resolve("vehicle_of_result")(self)
+        made: Vehicle = resolve("vehicle_of_result")(self)
+        return made
 
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
