@@ -34,6 +34,7 @@ class Health:
     """What was heard of an autopilot's readiness.
 
     Attributes:
+        texts: everything that it said, in order.
         refusals: why it cannot be armed, in its own words, each once.
         sick: names of sensors that are enabled and not healthy.
         ready: whether its checks passed; None where it never said.
@@ -42,6 +43,7 @@ class Health:
         clock: pairs of wall clock and time since boot [s].
     """
 
+    texts: list[str] = field(default_factory=list)
     refusals: list[str] = field(default_factory=list)
     sick: tuple[str, ...] = ()
     ready: bool | None = None
@@ -87,6 +89,7 @@ class Health:
             ) + text
             if len(message.text) == 50:
                 return
+        self.texts.append(text)
         if text.lower().startswith(REFUSALS) and text not in self.refusals:
             self.refusals.append(text)
 
