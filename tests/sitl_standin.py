@@ -23,14 +23,13 @@ from pathlib import Path
 import numpy as np
 from pymavlink.dialects.v20 import common
 
-from heli_autopilot import Gains, HeliAutopilot, servo_packet
+from heli_autopilot import Gains, HeliAutopilot
 from made_autopilot_logs import Row, dataflash
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 
 STABILIZE, ALT_HOLD, LOITER, LAND, SYSTEM_ID = 0, 2, 5, 9, 25
 SLOW, FAST, CRAWL = 100, 200, 50
 """Frames per second on the ground with a rotor that turns, in the air, and before arming (real SITL: 1200)."""
-RUN_UP_SHARE = 1.0
 HEALTHY = common.MAV_SYS_STATUS_SENSOR_3D_GYRO | common.MAV_SYS_STATUS_AHRS
 PREARM = common.MAV_SYS_STATUS_PREARM_CHECK
 
@@ -50,9 +49,10 @@ class Firmware(HeliAutopilot):
     """ArduCopter as far as a trial meets it.
 
     Attributes:
-        faults: "never-ekf", "reboot" (in the sweep), "crash" (a floating point exception at lift-off), "frozen"
-            (stops sending at lift-off), "frame" (FRAME_CLASS 8 whatever the file says), "old" (version 4.1), "plane",
-            "mute" (no MAVLink), "sweepless" (System ID is refused), "stubborn" (ignores SIGTERM).
+        faults: "never-ekf"; "warm" (an EKF that is ready after 12 s); "reboot" (in the sweep); "crash" (a floating
+            point exception at lift-off); "frozen" (stops sending at lift-off); "sweepless" (System ID is refused);
+            "frame" (FRAME_CLASS 8 whatever the file says); "old" (version 4.1); "plane"; "mute" (no MAVLink);
+            "stubborn" (ignores SIGTERM).
     """
 
     def boot(self, parameters: dict[str, float], ports: tuple[int, int, int], faults: set[str]) -> None:
@@ -81,6 +81,8 @@ class Firmware(HeliAutopilot):
         self.running_since, self.interlocked, self.landed_since = math.inf, False, math.inf
         self.chirp: Chirp | None = None
         self.lift_off = False
+        self.ekf.begun = -30.0 if "warm" in faults else 0.0
+        Path("pid").write_text(str(os.getpid()))
         self.send, self.rate = self.over_udp, CRAWL
         g = parameters
         self.gains = Gains(
@@ -283,10 +285,6 @@ class Firmware(HeliAutopilot):
         Path("logs").mkdir(exist_ok=True)
         rows: list[Row] = [("MSG", (0, "ArduCopter V4.5.7 (stand-in)")), *self.rows]
         Path("logs/00000001.BIN").write_bytes(dataflash(rows))
-
-
-def servo_of(firmware: Firmware) -> bytes:
-    return servo_packet(firmware.rate, firmware.count, firmware._pulses)
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
 from swashplate.errors import LinkError, SwashError
 from swashplate.extras import library
+from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.readers.read import read
 from swashplate.links.ardupilot.mixing import MIXER_AXES, hover_stick, mixed, mixer_response
@@ -42,7 +43,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import LinearModel, linearize
-from swashplate.simulation.standing import standing
+from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.trim import trim
 
 OLDEST = (4, 5)
@@ -69,6 +70,7 @@ def accept_autopilot(
     band: tuple[float, float] = (0.4, 8.0),
     seconds: float = 40.0,
     hover: float = 10.0,
+    height: float = 5.0,
     ekf: float = 120.0,
     defaults: Sequence[str | Path] = (),
     environment: Environment | None = None,
@@ -90,6 +92,7 @@ def accept_autopilot(
         truth: whose linearisation the estimates are held against; the vehicle's own where None.
         axes: that are swept, of roll, pitch, yaw and heave.
         band: of the sweeps [Hz]. seconds: of each. hover: in each mode [s].
+        height: of the hover [m].
         ekf: simulated time that the autopilot has until it can be armed [s].
         defaults: parameter files of yours, read last.
         environment: wind and air.
@@ -108,17 +111,22 @@ def accept_autopilot(
     folder = Path(out) / "sitl"
     if folder.exists():
         raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
-    around = environment_of(vehicle, environment)
-    aircraft = standing(vehicle)
-    mapping = mapping_of(aircraft, servos, name=name, suffix="")
-    level = trim(vehicle, environment=environment)
-    model = linearize(vehicle, level)
-    other = model if truth is None else linearize(truth, trim(truth, environment=environment))
-    moves, expected = mixed(mapping, model), parameters(mapping, vehicle, level)
-    chirps = {axis: _chirp(model, moves[axis], axis, band, seconds, float(around.gravity)) for axis in axes}
-    called = name or vehicle.card.called
+    # What can be refused is refused before anything is compiled.
     files = ["trial.parm", "vehicle.parm", *(f"yours-{k + 1}.parm" for k in range(len(defaults)))]
+    for file in defaults:
+        if not Path(file).is_file():
+            raise SwashError("there is no such file.", where=file, channel="--defaults")
     sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup)
+    listen_udp("127.0.0.1", sitl.physics_port).close()
+    called, around = name or vehicle.card.called, environment_of(vehicle, environment)
+    aircraft, flying = standing(vehicle), airborne(vehicle)
+    mapping = mapping_of(aircraft, servos, name=name, suffix="")
+    say("trimming and linearising the vehicle")
+    level = trim(flying, environment=environment)
+    model = linearize(flying, level)
+    other = model if truth is None else _linear(airborne(truth), environment)
+    moves, expected = mixed(mapping, model), parameters(mapping, flying, level)
+    chirps = {axis: _chirp(model, moves[axis], axis, band, seconds, float(around.gravity)) for axis in axes}
     first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
     with listen_udp("127.0.0.1", sitl.physics_port) as bound:
         say("compiling the vehicle")
@@ -133,7 +141,8 @@ def accept_autopilot(
                 hover_stick=hover_stick(mapping, model),
                 depth=plant.standing_depth,
             )
-            plan = TrialPlan(chirps, float(expected.get("H_RSC_RUNUP_TIME", -1.0)) + 1.0, hover=hover, ekf=ekf)
+            run_up = float(expected.get("H_RSC_RUNUP_TIME", -1.0)) + 1.0
+            plan = TrialPlan(chirps, run_up, height=height, hover=hover, ekf=ekf)
             piloted = Piloted(session, pilot)
             with Background(lambda go_on: serve(bound, piloted, go_on=go_on)) as physics, sitl:
                 lines, version, flown, speed, loop = _flown(
@@ -148,7 +157,7 @@ def accept_autopilot(
             late, gravity = 0.5 / loop, float(around.gravity)
             return mixer_response(other, mixed(mapping, other)[axis], output, omega, late=late, gravity=gravity)
 
-        found = _judged(logs, {axis: chirps[axis] for axis in flown}, true, lines)
+        found = _judged(logs, {axis: chirps[axis] for axis in flown}, true, pilot, lines)
     log = logs[-1] if logs else None
     return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), found, log, folder, speed)
 
@@ -165,6 +174,10 @@ def _chirp(
     return Chirp.planned(a.number, float(f"{most:.2g}"), band, record=seconds, fade=1.0)
 
 
+def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
+    return linearize(vehicle, trim(vehicle, environment=environment))
+
+
 def _heave(model: LinearModel, moved: Array) -> float:
     return float((model.B @ moved)[model.states.index("w")])
 
@@ -172,9 +185,6 @@ def _heave(model: LinearModel, moved: Array) -> float:
 def _write_files(
     folder: Path, files: Sequence[str], expected: Parameters, chirp: Chirp, yours: Sequence[str | Path], title: str
 ) -> None:
-    for file in yours:
-        if not Path(file).is_file():
-            raise SwashError("there is no such file.", where=file, channel="--defaults")
     folder.mkdir(parents=True)
     trial = trial_parameters(expected, chirp)
     lines = "".join(f"{key},{value:.6g}\n" for key, value in trial.items())
@@ -270,7 +280,7 @@ def _parameters_right(reading: ParameterReading, expected: Parameters, lines: li
 
 
 def _judged(
-    logs: Sequence[Path], flown: Mapping[str, Chirp], true: Truth, lines: list[TrialLine]
+    logs: Sequence[Path], flown: Mapping[str, Chirp], true: Truth, pilot: TrialPilot, lines: list[TrialLine]
 ) -> TruthBeside | None:
     """The estimates of the newest log; lines are added for the log and for each of them."""
     if not logs:
@@ -280,9 +290,18 @@ def _judged(
         flight = read(logs[-1])
         damage = "; ".join(flight.provenance.damage)
         lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
+        lines.append(_rotor_line(flight, pilot))
         found = beside_truth(flight, flown, true, rate=_RATE)
     except SwashError as error:
         lines.append(TrialLine("log", str(error), "read", False))
         return None
     lines += found.lines
     return found
+
+
+def _rotor_line(flight: Flight, pilot: TrialPilot) -> TrialLine:
+    """The rotor speed that the log has, beside the true one; told, not judged: not every version reads it."""
+    true = float(np.max([seen.rotor for seen in pilot.seen])) * 30.0 / math.pi
+    logged = float(np.max(flight.values("omega_rotor"))) * 30.0 / math.pi if "omega_rotor" in flight else 0.0
+    found = f"{logged:.0f} rpm" if logged else "none: this version reads no rpm, or RPM1_TYPE is not 10"
+    return TrialLine("rotor speed in the log, largest", found, f"{true:.0f} rpm")

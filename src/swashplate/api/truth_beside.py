@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.api.fit_ss import fit_ss
 from swashplate.api.fit_tf import fit_tf
@@ -29,6 +30,8 @@ _LEAST_SHARE = 0.7
 """Share of the band that must be coherent, else the sweep has told too little."""
 STRUCTURES: Mapping[tuple[str, ...], str] = {("roll", "pitch"): "rotor_body", ("yaw",): "yaw", ("heave",): "heave"}
 """Ready structures by the axes that they describe."""
+FORMS: Mapping[str, str] = {"roll": "0/2", "pitch": "0/2", "yaw": "0/1", "heave": "1/1"}
+"""Zeros over poles of an axis in hover: a rotor that tilts, and a body that is damped; az of one that climbs."""
 
 Truth = Callable[[str, str, Array], Complex]
 """Response of an axis' command to a channel ("p") over frequency [rad/s]."""
@@ -102,7 +105,8 @@ def _judge(
 ) -> None:
     named = [MIXER_AXES[axis] for axis in axes]
     inputs, outputs = [a.input for a in named], [a.output for a in named]
-    logged = {a.output: a.logged for a in named}
+    # Without another message that has the channel, System ID's own has the plain name.
+    logged = {a.output: a.logged if a.logged in flight else a.output for a in named}
     if missing := [name for name in (*inputs, *logged.values()) if name not in flight]:
         raise FlightError("is not in the log.", channel=", ".join(missing))
     pieces = [flight.between(part.start, part.stop) for part in parts]
@@ -113,7 +117,7 @@ def _judge(
     found.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
     studies: list[tuple[str, Any]] = []
     for axis, a in zip(axes, named, strict=True):
-        fit = fit_tf(responses, input=a.input, outputs=[a.output])
+        fit = fit_tf(responses, input=a.input, outputs=[a.output], form=FORMS[axis])
         found.models.append(f"{axis}, fit-tf: {fit.material.transfer_functions[0].model[0]!r}")
         studies.append((axis, fit))
     structure = STRUCTURES.get(tuple(axes))
@@ -141,7 +145,7 @@ def _judge(
         found.lines.append(_lateness(axis, h, true, responses, good))
 
 
-def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: Array) -> TrialLine:
+def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_]) -> TrialLine:
     """The largest distance over the coherent lines; the random errors there widen what is allowed."""
     if not good.any():
         return TrialLine(what, "nothing coherent", f"within {GAIN:g} dB and {PHASE:g} deg", False)
@@ -154,7 +158,7 @@ def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: Ar
     return TrialLine(what, found, f"within {GAIN:g} dB and {PHASE:g} deg", passed)
 
 
-def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: Array) -> TrialLine:
+def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: NDArray[np.bool_]) -> TrialLine:
     """How much later than the truth the estimate is, as a pure delay [ms]; told, not judged: the phase is."""
     omega = responses.omega[good]
     late = -float(np.sum(omega * np.angle(h[good] / true[good])) / np.sum(omega**2)) if good.any() else float("nan")

@@ -288,7 +288,7 @@ def test_wind_battery_and_noise_are_told() -> None:
     assert told["battery"]["voltage"] == pytest.approx(11.5, abs=0.01)
     assert 0.05 < told["battery"]["current"] < 5.0
     assert told["rpm"]["rpm_1"] > 1000.0
-    assert told["rpm_2"] > 1000.0
+    assert told["rpm"]["rpm_2"] > 1000.0
 
     def noisy(seed: int) -> np.ndarray:
         at = bench("raptor50", unit=InertialUnit(), seed=seed)

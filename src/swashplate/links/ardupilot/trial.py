@@ -10,10 +10,12 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.errors import LinkError
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.links.ardupilot.session import ArduPilotSession
@@ -236,7 +238,7 @@ class Trial:
         """A while in a mode, and how far it strays: from the place (where it is kept) and in height."""
         self.set_mode(name, mode)
         self.pilot.hands = hands
-        self.pause(5.0)
+        self.pause(min(5.0, self.plan.hover))
         first = len(self.pilot.seen)
         self.pause(self.plan.hover)
         rows = np.array(self.pilot.seen[first:])
@@ -253,29 +255,29 @@ class Trial:
         self.set_mode("STABILIZE", STABILIZE)
         self.pause(4.0)
         for name, value in chirp.parameters().items():
-            if not self._asked(
-                lambda n=name, v=value: self.autopilot.set_value(n, v),  # type: ignore[misc]
-                lambda n=name, v=value: math.isclose(self.autopilot.values.get(n, math.nan), v, rel_tol=1e-5),  # type: ignore[misc]
-                longest=15.0,
-            ):
+            ask, done = partial(self.autopilot.set_value, name, value), partial(self._has, name, value)
+            if not self._asked(ask, done, longest=15.0):
                 self._end(f"sweep of {axis}", f"{name} cannot be set to {value:g}", "set")
         said = len(self.autopilot.health.texts)
         self.set_mode("SYSTEMID", SYSTEM_ID)
         until = self.time + START_DELAY + chirp.record + 0.5
-        ours = lambda: [t for t in self.autopilot.health.texts[said:] if t.startswith("SystemID ")]  # noqa: E731
-        self.wait(
-            lambda: self.time >= until or any("Stopped" in t or "Error" in t for t in ours()),
-            longest=chirp.record + 10.0,
-        )
-        bad = [text for text in ours() if "Stopped" in text or "Error" in text]
-        early = self.time < until - 0.4
-        if bad and early:
-            self._tell(f"sweep of {axis}", bad[0], "flown to its end", False)
+
+        def bad() -> list[str]:
+            texts = self.autopilot.health.texts[said:]
+            return [text for text in texts if text.startswith(("SystemID Stopped", "SystemID Parameter Error"))]
+
+        self.wait(lambda: self.time >= until or bool(bad()), longest=chirp.record + 10.0)
+        if bad() and self.time < until:
+            self._tell(f"sweep of {axis}", bad()[0], "flown to its end", False)
         else:
             self.flown.append(axis)
             self._tell(f"sweep of {axis}", f"flown, {chirp.record:g} s", "flown to its end", True)
         self.set_mode("STABILIZE", STABILIZE)
         self.pause(2.0)
+
+    def _has(self, name: str, value: float) -> bool:
+        """Whether the autopilot has said that a parameter is so."""
+        return math.isclose(self.autopilot.values.get(name, math.nan), value, rel_tol=1e-5)
 
     def land(self) -> None:
         """In LAND, until it disarms itself."""
@@ -292,7 +294,7 @@ class Trial:
         self._tell("landing", found, "on the ground, upright, disarmed", down and -now.down < 0.1 and lean < 10.0)
 
 
-def strayed(rows: np.ndarray) -> tuple[float, float, float]:
+def strayed(rows: Array) -> tuple[float, float, float]:
     """How far looks (rows of `Seen`) are at most from their middle in place and height [m], and the lean [rad]."""
     seen = Seen(*rows.T)
     centre = [0.5 * (float(np.max(x)) + float(np.min(x))) for x in (seen.north, seen.east, seen.down)]

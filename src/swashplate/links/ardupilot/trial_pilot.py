@@ -81,7 +81,8 @@ class TrialPilot:
             return
         self._due = time + PERIOD
         body, v = moved.body, moved.velocity
-        now = Seen(time, *map(float, (body.x, body.y, body.z + self.depth, body.phi, body.theta, body.psi)), rotor)
+        x, y, z, phi, theta, psi = map(float, (body.x, body.y, body.z, body.phi, body.theta, body.psi))
+        now = Seen(time, x, y, z + self.depth, phi, theta, psi, rotor)
         self.seen.append(now)
         leans = self.hands in ("flying", "height let go")
         roll, pitch = self._lean(now, float(v.x), float(v.y)) if leans else (0.0, 0.0)
