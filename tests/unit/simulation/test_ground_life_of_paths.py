@@ -58,7 +58,7 @@ def schedule(made: Vehicle, parked: float) -> tuple[np.ndarray, dict[str, slice]
         for power, seconds in powers:
             hold(power, seconds)
         places[f"turning {round_}"] = slice(begun, len(rows))
-        hold(0.0, 3.0 if len(powers) > 1 else 20.0)
+        hold(0.0, 3.0 if len(powers) > 1 else 120.0)  # a helicopter's rotor runs down for minutes
         places[f"down {round_}"] = slice(len(rows) - 50, len(rows))
     return np.array(rows), places
 
