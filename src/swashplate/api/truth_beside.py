@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,15 +114,15 @@ def _judge(
     responses = respond(records, inputs=inputs, outputs=outputs, band=(1.25 * low, 0.75 * high))
     words = f"{' and '.join(axes)}: "
     found.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
-    studies: list[tuple[str, Any]] = []
+    simple = []
     for axis, a in zip(axes, named, strict=True):
         fit = fit_tf(responses, input=a.input, outputs=[a.output], form=FORMS[axis])
-        found.models.append(f"{axis}, fit-tf: {fit.material.transfer_functions[0].model[0]!r}")
-        studies.append((axis, fit))
-    structure = STRUCTURES.get(tuple(axes))
-    if structure is not None:
-        fitted = fit_ss(structure, responses)
-        found.models.append(f"{' and '.join(axes)}, fit-ss: {fitted.model!r}")
+        simple.append(fit.material.transfer_functions[0].solution[0])
+        found.models.append(f"{axis}, fit-tf: {simple[-1]!r}")
+    name = STRUCTURES.get(tuple(axes))
+    fitted = None if name is None else fit_ss(name, responses).structure
+    if fitted is not None:
+        found.models.append(f"{' and '.join(axes)}, fit-ss: {fitted!r}")
     for place, (axis, a) in enumerate(zip(axes, named, strict=True)):
         h, coherence, error = responses.pair(a.output, a.input)
         good = np.isfinite(h) & (coherence >= COHERENT)
@@ -134,13 +133,13 @@ def _judge(
         found.lines.append(
             TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
         )
-        models = {"fit-tf": studies[place][1].material.transfer_functions[0].model[0].response(responses.omega)}
-        if structure is not None and fitted.model is not None:
-            o, i = fitted.model.outputs.index(a.output), list(fitted.model.inputs).index(a.input)
-            models["fit-ss"] = fitted.model.response(responses.omega)[:, o, i]
-        for name, estimate in {"respond": h, **models}.items():
-            curves[name] = (responses.omega, curves[name][1] if name in curves else estimate)
-            found.lines.append(_verdict(f"{axis}: {name} beside truth", estimate, true, error, good))
+        models = {"fit-tf": np.asarray(simple[place].response(responses.omega))}
+        if fitted is not None:
+            o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
+            models["fit-ss"] = fitted.response(responses.omega)[:, o, i]
+        curves |= {verb: (responses.omega, estimate) for verb, estimate in models.items()}
+        for verb, estimate in {"respond": h, **models}.items():
+            found.lines.append(_verdict(f"{axis}: {verb} beside truth", estimate, true, error, good))
         found.curves[(a.output, a.input)] = curves
         found.lines.append(_lateness(axis, h, true, responses, good))
 

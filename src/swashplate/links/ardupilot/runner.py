@@ -14,7 +14,7 @@ _LOOK_UP = 0.2
 """s between looks at whether to go on."""
 
 
-class Answers(Protocol):
+class Answering(Protocol):
     """What answers datagrams: a session."""
 
     def handle(self, data: bytes, sender: tuple[str, int], now: float) -> bytes | None:
@@ -23,7 +23,7 @@ class Answers(Protocol):
 
 def serve(
     bound: socket.socket,
-    session: Answers,
+    session: Answering,
     *,
     idle_exit: float | None = None,
     go_on: Callable[[], bool] = lambda: True,
