@@ -21,7 +21,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from pymavlink.dialects.v20 import common
+from pymavlink.dialects.v20 import ardupilotmega as common
 
 from heli_autopilot import Gains, HeliAutopilot
 from made_autopilot_logs import Row, dataflash
@@ -49,10 +49,10 @@ class Firmware(HeliAutopilot):
     """ArduCopter as far as a trial meets it.
 
     Attributes:
-        faults: "never-ekf"; "warm" (an EKF that is ready after 12 s); "reboot" (in the sweep); "crash" (a floating
-            point exception at lift-off); "frozen" (stops sending at lift-off); "sweepless" (System ID is refused);
-            "frame" (FRAME_CLASS 8 whatever the file says); "old" (version 4.1); "plane"; "mute" (no MAVLink);
-            "stubborn" (ignores SIGTERM).
+        faults: "never-ekf"; "nowhere" (its checks pass, the EKF has no place); "warm" (ready after 12 s);
+            "reboot" (in the sweep); "crash" (a floating point exception at lift-off); "frozen" (stops sending at
+            lift-off); "sweepless" (System ID is refused); "frame" (FRAME_CLASS 8 whatever the file says); "old"
+            (version 4.1); "plane"; "mute" (no MAVLink); "stubborn" (ignores SIGTERM).
     """
 
     def boot(self, parameters: dict[str, float], ports: tuple[int, int, int], faults: set[str]) -> None:
@@ -128,6 +128,9 @@ class Firmware(HeliAutopilot):
     def status(self) -> None:
         healthy = HEALTHY | (0 if self.refusal() else PREARM)
         self.tell("sys_status", HEALTHY | PREARM, HEALTHY | PREARM, healthy, *(0,) * 10)
+        if self.now > 2.0:  # silent until the estimator has begun
+            placed = 16 if not self.refusal() and "nowhere" not in self.faults else 128
+            self.tell("ekf_status_report", 7 | placed, 0.1, 0.1, 0.1, 0.1, 0.1)
         self.tell("system_time", 0, round(1e3 * self.now))
 
     def listen(self) -> None:

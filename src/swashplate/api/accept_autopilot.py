@@ -107,7 +107,7 @@ def accept_autopilot(
     """
     if unknown := [axis for axis in axes if axis not in MIXER_AXES]:
         raise SwashError(f"'{unknown[0]}' is none of {', '.join(MIXER_AXES)}.", channel="axes")
-    library("pymavlink.dialects.v20.common", what="a trial over MAVLink")
+    library("pymavlink.dialects.v20.ardupilotmega", what="a trial over MAVLink")
     folder = Path(out) / "sitl"
     if folder.exists():
         raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")

@@ -179,16 +179,17 @@ class Trial:
         self.land()
 
     def wait_for_ekf(self) -> None:
-        """Until its own checks let it be armed."""
+        """Until its EKF has a place, without which LOITER is refused, and its own checks let it be armed."""
         health = self.autopilot.health
 
         def ask() -> None:
             health.refusals.clear()
             self.autopilot.ask_readiness(interval=0.5)
 
-        found = self._asked(ask, lambda: health.ready is True and self.time > 1.0, longest=self.plan.ekf)
+        found = self._asked(ask, lambda: health.ready is True and health.placed is True, longest=self.plan.ekf)
         if not found:
             why = "; ".join(health.refusals) or ", ".join(health.sick) or "it does not say why"
+            why = "its EKF has no place" if health.ready else why
             self._end("ready to be armed", f"not within {self.plan.ekf:g} s: {why}", f"within {self.plan.ekf:g} s")
         self._tell("ready to be armed", f"after {self.time:.0f} s", f"within {self.plan.ekf:g} s", True)
 
@@ -290,8 +291,8 @@ class Trial:
             self.pause(2.0)
         now = self.pilot.seen[-1]
         lean = math.degrees(math.hypot(now.roll, now.pitch))
-        found = f"{-now.down:.2f} m high, {lean:.1f} deg, {'disarmed' if down else 'still armed'}"
-        self._tell("landing", found, "on the ground, upright, disarmed", down and -now.down < 0.1 and lean < 10.0)
+        found = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if down else 'still armed'}"
+        self._tell("landing", found, "on the ground, upright, disarmed", down and abs(now.down) < 0.1 and lean < 10.0)
 
 
 def strayed(rows: Array) -> tuple[float, float, float]:

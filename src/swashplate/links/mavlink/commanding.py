@@ -11,7 +11,7 @@ from swashplate.links.mavlink.greeting import beat
 from swashplate.links.mavlink.health import Health
 
 _DO_SET_MODE, _ARM_DISARM, _REQUEST_MESSAGE, _SET_MESSAGE_INTERVAL, _RUN_PREARM_CHECKS = 176, 400, 512, 511, 401
-_AUTOPILOT_VERSION, _SYS_STATUS, _SYSTEM_TIME = 148, 1, 2
+_AUTOPILOT_VERSION, _SYS_STATUS, _SYSTEM_TIME, _EKF_STATUS_REPORT = 148, 1, 2, 193
 _CUSTOM_MODE_ENABLED = 1.0
 _REAL32 = 9
 ACCEPTED = 0
@@ -73,8 +73,8 @@ class Commanding:
         self.command(_REQUEST_MESSAGE, _AUTOPILOT_VERSION)
 
     def ask_readiness(self, *, interval: float) -> None:
-        """Ask for its checks before arming, and for SYS_STATUS and its clock every `interval` [s]."""
-        for number in (_SYS_STATUS, _SYSTEM_TIME):
+        """Ask for its checks before arming, and for SYS_STATUS, its clock and its EKF every `interval` [s]."""
+        for number in (_SYS_STATUS, _SYSTEM_TIME, _EKF_STATUS_REPORT):
             self.command(_SET_MESSAGE_INTERVAL, number, 1e6 * interval)
         self.command(_RUN_PREARM_CHECKS)
 
