@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from swashplate import public
 
 if TYPE_CHECKING:
+    from swashplate.api.accept_autopilot import accept_autopilot
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -127,6 +128,7 @@ __all__ = [
     "Vector",
     "Vehicle",
     "__version__",
+    "accept_autopilot",
     "autopilot",
     "check_autopilot",
     "check_controller",

@@ -76,6 +76,7 @@ _LIGHT: Mapping[str, str] = {
 _COMPUTING: Mapping[str, str] = {
     "QUIET": "swashplate.simulation.sensors:QUIET",
     "Sensors": "swashplate.simulation.sensors:Sensors",
+    "accept_autopilot": "swashplate.api.accept_autopilot:accept_autopilot",
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_autopilot": "swashplate.api.check_autopilot:check_autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",
