@@ -161,7 +161,9 @@ class Desk:
         """
         opened = self.log(number)
         flight, found = opened.ready, opened.inspection
-        if found is None or not sweep < len(found.sweeps):
+        if found is None:
+            raise SwashError("is still being checked.", where=opened.read.file, hint="Wait until its findings stand.")
+        if not sweep < len(found.sweeps):
             raise SwashError(f"has no sweep {sweep + 1}.", where=opened.read.file)
         chosen = channels_of(flight, found.sweeps[sweep], input=input, output=output)
         with self._lock:
