@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, rotation
@@ -258,7 +257,11 @@ def _pieces(flight: Flight, names: Sequence[str], time: Array, reference: Refere
         return
     own = 1.0 / float(np.median(np.diff(stamps)))
     rate = min(own, 1.0 / float(np.median(np.diff(time))), _FASTEST)
-    table = uniform_filter1d(table, max(1, round(own / rate)), axis=0)  # vibration must not fold into the band
+    width = round(own / rate)
+    if width > 1:  # vibration must not fold into the band
+        from scipy.ndimage import uniform_filter1d  # a quarter of a second that most logs need not wait
+
+        table = uniform_filter1d(table, width, axis=0)
     gap = max(_MAX_GAP, 2.5 / rate)
     for start, stop in common(unbroken(time, max_gap=gap), unbroken(stamps, max_gap=gap)):
         grid = start + np.arange(int((stop - start) * rate)) / rate
