@@ -26,6 +26,7 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report
 from swashplate.reporting.summary import banners, summary
+from swashplate.shown import Shown
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
@@ -36,7 +37,7 @@ TRACKED = ("prediction-error", "output-error", "nelder-mead")
 
 
 @dataclass(frozen=True, repr=False)
-class Identification:
+class Identification(Shown):
     """A vehicle identified from flights, and how it predicts others.
 
     Attributes:
@@ -46,6 +47,11 @@ class Identification:
 
     fit: Result[Vehicle, FlightDetails]
     validation: Validation | None
+
+    @property
+    def model(self) -> Vehicle:
+        """The vehicle with the identified numbers."""
+        return self.fit.model
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON, without time histories."""

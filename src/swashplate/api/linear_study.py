@@ -20,6 +20,7 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.validation.verification import Verification
 
 FILES = ("report.html", "fit.json", "model.toml", "verification.json")
@@ -27,7 +28,7 @@ FILES = ("report.html", "fit.json", "model.toml", "verification.json")
 
 
 @dataclass(frozen=True, repr=False)
-class LinearStudy:
+class LinearStudy(Shown):
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:

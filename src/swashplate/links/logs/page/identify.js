@@ -98,4 +98,9 @@ export function begin() {
   on("logs", show);
   on("view", (name) => name === "identify" && show());
   on("theme", show);
+  let width = innerWidth; // a telephone that is turned; its height changes with every scroll
+  addEventListener("resize", () => {
+    if (width !== innerWidth) show();
+    width = innerWidth;
+  });
 }
