@@ -45,6 +45,11 @@ class Identification(ReportFolder):
     fit: Result[Vehicle, FlightDetails]
     validation: Validation | None
 
+    @property
+    def model(self) -> Vehicle:
+        """The vehicle with the identified numbers."""
+        return self.fit.model
+
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON, without time histories."""
         validation = self.validation and self.validation.as_dict()
