@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from swashplate import public
 
 if TYPE_CHECKING:
+    from swashplate.api.autopilot_gains import autopilot_gains
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -126,6 +127,7 @@ __all__ = [
     "Vehicle",
     "__version__",
     "autopilot",
+    "autopilot_gains",
     "check_autopilot",
     "check_controller",
     "compare",
