@@ -51,8 +51,8 @@ _SEEN = (1.0, 10.0)
 _NEAR = 6.0
 """rad/s: where commands are compared between vehicles and axes."""
 _SHARES = np.geomspace(0.02, 5.0, 20)
-_LOUDEST = 3.0
-"""Of a full command per rad/s of the gyros' noise, P and D together."""
+_STRONGEST, _LOUDEST = 0.5, 2.5
+"""Of a full command per rad/s: P alone, the end of ArduPilot's range for roll and pitch, and with D for noise."""
 _SLOW = 1.0
 """rad/s: modes of place and speed below it may grow while no place is held."""
 _DAMPED, _SWIFT = 0.04, 50.0
@@ -235,7 +235,8 @@ def _attitude_sets(plant: CascadePlant, k: Mapping[str, float], axes: tuple[int,
     near = int(np.argmin(np.abs(plant.omega - _NEAR)))
     ones = {i: 1.0 / float(np.abs(plant.response[near, i, i])) for i in axes}
     loud = grid[0] * (1.0 + grid[2] * 2.0 * np.pi * max(k[f"ATC_RAT_{AXES[i]}_FLTD"] for i in axes))
-    grid = grid[:, loud * max(ones.values()) <= _LOUDEST]
+    most = max(ones.values())
+    grid = grid[:, (loud * most <= _LOUDEST) & (grid[0] * most <= _STRONGEST)]
     for i in axes:
         p = grid[0] * ones[i]
         axis = AXES[i]
