@@ -141,15 +141,15 @@ class AutopilotGains:
             text_table(("parameter", "value"), [(name, f"{self.parameters[name]:.4g}") for name in self.gains])
         )
         if self.flown:
-            head = ("flown in still air", "lean [deg]", "heading [deg]", "height [m]", "place [m]", "last 20 s [m]")
-            rows = [
+            above = ("flown in still air", "lean [deg]", "heading [deg]", "height [m]", "place [m]", "last 20 s [m]")
+            cells = [
                 (
                     flight.mode,
                     *(_cell(v) for v in (flight.lean, flight.heading, flight.height, flight.place, flight.still)),
                 )
                 for flight in self.flown
             ]
-            lines += ["", text_table(head, rows)]
+            lines += ["", text_table(above, cells)]
             lines.append("from 2 degrees of lean and 0.14 m/s, integrals at zero: the farthest from what is held")
         return "\n".join([*lines, *(["", *self.problems] if self.problems else [])])
 

@@ -118,7 +118,7 @@ def feedback(omega: Array, k: Sets, *, height: bool = True, place: bool = True) 
         k: all parameters of the law.
         height, place: whether these loops are closed.
     """
-    s = 1j * np.asarray(omega)
+    s: Complex = np.asarray(1j * np.asarray(omega), dtype=np.complex128)
     m = max(np.size(value) for value in k.values())
     at = {name: np.broadcast_to(np.asarray(value, float), (m,)) for name, value in k.items()}
     K = np.zeros((m, s.size, 4, 12), dtype=np.complex128)
@@ -134,8 +134,8 @@ def feedback(omega: Array, k: Sets, *, height: bool = True, place: bool = True) 
         ahead.append(target * (angle * shape[0] + shape[1]))
     if place:
         e = _one(s, at["PSC_VELXY_FLTE"])
-        p, i, d = (at[f"PSC_VELXY_{n}"][:, None] for n in "PID")
-        speed = e * (p + i / s + d * s * _one(s, at["PSC_VELXY_FLTD"])) / GRAVITY
+        p, sums, d = (at[f"PSC_VELXY_{n}"][:, None] for n in "PID")
+        speed = e * (p + sums / s + d * s * _one(s, at["PSC_VELXY_FLTD"])) / GRAVITY
         for command, output, sign in ((0, 7, 1.0), (1, 6, -1.0)):
             K[:, :, command, output] = sign * speed * ahead[command]
             K[:, :, command, 3 + output] = K[:, :, command, output] * at["PSC_POSXY_P"][:, None]

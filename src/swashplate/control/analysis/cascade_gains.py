@@ -161,8 +161,8 @@ def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays:
         ranked = np.argsort(-worth, kind="stable")
         growing: set[float] = set()
         for share in (1.0, 0.5, 0.0):
-            kept = (loops.gain >= GAIN_KEPT + share * spare[0]) & (loops.phase >= PHASE_KEPT + share * spare[1])
-            kept = (kept & (loops.peak <= PEAK_KEPT - share * spare[2])).all(axis=1)
+            each = (loops.gain >= GAIN_KEPT + share * spare[0]) & (loops.phase >= PHASE_KEPT + share * spare[1])
+            kept = np.asarray(np.all(each & (loops.peak <= PEAK_KEPT - share * spare[2]), axis=1))
             order = [int(i) for i in ranked if kept[i]]
             for i in [i for i in order if loops.turns[i] not in growing][:_TRIED]:
                 if loops.turns[i] in growing:

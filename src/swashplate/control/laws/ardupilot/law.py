@@ -137,7 +137,8 @@ def ardupilot_step(
     head, rest = len(_HEAD), len(_HEAD) + len(_NAMES)
     dt, height, place = (gains[i] for i in range(head))
     k = {name: gains[head + i] for i, name in enumerate(_NAMES)}
-    mixer = FRAMES[frame](*(gains[rest + i] for i in range(len(FRAMES[frame]._fields))))
+    numbers: Any = [gains[rest + i] for i in range(len(FRAMES[frame]._fields))]
+    mixer = FRAMES[frame](*numbers)
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
     heli = frame == "swashplate"

@@ -61,7 +61,7 @@ class SwashplateMixer(NamedTuple):
         beyond = jnp.where(jnp.abs(wanted[2]) > 1.0, 1.0, 0.0)
         return Mixed(jnp.stack([jnp.asarray(v, float) for v in inputs]), jnp.stack([cut, cut, beyond]))
 
-    def unmixed(self, inputs: Sequence[float], k: Mapping[str, float]) -> Array:
+    def unmixed(self, inputs: Sequence[float] | Array, k: Mapping[str, float]) -> Array:
         """Roll, pitch, yaw and throttle that give these inputs, shape (4,)."""
         theta0, b1, a1, tail = inputs[:4]
         roll, pitch = a1 / self.side, -b1 / self.ahead
@@ -111,7 +111,7 @@ class CoaxialMixer(NamedTuple):
         cut = [scaled | (jnp.abs(flaps[0]) > 1.0), scaled | (jnp.abs(flaps[1]) > 1.0), yaw != wanted[2]]
         return Mixed(inputs, jnp.stack(cut).astype(float))
 
-    def unmixed(self, inputs: Sequence[float], k: Mapping[str, float]) -> Array:
+    def unmixed(self, inputs: Sequence[float] | Array, k: Mapping[str, float]) -> Array:
         """As `SwashplateMixer.unmixed`."""
         lower, upper = (_thrust(command, k) for command in inputs[:2])
         thrust = _HALF * (lower + upper)
