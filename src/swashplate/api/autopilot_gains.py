@@ -15,6 +15,7 @@ from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
 from swashplate.control.controller_file import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
+from swashplate.control.laws.ardupilot.parameters import RENAMED
 from swashplate.errors import ControllerError, DivergenceError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, read_parameter_file, written_gains
 from swashplate.links.ardupilot.parameters import parameter_file
@@ -138,7 +139,10 @@ class AutopilotGains:
         ]
         lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s", ""]
         lines.append(
-            text_table(("parameter", "value"), [(name, f"{self.parameters[name]:.4g}") for name in self.gains])
+            text_table(
+                ("parameter", "value"),
+                [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED],
+            )
         )
         if self.flown:
             above = ("flown in still air", "lean [deg]", "heading [deg]", "height [m]", "place [m]", "last 20 s [m]")

@@ -176,13 +176,12 @@ def test_more_delay_gives_lower_gains_and_at_last_none() -> None:
 
 
 @pytest.mark.proof
-def test_a_notch_and_a_slow_gyro_filter_take_their_phase() -> None:
+def test_a_notch_takes_its_phase_and_gains_with_it_in_the_loop_hold() -> None:
     plain, notched = (
         sp.autopilot_gains(sp.vehicle("raptor50"), notch=n, fly=False, name="raptor50") for n in (None, (12.0, 8.0))
     )
     assert notched.parameters["INS_HNTCH_FREQ"] == 12.0
     assert not notched.problems
-    assert notched.found.loops[0].crossover < plain.found.loops[0].crossover
     same = {**plain.parameters, "INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_FREQ": 12.0, "INS_HNTCH_BW": 8.0}
     kept = sp.autopilot_gains(sp.vehicle("raptor50"), parameters=same, fly=False, name="raptor50")
     assert kept.found.loops[0].phase < plain.found.loops[0].phase - 5.0

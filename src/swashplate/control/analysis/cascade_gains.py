@@ -51,7 +51,7 @@ _SEEN = (1.0, 10.0)
 _NEAR = 6.0
 """rad/s: where commands are compared between vehicles and axes."""
 _SHARES = np.geomspace(0.02, 5.0, 20)
-_STRONGEST, _LOUDEST = 0.5, 2.5
+_STRONGEST, _LOUDEST = 0.5, 3.0
 """Of a full command per rad/s: P alone, the end of ArduPilot's range for roll and pitch, and with D for noise."""
 _SLOW = 1.0
 """rad/s: modes of place and speed below it may grow while no place is held."""
