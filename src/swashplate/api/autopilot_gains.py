@@ -138,12 +138,8 @@ class AutopilotGains:
             for loop in self.found.loops
         ]
         lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s", ""]
-        lines.append(
-            text_table(
-                ("parameter", "value"),
-                [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED],
-            )
-        )
+        shown = [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED]
+        lines.append(text_table(("parameter", "value"), shown))
         if self.flown:
             above = ("flown in still air", "lean [deg]", "heading [deg]", "height [m]", "place [m]", "last 20 s [m]")
             cells = [
