@@ -6,24 +6,27 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+
+from swashplate.physics.backend import Scalar
 
 HARMONICS = (1.0, 2.0)
 """Of the gyros' notch: INS_HNTCH_HMNCS 3, the default."""
 
 
-def reached_by(now: Any, wanted: Any, hertz: Any, dt: Any) -> Any:
+def reached_by(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar) -> Any:
     """One pole: a step of `dt` [s] from a value to what is wanted; 0 Hz is no filter."""
     slow = 1.0 / (2.0 * math.pi * jnp.maximum(hertz, 1e-6))
     return now + jnp.where(hertz > 0.0, dt / (dt + slow), 1.0) * (wanted - now)
 
 
-def one_pole(now: Any, wanted: Any, hertz: Any, dt: Any, begun: Any) -> Any:
+def one_pole(now: Scalar, wanted: Scalar, hertz: Scalar, dt: Scalar, begun: Scalar) -> Any:
     """The same, which takes over the first value as it is."""
     return jnp.where(begun > 0.5, reached_by(now, wanted, hertz, dt), wanted)
 
 
-def low_pass(stages: Any, value: Any, hertz: Any, dt: Any) -> tuple[Any, Any]:
+def low_pass(stages: jax.Array, value: jax.Array, hertz: Scalar, dt: Scalar) -> tuple[Any, Any]:
     """Butterworth's two poles (LowPassFilter2p) on n signals: filtered, and what each keeps, shape (n, 2)."""
     turn = jnp.tan(math.pi * jnp.clip(hertz * dt, 1e-6, 0.49))
     root = 2.0 * math.cos(math.pi / 4.0)
@@ -35,7 +38,7 @@ def low_pass(stages: Any, value: Any, hertz: Any, dt: Any) -> tuple[Any, Any]:
     return jnp.where(passed, filtered, value), jnp.stack([fresh, stages[:, 0]], axis=1)
 
 
-def notch(memory: Any, value: Any, k: Mapping[str, Any], dt: Any) -> tuple[Any, Any]:
+def notch(memory: jax.Array, value: jax.Array, k: Mapping[str, Any], dt: Scalar) -> tuple[Any, Any]:
     """The gyros' notch at a fixed frequency and twice it: filtered, and its memory, shapes (3,) and (12,)."""
     on = k["INS_HNTCH_ENABLE"] > 0.5
     deep = 10.0 ** (-k["INS_HNTCH_ATT"] / 40.0)

@@ -22,6 +22,7 @@ from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole,
 from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Scalar
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Step
 from swashplate.simulation.trim import Trim
@@ -158,7 +159,7 @@ def ardupilot_step(
     return carried, mixed.inputs[:inputs]
 
 
-def square_root(error: Any, p: Any, most: Any) -> Any:
+def square_root(error: Scalar, p: Scalar, most: Scalar) -> Any:
     """ArduPilot's `sqrt_controller`: proportional near zero, and from there no faster than `most` can brake."""
     near = most / jnp.maximum(p * p, 1e-12)
     beyond = jnp.sqrt(2.0 * most * jnp.maximum(jnp.abs(error) - 0.5 * near, 0.5 * near))
@@ -172,7 +173,15 @@ def _to_north_east_down(body: RigidBody) -> Any:
     return jnp.stack([cp * level - sp * side, sp * level + cp * side, down])
 
 
-def _horizontal(body: Any, velocity: Any, reference: Any, k: Any, m: Any, after: dict[str, Any], dt: Any) -> Any:
+def _horizontal(
+    body: RigidBody,
+    velocity: jax.Array,
+    reference: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+) -> Any:
     """Roll and pitch [rad] that the place asks for."""
     off = jnp.stack([reference[0] - body.x, reference[1] - body.y])
     far = jnp.sqrt(off @ off + 1e-12)
@@ -195,7 +204,16 @@ def _horizontal(body: Any, velocity: Any, reference: Any, k: Any, m: Any, after:
 
 
 def _vertical(
-    body: Any, velocity: Any, reference: Any, k: Any, m: Any, after: dict[str, Any], dt: Any, height: Any, *, heli: bool
+    body: RigidBody,
+    velocity: jax.Array,
+    reference: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+    height: Scalar,
+    *,
+    heli: bool,
 ) -> Any:
     """The throttle, shape (1,): the hover's and what the height asks for."""
     climb, hover = -velocity[2:], k["H_COL_HOVER" if heli else "MOT_THST_HOVER"]
@@ -227,7 +245,9 @@ def _vertical(
     return hover + after["throttle"]
 
 
-def _attitude(body: Any, wanted: Any, k: Any, m: Any, after: dict[str, Any], dt: Any) -> Any:
+def _attitude(
+    body: RigidBody, wanted: jax.Array, k: Mapping[str, Any], m: Mapping[str, Any], after: dict[str, Any], dt: Scalar
+) -> Any:
     """Rates [rad/s] asked of the rate controllers, shape (3,)."""
     now = jnp.stack([body.phi, body.theta, body.psi])
     target = jnp.where(m["begun"] > 0.5, m["target"], now)
@@ -247,10 +267,10 @@ def _attitude(body: Any, wanted: Any, k: Any, m: Any, after: dict[str, Any], dt:
     return rates + jnp.stack([p - r * st, q * cf + r * sf * ct, r * cf * ct - q * sf])
 
 
-def _rotation(now: Any, target: Any) -> Any:
+def _rotation(now: jax.Array, target: jax.Array) -> Any:
     """The rotation in body axes from one attitude to another [rad], from their quaternions."""
 
-    def quaternion(angles: Any) -> Any:
+    def quaternion(angles: jax.Array) -> Any:
         (cf, ct, cp), (sf, st, sp) = jnp.cos(0.5 * angles), jnp.sin(0.5 * angles)
         return (
             cf * ct * cp + sf * st * sp,
@@ -263,7 +283,16 @@ def _rotation(now: Any, target: Any) -> Any:
     return parts / size * 2.0 * jnp.arctan2(size, jnp.abs(real)) * jnp.where(real < 0.0, -1.0, 1.0)
 
 
-def _rates(body: Any, asked: Any, k: Any, m: Any, after: dict[str, Any], dt: Any, *, heli: bool) -> Any:
+def _rates(
+    body: RigidBody,
+    asked: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+    *,
+    heli: bool,
+) -> Any:
     """Roll, pitch and yaw commands, shape (3,)."""
     at = {name: jnp.stack([k[f"ATC_RAT_{axis}_{name}"] for axis in AXES]) for name in RATE}
     gyro = jnp.stack([body.p, body.q, body.r])

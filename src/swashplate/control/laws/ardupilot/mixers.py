@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.physics.backend import Scalar
 
 _FULL_STICK = 4500.0
 _LEAST_ACTUATOR, _HALF = 0.5, 0.5
@@ -44,7 +46,7 @@ class SwashplateMixer(NamedTuple):
     turn: float
     engine: float
 
-    def mix(self, wanted: Any, k: Mapping[str, Any]) -> Mixed:
+    def mix(self, wanted: Array | jax.Array, k: Mapping[str, Any]) -> Mixed:
         """Of roll, pitch, yaw (-1 to 1) and throttle (0 to 1), shape (4,), under parameters by ArduPilot's names."""
         size = jnp.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + 1e-12)
         room = k["H_CYC_MAX"] / _FULL_STICK
@@ -85,7 +87,7 @@ class CoaxialMixer(NamedTuple):
     yaw: float = 0.5
     divided: float = 1.0
 
-    def mix(self, wanted: Any, k: Mapping[str, Any]) -> Mixed:
+    def mix(self, wanted: Array | jax.Array, k: Mapping[str, Any]) -> Mixed:
         """As `SwashplateMixer.mix`."""
         largest = jnp.maximum(jnp.abs(wanted[0]), jnp.abs(wanted[1]))
         kept = jnp.minimum(jnp.abs(wanted[2]), _HALF * k["MOT_YAW_HEADROOM"] / 1000.0)
@@ -128,7 +130,7 @@ FRAMES: Mapping[str, type[SwashplateMixer] | type[CoaxialMixer]] = {
 """By `Traits.servo_layout`."""
 
 
-def _actuator(thrust: Any, k: Mapping[str, Any]) -> Any:
+def _actuator(thrust: Scalar, k: Mapping[str, Any]) -> Any:
     """A motor's output, 0 to 1, for a thrust of 0 to 1; the battery is not compensated for (MOT_BAT_VOLT_MAX 0)."""
     expo = jnp.maximum(k["MOT_THST_EXPO"], 1e-6)
     inside = jnp.maximum((1.0 - expo) ** 2 + 4.0 * expo * jnp.clip(thrust, 0.0, 1.0), 0.0)
