@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.earth import Earth
     from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
@@ -115,6 +116,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Earth",
     "Environment",
     "Flight",
     "FrequencyResponse",

@@ -11,7 +11,7 @@ from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Report
 
 
-class Study:
+class ReportFolder:
     """A result with a report and files of its own.
 
     Attributes:
