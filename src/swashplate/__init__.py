@@ -19,6 +19,7 @@ from swashplate import public
 
 if TYPE_CHECKING:
     from swashplate.api.accept_autopilot import accept_autopilot
+    from swashplate.api.autopilot_gains import autopilot_gains
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -130,6 +131,7 @@ __all__ = [
     "__version__",
     "accept_autopilot",
     "autopilot",
+    "autopilot_gains",
     "check_autopilot",
     "check_controller",
     "compare",

@@ -77,6 +77,7 @@ _COMPUTING: Mapping[str, str] = {
     "QUIET": "swashplate.simulation.sensors:QUIET",
     "Sensors": "swashplate.simulation.sensors:Sensors",
     "accept_autopilot": "swashplate.api.accept_autopilot:accept_autopilot",
+    "autopilot_gains": "swashplate.api.autopilot_gains:autopilot_gains",
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_autopilot": "swashplate.api.check_autopilot:check_autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",

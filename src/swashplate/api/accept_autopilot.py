@@ -22,7 +22,7 @@ from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.readers.read import read
-from swashplate.links.ardupilot.mixing import MIXER_AXES, hover_stick, mixed, mixer_response
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, hover_stick, mixed, mixer_response
 from swashplate.links.ardupilot.parameters import Parameters, as_written, parameter_file, parameters
 from swashplate.links.ardupilot.runner import serve
 from swashplate.links.ardupilot.session import ArduPilotSession

@@ -18,7 +18,7 @@ from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.respond import respond
-from swashplate.links.ardupilot.mixing import MIXER_AXES
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import TrialLine
 
 GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0

@@ -79,7 +79,9 @@ def ardupilot(
     write_parameters: Annotated[
         Path | None,
         typer.Option(
-            "--write-parameters", metavar="FILE", help="Write ArduPilot's parameters for this vehicle and end."
+            "--write-parameters",
+            metavar="FILE",
+            help="Write ArduPilot's parameters and gains for this vehicle, and end.",
         ),
     ] = None,
     check: Check = False,
@@ -107,7 +109,7 @@ def ardupilot(
     where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
     if write_parameters is not None:
         verbs.write_ardupilot_parameters(
-            where.vehicle, write_parameters, name=vehicle, servos=servos, trim=where.trims()[0]
+            where.vehicle, write_parameters, name=vehicle, servos=servos, trim=where.trims()[0], notice=_say
         )
         if not quiet:
             _say(f"written: {write_parameters}")

@@ -22,7 +22,7 @@ from swashplate.api.acceptance import Acceptance
 from swashplate.api.truth_beside import TruthBeside, beside_truth
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.links.ardupilot import sitl, trial
-from swashplate.links.ardupilot.mixing import MIXER_AXES, mixed, mixer_response
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
 from swashplate.links.servos import servo_mapping
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.standing import airborne
