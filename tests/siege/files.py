@@ -15,7 +15,7 @@ from pathlib import Path
 from .found import ROOT, Found, progress
 
 SLOWEST = 10.0
-"""s that one file may take."""
+"""s of the processor that one file may take."""
 _START = 120.0
 """s that a worker may take for its first file of a kind: it imports, and makes the whole files."""
 _LOT = 4.0
@@ -38,6 +38,7 @@ class _Worker:
     lot: _Lot | None = None
     at: int | None = None
     since: float = 0.0
+    used: float = 0.0
     buffer: bytes = b""
     known: set[str] = field(default_factory=set)
 
@@ -56,6 +57,15 @@ def _started() -> _Worker:
     assert process.stdout is not None
     os.set_blocking(process.stdout.fileno(), False)
     return _Worker(process)
+
+
+def _processor_time(process: int) -> float:
+    """s that a process has used; 0 where it is gone."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Files:
@@ -93,8 +103,7 @@ class Files:
             for k, worker in enumerate(workers):
                 if worker.lot is None:
                     continue
-                ready = worker.at is not None and worker.lot.name in worker.known
-                late = time.monotonic() - worker.since > (SLOWEST if ready else _START)
+                late = self._late(worker)
                 if late or worker.process.poll() is not None:
                     selector.unregister(worker.process.stdout)  # type: ignore[arg-type]
                     workers[k] = self._replaced(worker, late=late)
@@ -104,6 +113,14 @@ class Files:
             worker.process.stdin.close()  # type: ignore[union-attr]
             worker.process.wait()
         return self._found(time.monotonic() - begin)
+
+    def _late(self, worker: _Worker) -> bool:
+        """Whether a file takes too long: of the processor's time, as the machine may be busy, or six times as long."""
+        assert worker.lot is not None
+        if worker.at is None or worker.lot.name not in worker.known:
+            return time.monotonic() - worker.since > _START
+        used = _processor_time(worker.process.pid) - worker.used
+        return used > SLOWEST or time.monotonic() - worker.since > 6.0 * SLOWEST
 
     def _hand_out(self, worker: _Worker) -> None:
         if self._given >= self._files or time.monotonic() > self._until:
@@ -134,7 +151,7 @@ class Files:
             kind, _, rest = line.decode().partition(" ")
             worker.since = time.monotonic()
             if kind == "?":
-                worker.at = int(rest)
+                worker.at, worker.used = int(rest), _processor_time(worker.process.pid)
             elif kind == ".":
                 lot = worker.lot
                 cost = (time.monotonic() - lot.begun) / lot.count

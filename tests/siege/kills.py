@@ -72,7 +72,6 @@ SLOW: Mapping[str, Command] = {
     "export, C": _two("export * --format c --out OUT/code", "coax", "raptor50"),
     "export, MATLAB": _two("export raptor50 --format matlab --speed * --out OUT/made", "2", "4"),
     "export, FMU": _two("export * --format fmu --out OUT/made", "coax", "raptor50"),
-    "control design": _two("control design coax --rate * --out OUT/controller.toml", "50", "100"),
     "stitch": _two("stitch INPUTS/at0.toml INPUTS/at5.toml --title * --out OUT/model.toml", "a", "b"),
 }
 
