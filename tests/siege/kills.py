@@ -200,7 +200,10 @@ class Case:
             wrong += [f"after the next run: {problem}" for problem in problems]
         wrong += [f"after the next run {name} is left" for name in _litter(self.out, self._siege.temporary)]
         self._emptied()
-        return [f"{self.name}, call {stop} of {self.calls}: {words}" for words in wrong]
+        said_so = [f"{self.name}, call {stop} of {self.calls}: {words}" for words in wrong]
+        for words in said_so:
+            print(words, file=sys.stderr, flush=True)
+        return said_so
 
     def _emptied(self) -> None:
         for path in self._siege.temporary.iterdir():

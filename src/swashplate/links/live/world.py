@@ -361,6 +361,8 @@ class World:
                 if (value <= low or value >= high) and name not in dict(self.vehicle.trim_held)
             ]
             why = f": {', '.join(ends)} at the limit" if ends else ""
+            if not ends and any(self.setting.wind):
+                why = ": the controller leans no more than it may, which is too little against this wind"
             found.append(f"The place is not held, it is {off:.0f} m away{why}.")
         if np.all(np.isfinite(own.x)):
             said = doubts(self.vehicle, own.x, own.inputs, self.environment())
