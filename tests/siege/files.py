@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter, defaultdict
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -43,11 +44,14 @@ class _Worker:
     known: set[str] = field(default_factory=set)
 
 
+WORKER = (sys.executable, "-m", "tests.siege.worker")
+
+
 def _started() -> _Worker:
     places = [str(ROOT / "tests"), str(ROOT), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.siege.worker"],
+        WORKER,
         cwd=ROOT,
         env=environment,
         stdin=subprocess.PIPE,
@@ -57,6 +61,15 @@ def _started() -> _Worker:
     assert process.stdout is not None
     os.set_blocking(process.stdout.fileno(), False)
     return _Worker(process)
+
+
+def _ended(worker: _Worker) -> int:
+    """Waits for a process that has nothing more to read; returns its exit code."""
+    with suppress(BrokenPipeError):
+        worker.process.stdin.close()  # type: ignore[union-attr]
+    code = worker.process.wait()
+    worker.process.stdout.close()  # type: ignore[union-attr]
+    return code
 
 
 def _processor_time(process: int) -> float:
@@ -110,8 +123,7 @@ class Files:
                     selector.register(workers[k].process.stdout, selectors.EVENT_READ, workers[k])  # type: ignore[arg-type]
             progress(f"{sum(c.total() for c in self.counts.values()):,} files, {len(self.bad)} bad")
         for worker in workers:
-            worker.process.stdin.close()  # type: ignore[union-attr]
-            worker.process.wait()
+            _ended(worker)
         return self._found(time.monotonic() - begin)
 
     def _late(self, worker: _Worker) -> bool:
@@ -176,7 +188,7 @@ class Files:
         """Another worker for one that hangs or is dead; it goes on behind the file that did it."""
         self._hear(worker)
         worker.process.kill()
-        code = worker.process.wait()
+        code = _ended(worker)
         lot = worker.lot
         fresh = _started()
         if lot is None:

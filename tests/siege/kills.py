@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -37,6 +38,8 @@ ERRORS = {
 }
 _SECONDS = 120.0
 _MARK = ".swash-"
+_WHEN = re.compile(rb"20\d\d-\d\d-\d\d[ T]\d\d:\d\d(:\d\d)?")
+"""When a page was made, which it says."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,8 @@ class Siege:
         assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
 
 Files = dict[str, bytes]
@@ -136,7 +141,7 @@ def _files(folder: Path) -> Files:
     """What a user sees in a folder, by path."""
     seen = [path for path in sorted(folder.rglob("*")) if path.is_file()]
     names = {path.relative_to(folder).as_posix(): path for path in seen}
-    return {name: path.read_bytes() for name, path in names.items() if _MARK not in name}
+    return {name: _WHEN.sub(b"then", path.read_bytes()) for name, path in names.items() if _MARK not in name}
 
 
 def _litter(*folders: Path) -> list[str]:
@@ -244,7 +249,7 @@ def besiege(
         seconds: after which no more is begun.
         seed: of which calls are struck.
     """
-    chance, begin = random.Random(seed), time.monotonic()
+    chance = random.Random(seed)
     killed, failed = Counter[str](), Counter[str]()
     bad_kills: list[str] = []
     bad_failures: list[str] = []
@@ -255,8 +260,10 @@ def besiege(
         _inputs(inputs)
         siege = Siege(folder)
         try:
-            _made_inputs(siege, inputs)
+            if any("INPUTS" in word for command in commands.values() for word in command.new):
+                _made_inputs(siege, inputs)
             cases = [Case(siege, name, command, inputs) for name, command in commands.items()]
+            begin = time.monotonic()
             for k in range(max(kills, failures)):
                 for case in cases:
                     if time.monotonic() - begin > seconds:
