@@ -93,7 +93,7 @@ def _inputs(folder: Path) -> None:
 class Siege:
     """A loaded program that forks for every command."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, loaded: Sequence[str] = ()) -> None:
         shim = folder / "injected.so"
         source = Path(__file__).with_name("injected.c")
         subprocess.run(["gcc", "-shared", "-fPIC", "-O1", "-o", str(shim), str(source), "-ldl"], check=True)
@@ -104,7 +104,7 @@ class Siege:
         environment = {**os.environ, "LD_PRELOAD": str(shim), "PYTHONPATH": os.pathsep.join(places)}
         environment |= {"TMPDIR": str(self.temporary), "NO_COLOR": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.siege.zygote"],
+            [sys.executable, "-m", "tests.siege.zygote", *loaded],
             cwd=ROOT,
             env=environment,
             stdin=subprocess.PIPE,
@@ -239,7 +239,13 @@ class Case:
 
 
 def besiege(
-    commands: Mapping[str, Command], *, kills: int, failures: int, seconds: float, seed: int = 0
+    commands: Mapping[str, Command],
+    *,
+    kills: int,
+    failures: int,
+    seconds: float,
+    seed: int = 0,
+    loaded: Sequence[str] = (),
 ) -> list[Found]:
     """Kills and failing calls, spread evenly over commands and their calls.
 
@@ -248,6 +254,7 @@ def besiege(
         kills, failures: how many of each in all.
         seconds: after which no more is begun.
         seed: of which calls are struck.
+        loaded: modules that the program has loaded before it forks; all of them where none is named.
     """
     chance = random.Random(seed)
     killed, failed = Counter[str](), Counter[str]()
@@ -258,7 +265,7 @@ def besiege(
         inputs = folder / "inputs"
         inputs.mkdir()
         _inputs(inputs)
-        siege = Siege(folder)
+        siege = Siege(folder, loaded=loaded)
         try:
             if any("INPUTS" in word for command in commands.values() for word in command.new):
                 _made_inputs(siege, inputs)

@@ -108,15 +108,21 @@ def test_old_or_new_and_nothing_between(found: dict[str, bytes], complete: bool,
 
 
 def test_kills_and_full_disks_in_short() -> None:
-    found = kills.besiege({"maneuver": kills.QUICK["maneuver"]}, kills=3, failures=3, seconds=60.0)
+    chosen, loaded = (
+        {"maneuver": kills.QUICK["maneuver"]},
+        ("swashplate.cli.app", "swashplate.flights.maneuvers.planned"),
+    )
+    found = kills.besiege(chosen, kills=2, failures=2, seconds=600.0, loaded=loaded)
     assert [one.bad for one in found] == [[], []]
-    assert [one.rows[0][2] for one in found] == [3, 3]
+    assert [one.rows[0][2] for one in found] == [2, 2]
 
 
-def test_packets_in_short() -> None:
-    found = packets.besiege(packets=packets._EVERY, seconds=20.0)
+def test_packets_in_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {name: make for name, make in packets.LINKS.items() if name not in ("ArduPilot, strangers", "PX4")}
+    monkeypatch.setattr(packets, "LINKS", some)
+    found = packets.besiege(packets=packets._EVERY, seconds=60.0)
     assert found.bad == []
-    assert [row[0] for row in found.rows] == list(packets.LINKS)
+    assert [row[1] for row in found.rows] == [packets._EVERY] * len(some)
 
 
 def test_a_link_that_is_moved_by_strangers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,6 +138,6 @@ def test_a_link_that_is_moved_by_strangers_is_told(monkeypatch: pytest.MonkeyPat
 
 
 def test_hostile_pages_in_short() -> None:
-    found = pages.besiege(half_open=70, live=False)
+    found = pages.besiege(half_open=70, live=False, every=4)
     assert found.bad == []
-    assert sum(row[2] for row in found.rows) > 250
+    assert sum(row[2] for row in found.rows) > 90

@@ -1,7 +1,8 @@
 """A process that has loaded the program once and forks for every command, with tests/siege/injected.c preloaded.
 
 Lines in and out are JSON: `{"arguments", "folder", "mode", "stop", "error", "log", "seconds", "cwd"}`, and
-`{"code", "calls", "hang"}`, the code as of `os.waitstatus_to_exitcode`.
+`{"code", "calls", "hang"}`, the code as of `os.waitstatus_to_exitcode`. Arguments are the modules to load; all of them
+where there are none.
 """
 
 from __future__ import annotations
@@ -78,9 +79,10 @@ def _watched(asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def main() -> None:
-    for name in ("h5netcdf", "jax", "jax.numpy", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "control"):
+    usual = ("h5netcdf", "jax", "jax.numpy", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "control")
+    for name in sys.argv[1:] or usual:
         importlib.import_module(name)
-    for found in pkgutil.walk_packages(swashplate.__path__, "swashplate."):
+    for found in pkgutil.walk_packages(swashplate.__path__, "swashplate.") if not sys.argv[1:] else ():
         if not found.name.endswith("__main__"):
             importlib.import_module(found.name)
     answers = os.fdopen(os.dup(1), "w")
