@@ -18,6 +18,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.sources import DataSource
+from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
 from swashplate.shown import Shown
 
@@ -128,7 +129,8 @@ class Result(Shown, Generic[Model, Details]):
 
     Attributes:
         method: name of the estimator.
-        model: what was identified. start: the same before the fit.
+        solution: what was identified: a vehicle, matrices of named expressions, or transfer functions; `model` is a
+            vehicle always. start: the same before the fit.
         estimates: the model's numbers, free ones in the order of `names`, then (or among them) tied and fixed ones.
         names: free parameters in the order of the matrices below.
         covariance, covariance_corrected: of the free parameters in their units (p, p); the second allows for coloured
@@ -151,7 +153,7 @@ class Result(Shown, Generic[Model, Details]):
     """
 
     method: str
-    model: Model
+    solution: Model
     start: Model
     estimates: tuple[Estimate, ...]
     names: tuple[str, ...]
@@ -215,16 +217,17 @@ class Result(Shown, Generic[Model, Details]):
     @property
     def name(self) -> str:
         """The model's name."""
-        return str(getattr(self.model, "name", "transfer functions"))
+        return str(getattr(self.solution, "name", "transfer functions"))
 
-    @property
-    def vehicle(self) -> Any:
-        """The model as `swashplate.vehicle` loads it from its file: it trims, flies, exports and is controlled.
+    @cached_property
+    def model(self) -> Vehicle:
+        """The identified vehicle, as `swashplate.vehicle` loads it from its file: it trims, flies and is controlled.
 
         Raises:
             IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
         """
-        return resolve("vehicle_of_result")(self)
+        made: Vehicle = resolve("vehicle_of_result")(self)
+        return made
 
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
@@ -252,19 +255,19 @@ class Result(Shown, Generic[Model, Details]):
         if vague or not self.names or not np.all(np.isfinite(covariance)):
             told = "has no standard deviation." if vague else "knows no spread: nothing was free."
             raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
-        low, high = bounds_of(self.model if within is None else within, self.names)
+        low, high = bounds_of(self.solution if within is None else within, self.names)
         mean = np.array([self[name].value for name in self.names])
         found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
         drawn = {name: found[:, i] for i, name in enumerate(self.names)}
         return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
 
-    def draw(self, count: int, *, seed: int) -> tuple[Model, ...]:
-        """Models that the data cannot tell from the identified one (see `draw_values`, which it takes).
+    def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:
+        """Vehicles that the data cannot tell from the identified one (see `draw_values`, which it takes).
 
         Raises:
             IdentificationError: as `draw_values`; or for a model whose numbers cannot be changed.
         """
-        if not hasattr(self.model, "with_values"):
+        if not hasattr(self.solution, "with_values"):
             raise IdentificationError("numbers of it cannot be drawn.", where=self.name)
         made: Drawable = self.model
         drawn = self.draw_values(count, seed=seed)
