@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from swashplate import public
 
 if TYPE_CHECKING:
+    from swashplate.api.accept_autopilot import accept_autopilot
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.earth import Earth
     from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
@@ -114,6 +116,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Earth",
     "Environment",
     "Flight",
     "FrequencyResponse",
@@ -125,6 +128,7 @@ __all__ = [
     "Vector",
     "Vehicle",
     "__version__",
+    "accept_autopilot",
     "autopilot",
     "check_autopilot",
     "check_controller",

@@ -248,12 +248,12 @@ def _plant(
             judge=partial(monitored, vehicle=aircraft),
         )
     made = Surroundings(around, sag)
-    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=_engine(notice))
+    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=link_engine(notice))
     plant.prepare()
     return plant, recorder
 
 
-def _engine(notice: Say) -> MakeEngine:
+def link_engine(notice: Say) -> MakeEngine:
     """The vehicle's own C where this machine can compile it, which is quicker; XLA elsewhere."""
     from swashplate.export.stepping_c import CompiledEngine, can_compile
 

@@ -10,6 +10,7 @@ import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
+from swashplate.cli.link_accept import accept
 
 if TYPE_CHECKING:
     from swashplate.models.vehicle import Vehicle
@@ -185,6 +186,9 @@ def px4(
         notice=_say,
         say=_silent if quiet else _say,
     )
+
+
+app.command("accept")(accept)
 
 
 def _check(

@@ -64,7 +64,7 @@ def parameters(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Paramete
             found |= _output(servo, _MOTORS[servo.channel])
     else:
         found = _helicopter(mapping, vehicle, hover)
-    return found | {"SIM_RATE_HZ": 1200, "RNGFND1_TYPE": 100}
+    return found | {"SIM_RATE_HZ": 1200, "RNGFND1_TYPE": 100, "RPM1_TYPE": 10}
 
 
 def parameter_file(found: Parameters, *, title: str) -> str:
