@@ -6,13 +6,14 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 WORKERS ?= 2
 
-.PHONY: help demo test page lint types layers unit speed proof site clean
+.PHONY: help demo test page lint types layers unit speed proof siege site clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo   identify the CoaX from one flight, predict another, write demo/report.html"
 	@echo "make test   ruff, mypy, import-linter, pytest and the benchmarks in short"
 	@echo "make proof  the statistics with all their seeds and the benchmarks in full, into docs/proof.md (half an hour)"
+	@echo "make siege  damaged files, kills, full disks, packets and hostile pages, into docs/proof.md (an hour)"
 	@echo "make site   the documentation as a site, build/site/index.html; offline, warnings are errors"
 	@echo "make clean  remove .venv and everything that was built"
 
@@ -58,6 +59,11 @@ speed: $(STAMP)
 
 proof: $(STAMP)
 	$(BIN)/python scripts/proof.py
+
+# Sizes: make siege SIEGE="--minutes 10 --only files"; see python scripts/siege.py --help
+siege: $(STAMP)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 JAX_COMPILATION_CACHE_DIR="$(CURDIR)/build/jax" \
+	$(BIN)/python scripts/siege.py $(SIEGE)
 
 site: $(STAMP)
 	$(BIN)/python scripts/build_site.py

@@ -8,6 +8,7 @@ Tests marked `proof` and the benchmarks leave JSON files in build/proof (the fol
 
 `rows` hold texts or numbers; `passed` may be left out. The benchmarks' file (build/proof/benchmarks.json) is what
 `python -m benchmarks.run --out` writes. Files of an earlier run are removed first, so that nothing old is reported.
+What `make siege` wrote into the page (scripts/siege.py) is kept.
 """
 
 from __future__ import annotations
@@ -114,6 +115,21 @@ def assemble(folder: Path, runs: Sequence[dict[str, Any]]) -> str:
     return "\n\n".join([heading(runs), *sections]) + "\n"
 
 
+BEGIN, END = "<!-- siege -->", "<!-- end of siege -->"
+
+
+def siege_of(page: str) -> str:
+    """What `make siege` wrote into a page; "" where it did not."""
+    return page.partition(BEGIN)[2].partition(END)[0].strip() if END in page else ""
+
+
+def with_siege(page: str, siege: str) -> str:
+    """A page with another part of `make siege`, at its end."""
+    head, _, rest = page.partition(BEGIN)
+    kept = f"{head.rstrip()}\n\n{rest.partition(END)[2].strip()}".strip()
+    return f"{kept}\n\n{BEGIN}\n\n{siege}\n\n{END}\n" if siege else f"{kept}\n"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="Run every proof and write docs/proof.md.")
     parser.add_argument("--assemble-only", action="store_true", help="write the page from build/proof as it is")
@@ -125,7 +141,8 @@ def main() -> int:
         runs.append(ran(["-m", "benchmarks.run", "--out", str((FOLDER / "benchmarks.json").relative_to(ROOT))]))
         runs.append(ran(["-m", "pytest", "-m", "proof", "-q", "-n", "2", "--dist", "loadfile"]))
     PAGE.parent.mkdir(exist_ok=True)
-    PAGE.write_text(assemble(FOLDER, runs), encoding="utf-8")
+    old = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    PAGE.write_text(with_siege(assemble(FOLDER, runs), siege_of(old)), encoding="utf-8")
     print(f"Written: {PAGE.relative_to(ROOT)}")
     return 1 if any(run["code"] for run in runs) else 0
 

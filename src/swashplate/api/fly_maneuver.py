@@ -15,7 +15,6 @@ from swashplate.flights.csv_export import write_csv
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import Maneuver
 from swashplate.models.delays import input_delays
-from swashplate.models.doubts import doubts_along
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.flight_page import compose_flight
 from swashplate.reporting.structure import Report
@@ -151,17 +150,11 @@ def fly_maneuver(
         rate=rate,
         wind=wind,
     )
-    remarks += [f"{words}." for words in _doubts(vehicle, truth)] + _at_limits(vehicle, truth)
+    remarks += [f"{words}." for words in truth.provenance.notes] + _at_limits(vehicle, truth)
     seen = truth
     if sensors != "none":
         seen = observe(truth, vehicle, sensors=QUIET if sensors == "clean" else Sensors(), seed=seed)
     return SimulatedFlight(vehicle, str(maneuver), truth, seen, tuple(remarks))
-
-
-def _doubts(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
-    """Where a simulated flight leaves what its equations hold for."""
-    x, u, wind = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _WIND))
-    return doubts_along(vehicle, flight.time(vehicle.state_names[0]), x, u, wind, flight.values("voltage"))
 
 
 def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:

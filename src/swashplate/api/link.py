@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -26,6 +27,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import dispatch_in_line
+from swashplate.simulation.record import monitored
 from swashplate.simulation.sensors import InertialUnit
 from swashplate.simulation.standing import standing
 from swashplate.simulation.stepping import MakeEngine, SteppingEngine, XlaEngine
@@ -256,7 +258,12 @@ def _plant(
     recorder = None
     if file is not None:
         recover(file, notice)
-        recorder = Recorder(file, like=unflown(aircraft, record_rate=rate), say=notice)
+        recorder = Recorder(
+            file,
+            like=unflown(aircraft, record_rate=rate),
+            say=notice,
+            judge=partial(monitored, vehicle=aircraft),
+        )
     made = Surroundings(around, sag)
     plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=link_engine(notice))
     plant.prepare()

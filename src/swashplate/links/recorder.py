@@ -115,6 +115,9 @@ def _read(file: Path) -> Flight | None:
     return flight if data.sizes["time"] >= LEAST else None
 
 
+Judge = Callable[[Flight], Flight]
+
+
 class Recorder:
     """The true flights of a link: one for every time that the vehicle was put on the ground.
 
@@ -122,10 +125,11 @@ class Recorder:
         file: the first flight's, .nc or .csv; others, and all where it exists, are numbered (`numbered`).
         like: a flight without samples, see `Growing`.
         say: where lines go.
+        judge: puts into a flight's notes what of it may not be believed.
     """
 
-    def __init__(self, file: Path, *, like: Flight, say: Say) -> None:
-        self._file, self._like, self._say = file, like, say
+    def __init__(self, file: Path, *, like: Flight, say: Say, judge: Judge = lambda flight: flight) -> None:
+        self._file, self._like, self._say, self._judge = file, like, say, judge
         self._now: tuple[Path, Growing] | None = None
         self._waiting: list[tuple[Path, Growing]] = []
         self._saved: list[Path] = []
@@ -165,7 +169,10 @@ class Recorder:
         try:
             flight = _read(flown.path)
             if flight is not None:
-                self._saved.append(save(flight, target))
+                judged = self._judge(flight)
+                self._saved.append(save(judged, target))
+                for words in judged.provenance.notes:
+                    self._say(f"{self._saved[-1]}: {words}.")
         except FlightError as error:
             flown.close()
             self._troubles.append(f"{error} What was flown stays in {flown.path}; `swash inspect` reads it.")

@@ -17,7 +17,18 @@ from swashplate.errors import CardError
 CARD_SCHEMA = 1
 _HINT = "A card is a TOML file; `swash vehicles new` writes one, and logs are --flight."
 STATUSES = ("measured", "published", "identified", "derived", "assumed")
-_TABLES = {"kind", "schema", "vehicle", "title", "trust", "options", "parameters", "observer", "correlations"}
+_TABLES = {
+    "kind",
+    "schema",
+    "vehicle",
+    "title",
+    "trust",
+    "fastest",
+    "options",
+    "parameters",
+    "observer",
+    "correlations",
+}
 _NUMBERS = ("value", "sigma", "lower", "upper", "before")
 _FIELDS = {*_NUMBERS, "unit", "source", "status", "note"}
 
@@ -56,6 +67,7 @@ class Card:
         vehicle: which equations they are for ("coax").
         title: what this aircraft is.
         trust: where the card may be trusted, and where not.
+        fastest: air speed [m/s] up to which it may be; None where nobody knows.
         options: the switches of the equations.
         parameters: the numbers by name.
         observer: what an identification learnt beside the parameters (noise, delays), by section.
@@ -71,6 +83,7 @@ class Card:
     observer: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     correlations: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     path: str = ""
+    fastest: float | None = None
 
     @property
     def where(self) -> str:
@@ -187,6 +200,7 @@ class Card:
             "vehicle": self.vehicle,
             "title": self.title,
             "trust": self.trust,
+            **({} if self.fastest is None else {"fastest": self.fastest}),
             "options": dict(self.options),
             "parameters": parameters,
         }
@@ -239,6 +253,9 @@ def card_from(document: Mapping[str, Any], *, path: str = "") -> Card:
             channel=", ".join(unknown),
             hint="Is it misspelt?",
         )
+    fastest = document.get("fastest")
+    if fastest is not None and (isinstance(fastest, bool) or not isinstance(fastest, int | float) or not fastest > 0.0):
+        raise CardError(f"is {fastest!r}, expected a speed in m/s.", where=path, channel="fastest")
     parameters = {name: _parameter(name, entry, path) for name, entry in document["parameters"].items()}
     return Card(
         vehicle=str(document["vehicle"]),
@@ -249,6 +266,7 @@ def card_from(document: Mapping[str, Any], *, path: str = "") -> Card:
         observer=document.get("observer", {}),
         correlations=_correlations(document.get("correlations", {}), parameters, path),
         path=path,
+        fastest=None if fastest is None else float(fastest),
     )
 
 

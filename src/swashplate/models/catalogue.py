@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from swashplate import documents
 from swashplate.errors import CardError, SwashError
 from swashplate.models.card import Card, packaged_cards, read_card
 from swashplate.models.linear import state_space_file
@@ -123,11 +123,8 @@ def _card_of(path: Path) -> Card:
     Raises:
         CardError: for a file of another kind, said with what reads that.
     """
-    try:
-        kind = tomllib.loads(path.read_text(encoding="utf-8")).get("kind")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        kind = None  # `read_card` says what is wrong
-    if isinstance(kind, str) and kind in _READ_BY:
+    kind = documents.kind_of(path)  # `read_card` says what is wrong where it is none
+    if kind in _READ_BY:
         raise CardError(
             f"kind is {kind!r}, expected a model: 'vehicle' or 'state-space'.", where=path, hint=_READ_BY[kind]
         )

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
+from swashplate.flights.flight import Flight
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 
-_LOOKS = 200
+_LOOKS = 40
 _NOMINAL = "voltage_nominal"
 _NEAR_NOMINAL = 0.25
 """Share of the nominal voltage, to either side, within which a card's drive train is believed; assumed."""
@@ -27,6 +32,9 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
 def _by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
     said = vehicle.traits.doubts
     found = {} if said is None else dict(said(vehicle, x, u, environment))
+    fastest, speed = vehicle.card.fastest, _through_the_air(vehicle, x, environment)
+    if fastest is not None and speed > fastest * _ROUNDING:
+        found["speed"] = f"its air speed is {speed:.1f} m/s: the card may be trusted up to {fastest:g} m/s"
     nominal = nominal_voltage(vehicle)
     if nominal is not None and abs(environment.voltage / nominal - 1.0) > _NEAR_NOMINAL:
         found["battery"] = (
@@ -34,6 +42,20 @@ def _by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> 
             "is a guess so far away"
         )
     return found
+
+
+def _through_the_air(vehicle: Vehicle, x: Array, environment: Environment) -> float:
+    """Air speed [m/s] at a state; 0 for a vehicle without a rigid body's states."""
+    if not {*_SPEEDS, *_ANGLES} <= {*vehicle.state_names}:
+        return 0.0
+    moving, angles = (x[[vehicle.index(name) for name in names]] for names in (_SPEEDS, _ANGLES))
+    wind = [float(value) for value in environment[:3]]
+    turned = Rotation.from_euler("ZYX", angles[::-1]).inv().apply(wind) if any(wind) else 0.0
+    return float(np.linalg.norm(moving - turned))
+
+
+_SPEEDS, _ANGLES = ("u", "v", "w"), ("phi", "theta", "psi")
+_ROUNDING = 1.0 + 1e-6
 
 
 def nominal_voltage(vehicle: Vehicle) -> float | None:
@@ -45,17 +67,85 @@ def doubts_along(vehicle: Vehicle, time: Array, x: Array, u: Array, wind: Array,
     """What of the equations does not hold somewhere along a flight, each with when that is first seen.
 
     Args:
-        time: stamps [s], shape (n,); at most `_LOOKS` of them are looked at.
+        time: stamps [s], shape (n,). Looked at are `_LOOKS` of them and those where a state is largest or smallest.
         x, u, wind: states (n, n_states), inputs (n, n_inputs) and wind (n, 3) by sample.
         voltage: of the battery by sample [V], shape (n,).
     """
+    whole = np.flatnonzero(np.all(np.isfinite(np.column_stack([x, u, wind, voltage])), axis=1))
+    if not whole.size:
+        return ()
     usual, first = environment_of(vehicle), dict[str, str]()
-    for k in np.unique(np.linspace(0, len(time) - 1, min(_LOOKS, len(time))).astype(int)):
+    evenly = np.linspace(0, whole.size - 1, min(_LOOKS, whole.size)).astype(int)
+    for k in whole[np.unique(np.concatenate([evenly, x[whole].argmax(axis=0), x[whole].argmin(axis=0)]))]:
         blowing = dict(zip(Environment._fields[:3], map(float, wind[k]), strict=True))
         around = usual._replace(**blowing, voltage=float(voltage[k]))
-        for kind, words in _by_kind(vehicle, x[k], u[k], around).items():
-            first.setdefault(kind, f"At {time[k]:.1f} s {words}")
+        with suppress(ArithmeticError, ValueError):  # a flight that diverges is told of by others
+            for kind, words in _by_kind(vehicle, x[k], u[k], around).items():
+                first.setdefault(kind, f"At {time[k]:.1f} s {words}")
     return tuple(first.values())
+
+
+def envelope(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
+    """Where a flight, simulated or logged, leaves what the vehicle's numbers and equations hold for, in words.
+
+    Inputs beyond the vehicle's limits, air speed beyond its card's, and where all states are there `doubts_along`
+    (inflow, stall, flapping, battery); of a log the battery alone.
+    """
+    found = [words for name in vehicle.input_names for words in _beyond(vehicle, flight, name)]
+    if all(name in flight for name in (*vehicle.state_names, *vehicle.input_names, *_AROUND)):
+        x, u, wind = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _AROUND[:3]))
+        along = flight.time(vehicle.state_names[0])
+        return (*found, *doubts_along(vehicle, along, x, u, wind, flight.values("voltage")))
+    fastest = vehicle.card.fastest
+    time, speed = _ground_speed(flight)
+    if fastest is not None and np.any(fast := speed > fastest * _ROUNDING):
+        found.append(
+            f"At {time[np.argmax(fast)]:.1f} s it moves faster than {fastest:g} m/s, up to which the card is trusted: "
+            f"{np.nanmax(speed):.1f} m/s at most"
+        )
+    nominal = nominal_voltage(vehicle)
+    if nominal is not None and "voltage" in flight:
+        mean = float(np.nanmean(flight.values("voltage"))) if np.any(np.isfinite(flight.values("voltage"))) else nominal
+        if abs(mean / nominal - 1.0) > _NEAR_NOMINAL:
+            found.append(
+                f"Its battery gave {mean:.3g} V in the mean, and the card's drive train holds about {nominal:.4g}"
+            )
+    return tuple(found)
+
+
+_AROUND = (*Environment._fields[:3], "voltage")
+_OVER = 1e-3
+"""Share of an input's range beyond its limit that is noise."""
+
+
+def _beyond(vehicle: Vehicle, flight: Flight, name: str) -> Iterator[str]:
+    """What an input was told beyond its limits."""
+    if name not in flight:
+        return
+    low, high = vehicle.input_limits[vehicle.input_names.index(name)]
+    values, slack = flight.values(name), _OVER * (high - low)
+    with np.errstate(invalid="ignore"):
+        over = (values < low - slack) | (values > high + slack)
+    if over.any():
+        k = int(np.argmax(over))
+        yield f"At {flight.time(name)[k]:.1f} s {name} is told {values[k]:.4g}, beyond its limits {low:g} to {high:g}"
+
+
+def _ground_speed(flight: Flight) -> tuple[Array, Array]:
+    """Stamps [s] and speed [m/s] of a log; the place's over a second where no speed was logged, 0 for neither."""
+    if all(name in flight for name in _SPEEDS):
+        parts = [np.interp(flight.time("u"), flight.time(name), flight.values(name)) for name in _SPEEDS]
+        return flight.time("u"), np.linalg.norm(parts, axis=0)
+    if all(name in flight for name in _PLACE) and flight.duration > 1.0:
+        time = flight.time("x")
+        place = [np.interp(time, flight.time(name), flight.values(name)) for name in _PLACE]
+        before = [np.interp(time - 1.0, time, row) for row in place]
+        later = time - time[0] >= 1.0
+        return time[later], np.linalg.norm(np.subtract(place, before), axis=0)[later]
+    return np.zeros(1), np.zeros(1)
+
+
+_PLACE = ("x", "y", "z")
 
 
 def shaft_power(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -13,6 +14,7 @@ from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
 from swashplate.flights.schema import CHANNELS
+from swashplate.models.doubts import envelope
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import SURROUNDINGS
 
@@ -23,7 +25,10 @@ _ABSURD = {"m": 1e6, "m/s": 1e4, "rad": 1e4, "rad/s": 1e5}
 def simulated_flight(
     vehicle: Vehicle, time: Array, states: Array, rows: Array, *, details: Mapping[str, Any]
 ) -> Flight:
-    """A flight with the one stream "uniform": states (n, n_states), then inputs and surroundings (n, n_inputs + 4)."""
+    """A flight with the one stream "uniform": states (n, n_states), then inputs and surroundings (n, n_inputs + 4).
+
+    Where it leaves what the vehicle holds for stands in its notes.
+    """
     names = (*vehicle.state_names, *vehicle.input_names, *SURROUNDINGS)
     columns = dict(zip(names, np.concatenate([states, rows], axis=1).T, strict=True))
     names_of = (*vehicle.state_names, *vehicle.input_names)
@@ -36,7 +41,16 @@ def simulated_flight(
         simulated=True,
         vehicle=vehicle.name,
     )
-    return Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate", **details)
+    flown = Flight({"uniform": stream(time, columns, units)}, provenance).done("simulate", **details)
+    return monitored(flown, vehicle)
+
+
+def monitored(flight: Flight, vehicle: Vehicle) -> Flight:
+    """A flight that says in its notes where it leaves what the vehicle's numbers and equations hold for."""
+    said = tuple(words for words in envelope(vehicle, flight) if words not in flight.provenance.notes)
+    if not said:
+        return flight
+    return replace(flight, provenance=replace(flight.provenance, notes=(*flight.provenance.notes, *said)))
 
 
 def check_divergence(vehicle: Vehicle, time: Array, states: Array, flight: Flight | None) -> None:

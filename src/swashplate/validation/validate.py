@@ -24,6 +24,7 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
 from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.calibration import calibrate
@@ -93,7 +94,7 @@ def validate(
     alone = _same_numbers(vehicle, published)
     noise, prior = observer_of(vehicle)
     trims = vehicle.card.observer.get("trims", {})
-    flights = as_flights(flights)
+    flights = tuple(monitored(flight, vehicle) for flight in as_flights(flights))
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
     shortest = calibration + _STARTS + min(horizons)

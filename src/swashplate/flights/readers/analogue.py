@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate import documents
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights import units
@@ -96,6 +97,10 @@ def _points(entry: Mapping[str, Any], source: Source, name: str) -> tuple[Array,
     table = np.array([[_number(v, "points", source, name) for v in pair] for pair in pairs])
     if not np.all(np.diff(table[:, 0]) > 0.0):
         raise _refuse("the voltages of its points do not rise.", source, name)
+    with np.errstate(all="ignore"):
+        steep = np.diff(table[:, 1]) / np.diff(table[:, 0])
+    if not np.all(np.abs(steep) < documents.LARGEST):
+        raise _refuse("two voltages of its points are the same but for rounding.", source, name)
     return table[:, 0], table[:, 1]
 
 

@@ -21,7 +21,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError, UnitError
 from swashplate.flights import units
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers import frames, mocap, tables
+from swashplate.flights.readers import checks, frames, mocap, tables
 from swashplate.flights.readers.options import Options, with_mocap_table
 from swashplate.flights.readers.source import Source
 
@@ -146,6 +146,7 @@ def read(source: Source, options: Options) -> Flight:
         return unit_row[wanted[name]] if wanted[name] < len(unit_row) else ""
 
     frame = tables.column(data, 0, name="Frame", where=where, first_line=first_line)
+    checks.finite(frame, channel="Frame", where=where)
     position = read_columns(place)
     quaternion = None
     if poses:

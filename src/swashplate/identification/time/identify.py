@@ -32,6 +32,7 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.record import monitored
 
 ITERATIONS = 60
 """At most, where nothing is said."""
@@ -66,6 +67,7 @@ def identify_flight(
     horizon = None if question.horizon is None else Horizon.of(question.horizon)
     free = "full" if question.free is None else question.free
     outputs = POSE if question.outputs is None else question.outputs
+    flights = [monitored(flight, vehicle) for flight in flights]
     enable_double_precision()
     enable_compilation_cache()
     started = time.perf_counter()

@@ -27,6 +27,8 @@ from swashplate.simulation.closed_loop import Controller
 _BODY = len(RigidBody._fields)
 _SWEEP_SECONDS, _SWEEP_BAND = 30.0, (0.3, 5.0)
 _UNIT_SECONDS = 0.5
+_LOOK_EVERY = 50
+"""Steps of the controller between looks at what the equations hold for."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class LiveSession:
         self.notice = ""
         self._jobs: set[asyncio.Task[None]] = set()
         self._wanted_to_run = True
+        self._watched = -1, ""
 
     def _make(self, vehicle: Vehicle) -> tuple[World, Pose]:
         world = World(vehicle, controller=self._controller)
@@ -220,6 +223,14 @@ class LiveSession:
             "folder": str(self.folder),
         }
 
+    def _monitor(self) -> str:
+        """What the pilot must know of the flight as it is, looked at every half second; "" for nothing."""
+        with self.lock:
+            if self._watched[0] != self.world.ticks // _LOOK_EVERY:
+                words = self.world.doubts()
+                self._watched = self.world.ticks // _LOOK_EVERY, " ".join(words)
+        return self._watched[1]
+
     def moment(self) -> dict[str, Any]:
         """What is flown now, for one update of the page."""
         with self.lock:
@@ -241,7 +252,7 @@ class LiveSession:
             "target": _short(now.target),
             "stick": now.stick_number,
             "trouble": now.trouble or ("" if failed is None else f"The simulation stopped: {failed}"),
-            "notice": self.notice,
+            "notice": self.notice or self._monitor(),
             "runs": runs,
             "speed": self.speed,
             "steps": time.steps,

@@ -19,6 +19,7 @@ from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
 from swashplate.links.live.recording import LONGEST
 from swashplate.models.delays import input_delays
+from swashplate.models.doubts import doubts
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -43,6 +44,8 @@ PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz]."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
 _LEAN = np.radians(60.0)
+_HELD_WITHIN = 3.0
+"""m from a place that is held, beyond which it is not."""
 """Roll or pitch at which the flight of a linear model ends: its angles are small ones."""
 
 
@@ -343,6 +346,28 @@ class World:
         around = np.array([*self.setting.wind, self.setting.voltage])
         target, number = self._target.copy(), self.setting.stick_number
         return Moment(self.ticks * self.period, crafts, around, target, number, self.trouble)
+
+    def doubts(self) -> tuple[str, ...]:
+        """What the flight is not that the pilot may take it for, now: a place that is not held, a speed or a state
+        beyond what the vehicle holds for, in sentences."""
+        own, found = self._crafts["own"], []
+        off = float(np.hypot(*(own.x[:2] - self._target[:2])))
+        if self.setting.mode == "position" and off > _HELD_WITHIN:
+            ends = [
+                name
+                for name, value, (low, high) in zip(
+                    self.vehicle.input_names, own.inputs, self.vehicle.input_limits, strict=True
+                )
+                if (value <= low or value >= high) and name not in dict(self.vehicle.trim_held)
+            ]
+            why = f": {', '.join(ends)} at the limit" if ends else ""
+            if not ends and any(self.setting.wind):
+                why = ": the controller leans no more than it may, which is too little against this wind"
+            found.append(f"The place is not held, it is {off:.0f} m away{why}.")
+        if np.all(np.isfinite(own.x)):
+            said = doubts(self.vehicle, own.x, own.inputs, self.environment())
+            found += [f"{words[:1].upper()}{words[1:]}." for words in said]
+        return tuple(found)
 
     def environment(self) -> Environment:
         """The surroundings as the sliders have them, without gusts."""

@@ -53,7 +53,7 @@ class Guard:
         try:
             trusted = self._ours(host)
             if origin is not None or scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD"):
-                trusted = trusted and urlsplit(origin or "").netloc == host and (origin or "").startswith("http")
+                trusted = trusted and origin == f"http://{host}"
         except ValueError:
             trusted = False
         if trusted:

@@ -331,3 +331,16 @@ def test_what_fails_in_the_clock_is_told() -> None:
         time.sleep(0.01)
     clock.close()
     assert isinstance(clock.failure, ZeroDivisionError)
+
+
+def test_a_place_that_the_wind_takes_is_told_and_one_that_is_held_is_not(coax: World) -> None:
+    fresh(coax, "position").setting.wind = (1.2, 0.0, 0.0)
+    fly(coax, 20.0)
+    assert coax.doubts() == ()
+    fresh(coax, "position").setting.wind = (2.0, 0.0, 0.0)
+    moved = fly(coax, 20.0)
+    assert np.hypot(*moved[[X, Y]]) > 5.0
+    (words,) = coax.doubts()
+    assert "The place is not held, it is" in words
+    assert "too little against this wind" in words
+    fresh(coax, "position")

@@ -1,0 +1,103 @@
+"""Besieges the program and writes what came out into docs/proof.md, between its two marks: `make siege` (an hour).
+
+    python scripts/siege.py [--minutes M] [--only NAME] [--files N] [--kills N] [--packets N] ...
+
+Campaigns: `files` (damaged logs and documents), `kills` (hard kills, full and broken disks), `packets` (everything that
+listens), `pages` (hostile pages). Each ends at its number or at its share of the minutes, whichever is first, and the
+page says what was reached. Exit code 1 where anything fell. `make proof` leaves the section as it is.
+
+What is found on top of these (a soak of links, say) is a JSON file build/siege/NAME.json in the form of
+`scripts/proof.py`; all that are there are written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import proof
+
+ROOT = proof.ROOT
+FOLDER = ROOT / "build" / "siege"
+SHARES = {"files": 0.5, "kills": 0.4, "packets": 0.08, "pages": 0.02}
+"""Of the minutes; pages take what they take."""
+
+
+def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[dict[str, object]]]]:
+    """What runs, by name, from its seconds to sections of the page."""
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+    from tests.siege import files, kills, packets, pages
+    from tests.siege.targets import TARGETS
+
+    def besiege_files(seconds: float) -> list[dict[str, object]]:
+        siege = files.Files(
+            list(TARGETS), files=chosen.files, seconds=seconds, workers=chosen.workers, seed=chosen.seed
+        )
+        return [siege.run().as_dict()]
+
+    def besiege_writers(seconds: float) -> list[dict[str, object]]:
+        every = {**kills.QUICK, **kills.SLOW}
+        found = kills.besiege(every, kills=chosen.kills, failures=chosen.failures, seconds=seconds, seed=chosen.seed)
+        return [one.as_dict() for one in found]
+
+    def besiege_links(seconds: float) -> list[dict[str, object]]:
+        each = seconds / len(packets.LINKS)
+        return [packets.besiege(packets=chosen.packets, seconds=each, seed=chosen.seed).as_dict()]
+
+    def besiege_pages(seconds: float) -> list[dict[str, object]]:
+        return [pages.besiege(half_open=chosen.half_open).as_dict()]
+
+    return {"files": besiege_files, "kills": besiege_writers, "packets": besiege_links, "pages": besiege_pages}
+
+
+def siege_section(folder: Path) -> str:
+    """All that was found, as one part of the page."""
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    parts = [
+        f"# Siege\n\nWritten by `make siege`; do not edit. {today}, {platform.machine()}, {os.cpu_count()} cores. "
+        "Other programs on the machine make the numbers smaller, and nothing else."
+    ]
+    for file in sorted(folder.glob("*.json")):
+        parts.append(proof.section(json.loads(file.read_text(encoding="utf-8"))))
+    return "\n\n".join(parts)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Besiege the program and write what came out into docs/proof.md.")
+    parser.add_argument("--files", type=int, default=1_000_000, help="damaged files and documents")
+    parser.add_argument("--kills", type=int, default=1_000, help="hard kills of commands that write")
+    parser.add_argument("--failures", type=int, default=500, help="runs on full and broken disks")
+    parser.add_argument("--packets", type=int, default=1_000_000, help="mutated packets for each link")
+    parser.add_argument("--half-open", type=int, default=1_000, help="connections that never ask")
+    parser.add_argument("--minutes", type=float, default=60.0, help="for all of it")
+    parser.add_argument("--workers", type=int, default=2, help="processes that read files")
+    parser.add_argument("--seed", type=int, default=0, help="other mutants, other kills")
+    parser.add_argument("--only", action="append", choices=list(SHARES), help="this campaign; may be repeated")
+    parser.add_argument("--assemble-only", action="store_true", help="write the page from build/siege as it is")
+    chosen = parser.parse_args()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    fell = False
+    for name, run in campaigns(chosen).items() if not chosen.assemble_only else ():
+        if chosen.only and name not in chosen.only:
+            continue
+        for old in FOLDER.glob(f"{name}-*.json"):
+            old.unlink()
+        share = SHARES[name] / sum(SHARES[n] for n in (chosen.only or SHARES))
+        for k, found in enumerate(run(60.0 * chosen.minutes * share)):
+            (FOLDER / f"{name}-{k}.json").write_text(json.dumps(found), encoding="utf-8")
+            fell = fell or not found["passed"]
+            print(proof.section(found), flush=True)
+    page = proof.PAGE.read_text(encoding="utf-8") if proof.PAGE.exists() else ""
+    proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER)), encoding="utf-8")
+    print(f"Written: {proof.PAGE.relative_to(ROOT)}")
+    return 1 if fell else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,334 @@
+"""Hard kills and full disks at every place of the commands that write: old results or new ones, nothing between."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swashplate.flights.csv_export import write_csv
+from swashplate.flights.flight import Flight, stream
+from swashplate.flights.provenance import Provenance
+
+from .found import ROOT, Found, progress
+
+COUNT, KILL, HALF, FAIL = range(4)
+ERRORS = {
+    "disk full": errno.ENOSPC,
+    "quota": errno.EDQUOT,
+    "read-only": errno.EROFS,
+    "no permission": errno.EACCES,
+    "broken disk": errno.EIO,
+}
+_SECONDS = 120.0
+_MARK = ".swash-"
+_WHEN = re.compile(rb"20\d\d-\d\d-\d\d[ T]\d\d:\d\d(:\d\d)?")
+"""When a page was made, which it says."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that writes; `old` and `new` are arguments with other results, with INPUTS and OUT as places."""
+
+    old: Sequence[str]
+    new: Sequence[str]
+
+    def asked(self, words: Sequence[str], *, inputs: Path, out: Path) -> list[str]:
+        return [word.replace("INPUTS", str(inputs)).replace("OUT", str(out)) for word in words]
+
+
+def _two(words: str, old: str, new: str) -> Command:
+    """A command with a word that differs, "*"."""
+    return Command(words.replace("*", old).split(), words.replace("*", new).split())
+
+
+QUICK: Mapping[str, Command] = {
+    "maneuver": _two("maneuver sweep:pitch,0.5-4Hz,*s --out OUT/series.csv", "30", "34"),
+    "plot to SVG": _two("plot INPUTS/log.csv --channels * --out OUT/plot.svg", "p", "phi"),
+    "plot to HTML": _two("plot INPUTS/log.csv --channels * --out OUT/plot.html", "p", "phi"),
+    "respond": _two("respond INPUTS/log.csv --inputs servo_roll --outputs p --band *Hz --out OUT/found", "1-6", "1-8"),
+    "fit-tf": _two("fit-tf INPUTS/responses.nc --input servo_roll --form * --out OUT/fit", "0/1", "1/2"),
+    "compare": _two("compare INPUTS/responses.nc INPUTS/*.nc --out OUT/page.html", "responses", "narrow"),
+}
+"""That start quickly."""
+SLOW: Mapping[str, Command] = {
+    "bench simulate": _two("bench simulate OUT/bench --only * --seed 1", "thrust", "bar_linkage"),
+    "simulate": _two("simulate --vehicle coax --maneuver doublet:roll,0.5s,* --out OUT/flight.nc", "0.1", "0.2"),
+    "simulate, CSV": _two("simulate --vehicle coax --maneuver doublet:roll,0.5s,* --out OUT/a.csv", "0.1", "0.2"),
+    "linearize": _two("linearize raptor50 --speed * --out OUT/models", "0-5/5", "0-8/4"),
+    "export, C": _two("export * --format c --out OUT/code", "coax", "raptor50"),
+    "export, MATLAB": _two("export raptor50 --format matlab --speed * --out OUT/made", "2", "4"),
+    "export, FMU": _two("export * --format fmu --out OUT/made", "coax", "raptor50"),
+    "stitch": _two("stitch INPUTS/at0.toml INPUTS/at5.toml --title * --out OUT/model.toml", "a", "b"),
+}
+
+
+def _inputs(folder: Path) -> None:
+    """What the commands read."""
+    t = np.arange(0.0, 40.0, 0.02)
+    sweep = 0.1 * np.sin(2 * np.pi * (0.5 * t + 0.1 * t**2))
+    p = np.convolve(sweep, 5.0 * np.exp(-5.0 * np.arange(0, 2, 0.02)) * 0.02)[: t.size]
+    noise = np.random.default_rng(0).standard_normal((2, t.size))
+    measured = {"p": p + 0.002 * noise[0], "phi": np.cumsum(p) * 0.02 + 0.001 * noise[1], "servo_roll": sweep}
+    flight = Flight({"log": stream(t, measured)}, Provenance(source="a test", reader="tests", reader_version="1"))
+    write_csv(flight, folder / "log.csv")
+
+
+class Siege:
+    """A loaded program that forks for every command."""
+
+    def __init__(self, folder: Path, *, loaded: Sequence[str] = ()) -> None:
+        shim = folder / "injected.so"
+        source = Path(__file__).with_name("injected.c")
+        subprocess.run(["gcc", "-shared", "-fPIC", "-O1", "-o", str(shim), str(source), "-ldl"], check=True)
+        self.temporary = folder / "cases" / "tmp"
+        self.temporary.mkdir(parents=True)
+        self.folder = folder
+        places = [str(ROOT / "tests"), str(ROOT), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "LD_PRELOAD": str(shim), "PYTHONPATH": os.pathsep.join(places)}
+        environment |= {"TMPDIR": str(self.temporary), "NO_COLOR": "1"}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.siege.zygote", *loaded],
+            cwd=ROOT,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def run(
+        self, arguments: list[str], *, mode: int = COUNT, stop: int = 0, error: int = 0
+    ) -> tuple[dict[str, Any], str]:
+        """How a command ended, and what it said."""
+        log = self.folder / "said.txt"
+        asked = {"arguments": arguments, "folder": str(self.folder / "cases"), "mode": mode, "stop": stop}
+        asked |= {"error": error, "log": str(log), "seconds": _SECONDS, "cwd": str(self.folder)}
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(asked) + "\n")
+        self._process.stdin.flush()
+        return json.loads(self._process.stdout.readline()), log.read_text(errors="replace")
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+
+Files = dict[str, bytes]
+
+
+def _files(folder: Path) -> Files:
+    """What a user sees in a folder, by path."""
+    seen = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    names = {path.relative_to(folder).as_posix(): path for path in seen}
+    return {name: _WHEN.sub(b"then", path.read_bytes()) for name, path in names.items() if _MARK not in name}
+
+
+def _litter(*folders: Path) -> list[str]:
+    found = [path for folder in folders for path in folder.rglob("*")]
+    return [path.name for path in found if _MARK in path.name or path.parent == folders[-1]]
+
+
+def _put(files: Files, folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+
+class Case:
+    """One command: what it leaves when it runs well over old results, and what it leaves when it does not."""
+
+    def __init__(self, siege: Siege, name: str, command: Command, inputs: Path) -> None:
+        self._siege, self.name = siege, name
+        self.out = siege.folder / "cases" / "area" / "OUT"
+        _put({"mine.txt": b"mine"}, self.out)
+        self._new = command.asked(command.new, inputs=inputs, out=self.out)
+        self._well(command.asked(command.old, inputs=inputs, out=self.out))
+        self.old = _files(self.out)
+        told = self._well(self._new)
+        self.new, self.calls = _files(self.out), told["calls"]
+        self._well(self._new)
+        again = _files(self.out)
+        self.varies = {name for name in self.new if again.get(name) != self.new[name]}
+        assert self.old != self.new, name
+
+    def _well(self, arguments: list[str]) -> dict[str, Any]:
+        told, said = self._siege.run(arguments)
+        if told["code"] != 0:
+            raise RuntimeError(f"{self.name}: ended with {told['code']}: {said[-500:]}")
+        return told
+
+    def struck(self, *, mode: int, stop: int, error: int = 0) -> list[str]:
+        """What is wrong after a kill or a failing call, and after the next run."""
+        _put(self.old, self.out)
+        told, said = self._siege.run(self._new, mode=mode, stop=stop, error=error)
+        killed = told["code"] == -signal.SIGKILL
+        wrong = []
+        if told["hang"]:
+            wrong.append("hangs")
+        elif mode == FAIL and told["code"] not in (0, 2):
+            wrong.append(f"ends with {told['code']}: {said.strip()[-200:]!r}")
+        elif mode == FAIL and told["code"] == 2 and ("Error: " not in said or "Traceback" in said or "bug" in said):
+            wrong.append(f"says {said.strip()[-200:]!r}")
+        elif mode != FAIL and not killed and told["code"] != 0:
+            wrong.append(f"ends with {told['code']}: {said.strip()[-200:]!r}")
+        wrong += self._judged(_files(self.out), complete=told["code"] == 0)
+        if mode == FAIL and told["code"] == 2 and error not in (errno.EROFS, errno.EACCES, errno.EIO):
+            wrong += [f"leaves {name}" for name in _litter(self.out, self._siege.temporary)]
+        after, said = self._siege.run(self._new)
+        if after["code"] != 0:
+            wrong.append(f"the next run ends with {after['code']}: {said.strip()[-200:]!r}")
+        elif problems := self._judged(_files(self.out), complete=True):
+            wrong += [f"after the next run: {problem}" for problem in problems]
+        wrong += [f"after the next run {name} is left" for name in _litter(self.out, self._siege.temporary)]
+        self._emptied()
+        said_so = [f"{self.name}, call {stop} of {self.calls}: {words}" for words in wrong]
+        for words in said_so:
+            print(words, file=sys.stderr, flush=True)
+        return said_so
+
+    def _emptied(self) -> None:
+        for path in self._siege.temporary.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink()
+
+    def _judged(self, found: Files, *, complete: bool) -> list[str]:
+        """What of the files is neither the old result nor the new one."""
+        wrong, sides = [], set()
+        if found.pop("mine.txt", None) != b"mine":
+            wrong.append("the user's own file is gone")
+        for name, content in found.items():
+            is_old, is_new = content == self.old.get(name), content == self.new.get(name)
+            if name in self.varies and not is_old:
+                is_new = abs(len(content) - len(self.new[name])) <= 0.02 * len(self.new[name])
+            if not is_old and not is_new:
+                wrong.append(f"{name} is half-written ({len(content)} bytes)")
+            elif is_old != is_new:
+                sides.add(is_new)
+        if len(sides) > 1:
+            wrong.append(f"old and new lie side by side: {sorted(found)}")
+        wanted = set(self.new) - {"mine.txt"}
+        if complete and (set(found) != wanted or sides - {True}):
+            wrong.append(f"is said to be complete and holds {sorted(found)}, expected {sorted(wanted)}")
+        return wrong
+
+
+def besiege(
+    commands: Mapping[str, Command],
+    *,
+    kills: int,
+    failures: int,
+    seconds: float,
+    seed: int = 0,
+    loaded: Sequence[str] = (),
+) -> list[Found]:
+    """Kills and failing calls, spread evenly over commands and their calls.
+
+    Args:
+        commands: by name.
+        kills, failures: how many of each in all.
+        seconds: after which no more is begun.
+        seed: of which calls are struck.
+        loaded: modules that the program has loaded before it forks; all of them where none is named.
+    """
+    chance = random.Random(seed)
+    killed, failed = Counter[str](), Counter[str]()
+    bad_kills: list[str] = []
+    bad_failures: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="siege-") as name:
+        folder = Path(name)
+        inputs = folder / "inputs"
+        inputs.mkdir()
+        _inputs(inputs)
+        siege = Siege(folder, loaded=loaded)
+        try:
+            if any("INPUTS" in word for command in commands.values() for word in command.new):
+                _made_inputs(siege, inputs)
+            cases = [Case(siege, name, command, inputs) for name, command in commands.items()]
+            begin = time.monotonic()
+            for k in range(max(kills, failures)):
+                for case in cases:
+                    if time.monotonic() - begin > seconds:
+                        break
+                    share = (k + chance.random()) / max(1, -(-max(kills, failures) // len(cases)))
+                    stop = 1 + int(min(share, 0.999) * case.calls)
+                    if killed.total() < kills:
+                        bad_kills += case.struck(mode=chance.choice((KILL, KILL, HALF)), stop=stop)
+                        killed[case.name] += 1
+                    if failed.total() < failures:
+                        kind = list(ERRORS)[(k + failed.total()) % len(ERRORS)]
+                        bad_failures += [
+                            f"{kind}, {words}" for words in case.struck(mode=FAIL, stop=stop, error=ERRORS[kind])
+                        ]
+                        failed[case.name] += 1
+                    progress(
+                        f"{killed.total()} kills, {failed.total()} failures, {len(bad_kills) + len(bad_failures)} bad"
+                    )
+        finally:
+            siege.close()
+    return [
+        _found("Siege: hard kills", KILLS, killed, bad_kills, cases),
+        _found("Siege: disks that are full, read-only or broken", FAILURES, failed, bad_failures, cases),
+    ]
+
+
+KILLS = (
+    "kills at calls that open, write, flush, rename, remove or close files (a third of them in the middle of a write), "
+    "spread over all calls of each command. Judged are files that are half-written, old and new ones side by side, the "
+    "user's own file in the folder, and temporary files or a wrong result after the next run."
+)
+FAILURES = (
+    "runs in which a call fails, and all later ones: no space, quota, read-only, no permission, input or output error. "
+    "Wanted are a message and exit code 2, the old results untouched, nothing left, and a next run that is complete."
+)
+
+
+def _made_inputs(siege: Siege, inputs: Path) -> None:
+    """What commands make for other commands."""
+    out = siege.folder / "made"
+    made = [
+        f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 1-8Hz --out {out}",
+        f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 2-6Hz --out {out}/narrow",
+        f"linearize raptor50 --speed 0-5/5 --out {out}/models",
+    ]
+    for words in made:
+        told, said = siege.run(words.split())
+        if told["code"] != 0:
+            raise RuntimeError(f"{words}: {said}")
+    shutil.copy(out / "responses.nc", inputs / "responses.nc")
+    shutil.copy(out / "narrow" / "responses.nc", inputs / "narrow.nc")
+    for k, path in enumerate(sorted((out / "models").glob("*.toml"))):
+        shutil.copy(path, inputs / f"at{5 * k}.toml")
+    with contextlib.suppress(OSError):
+        shutil.rmtree(out)
+
+
+def _found(title: str, text: str, counts: Counter[str], bad: list[str], cases: Sequence[Case]) -> Found:
+    rows = [[case.name, case.calls, counts[case.name], sum(f"{case.name}, call" in b for b in bad)] for case in cases]
+    rows.append(["all", sum(case.calls for case in cases), counts.total(), len(bad)])
+    return Found(title, f"{counts.total():,} {text}", ["command", "its calls", "struck", "wrong"], rows, bad)

@@ -1,0 +1,143 @@
+"""Each campaign in short, and that each can say no."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from swashplate.errors import FlightError
+
+from . import files, kills, packets, pages, worker
+from .files import Files
+from .kills import Case
+from .targets import TARGETS, Target
+
+MUTANTS = 6
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_whole_files_are_read_and_damaged_ones_refused_in_words(name: str, tmp_path: Path) -> None:
+    target = TARGETS[name]()
+    for content in target.whole:
+        path = tmp_path / f"whole{target.suffix}"
+        path.write_bytes(content)
+        with contextlib.suppress(FlightError):  # a log that is cut off, or has no units
+            target.use(path)
+    found = [worker.outcome(name, seed, tmp_path) for seed in range(MUTANTS)]
+    assert {told[0] for told in found} <= set("arw"), found
+
+
+def _raises(error: Exception) -> Callable[[Path], object]:
+    def use(path: Path) -> object:
+        raise error
+
+    return use
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (FlightError("no."), "r"),
+        (KeyError("a"), "x KeyError"),
+        (MemoryError(), "x MemoryError"),
+        (OSError(5, "io"), "x OS"),
+    ],
+)
+def test_what_is_no_error_of_ours_is_counted(
+    error: Exception, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(worker._made, "made up", Target(".x", (b"a",), lambda whole, chance: whole[0], _raises(error)))
+    assert worker.outcome("made up", 0, tmp_path).startswith(told)
+
+
+DYING = """
+import os, signal, sys
+for line in sys.stdin:
+    name, first, count = line.split("\\t")
+    for seed in range(int(first), int(first) + int(count)):
+        print("?", seed, flush=True)
+        if seed == 3:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        while seed == 6:
+            pass
+        print("a", seed, flush=True)
+    print(".", flush=True)
+"""
+
+
+def test_a_dead_and_a_hanging_process_are_counted_and_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "WORKER", (sys.executable, "-c", DYING))
+    monkeypatch.setattr(files, "SLOWEST", 0.3)
+    siege = Files(["dying"], files=9, seconds=60.0, workers=1)
+    found = siege.run()
+    assert found.rows[0] == ["dying", 9, 7, 0, 0, 0, 1, 1]
+    assert f"seed 3 ended the process with {-signal.SIGSEGV}" in found.bad[0]
+    assert "seed 6 took more than 0.3 s" in found.bad[1]
+    assert not found.as_dict()["passed"]
+
+
+def _case(old: dict[str, bytes], new: dict[str, bytes]) -> Case:
+    case = object.__new__(Case)
+    case.old, case.new, case.varies = old, {**new, "mine.txt": b"mine"}, set()
+    return case
+
+
+@pytest.mark.parametrize(
+    ("found", "complete", "problem"),
+    [
+        ({"a": b"old", "b": b"old"}, False, ""),
+        ({"a": b"new", "b": b"new"}, True, ""),
+        ({"b": b"new"}, False, ""),
+        ({"a": b"old", "b": b"new"}, False, "side by side"),
+        ({"a": b"ne", "b": b"new"}, False, "a is half-written (2 bytes)"),
+        ({"a": b"new"}, True, "is said to be complete"),
+        ({"a": b"old", "b": b"old"}, True, "is said to be complete"),
+    ],
+)
+def test_old_or_new_and_nothing_between(found: dict[str, bytes], complete: bool, problem: str) -> None:
+    case = _case({"a": b"old", "b": b"old"}, {"a": b"new", "b": b"new"})
+    wrong = case._judged({**found, "mine.txt": b"mine"}, complete=complete)
+    assert [problem in words for words in wrong] == ([True] if problem else [])
+    assert "own file is gone" in case._judged(found, complete=complete)[0]
+
+
+def test_kills_and_full_disks_in_short() -> None:
+    chosen, loaded = (
+        {"maneuver": kills.QUICK["maneuver"]},
+        ("swashplate.cli.app", "swashplate.flights.maneuvers.planned"),
+    )
+    found = kills.besiege(chosen, kills=2, failures=2, seconds=600.0, loaded=loaded)
+    assert [one.bad for one in found] == [[], []]
+    assert [one.rows[0][2] for one in found] == [2, 2]
+
+
+def test_packets_in_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    some = {name: make for name, make in packets.LINKS.items() if name not in ("ArduPilot, strangers", "PX4")}
+    monkeypatch.setattr(packets, "LINKS", some)
+    found = packets.besiege(packets=packets._EVERY, seconds=60.0)
+    assert found.bad == []
+    assert [row[1] for row in found.rows] == [packets._EVERY] * len(some)
+
+
+def test_a_link_that_is_moved_by_strangers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def take(data: bytes, chance: random.Random) -> None:
+        if len(data) > 1000:
+            raise IndexError(len(data))
+
+    link = packets._Link(take, (b"a" * 2000,), lambda: "it moved")
+    monkeypatch.setattr(packets, "LINKS", {"made up": lambda: link})
+    found = packets.besiege(packets=packets._EVERY, seconds=20.0)
+    assert any("IndexError" in words for words in found.bad)
+    assert "it moved" in found.bad[-1]
+
+
+def test_hostile_pages_in_short() -> None:
+    found = pages.besiege(half_open=70, live=False, every=4)
+    assert found.bad == []
+    assert sum(row[2] for row in found.rows) > 90
