@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from swashplate.identification.frequency.state_space_fit import fit_state_space
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
     from swashplate.identification.identify import identify
+    from swashplate.identification.posterior import posterior
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
@@ -184,6 +185,7 @@ __all__ = [
     "plan_bench",
     "plan_maneuver",
     "plot_logs",
+    "posterior",
     "rate_loop_steps",
     "read",
     "read_control",

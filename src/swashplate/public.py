@@ -112,6 +112,7 @@ _COMPUTING: Mapping[str, str] = {
     "observer_trial": "swashplate.control.lqg.observer_trial:trial",
     "omit_derivatives": "swashplate.simulation.reduction:omit_derivatives",
     "plan_bench": "swashplate.bench.plan:plan",
+    "posterior": "swashplate.identification.posterior:posterior",
     "residuals": "swashplate.validation.residuals:residuals",
     "replay": "swashplate.links.live.replay:replay",
     "show_replay": "swashplate.api.live:show_replay",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from swashplate.arrays import Array
@@ -12,8 +14,13 @@ KNEE = 4.0
 
 def huber(whitened: Array) -> float:
     """Sum of the loss."""
-    size = np.abs(whitened)
-    return float(np.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2).sum())
+    return float(losses(whitened, np).sum())
+
+
+def losses(whitened: Any, xp: Any) -> Any:
+    """The loss of each whitened residual, in NumPy or JAX."""
+    size = xp.abs(whitened)
+    return xp.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2)
 
 
 def weights(whitened: Array) -> Array:
