@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from swashplate.api.decouple_axes import decouple_axes
     from swashplate.api.demo import demo
     from swashplate.api.design_controller import design_controller
+    from swashplate.api.design_maneuver import design_maneuver
     from swashplate.api.excitation import excitation
     from swashplate.api.export import export_controller, export_flight, export_model
     from swashplate.api.fit_ss import fit_ss
@@ -138,6 +139,7 @@ __all__ = [
     "demo",
     "derivatives",
     "design_controller",
+    "design_maneuver",
     "dynamic_decoupling",
     "equation_error",
     "evaluate_bench",

@@ -86,6 +86,7 @@ _COMPUTING: Mapping[str, str] = {
     "demo": "swashplate.api.demo:demo",
     "derivatives": "swashplate.simulation.derivatives_over_speed:derivatives",
     "design_controller": "swashplate.api.design_controller:design_controller",
+    "design_maneuver": "swashplate.api.design_maneuver:design_maneuver",
     "dynamic_decoupling": "swashplate.control.laws.linear_decoupling:dynamic_decoupling",
     "excitation": "swashplate.api.excitation:excitation",
     "export_model": "swashplate.api.export:export_model",
