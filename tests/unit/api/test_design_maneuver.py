@@ -16,7 +16,7 @@ from swashplate.errors import IdentificationError, ManeuverError
 from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
 
 UNKNOWN = ("tau_f_upper", "linkage_lower")
-LIMITS = {"attitude": 6.0, "rate": 60.0, "place": 1.0, "seconds": 10.0}
+LIMITS = {"attitude": 15.0, "rate": 120.0, "place": 1.0, "seconds": 10.0}
 
 
 @lru_cache(maxsize=1)
@@ -54,7 +54,7 @@ def test_its_files_are_the_series_and_the_card(tmp_path: Path) -> None:
     flight, (piece,) = sp.read(tmp_path / "design.csv"), designed().best.pieces
     np.testing.assert_allclose(flight.values("roll"), piece.signals(flight.time("roll"))["roll"], atol=1e-12)
     card = (tmp_path / "design.txt").read_text(encoding="utf-8")
-    for words in ("FLIGHT CARD", "both rotor speeds", "multisine of roll+pitch", "Stop", "6 deg"):
+    for words in ("FLIGHT CARD", "both rotor speeds", "multisine of roll+pitch", "Stop", "15 deg"):
         assert words in card
     json.dumps(designed().to_document(), default=str)
     with pytest.raises(ManeuverError, match=r"expected \.csv"):
@@ -83,6 +83,12 @@ def test_what_no_maneuver_tells_is_refused() -> None:
     asked: dict[str, Any] = {"limits": LIMITS, "axes": ("roll", "pitch"), "band": (0.5, 8.0), "draws": 1}
     with pytest.raises(ManeuverError, match=r"no maneuver within the limits tells it: .* drag_x not at all"):
         sp.design_maneuver(sp.vehicle("coax"), ("tau_f_upper", "drag_x"), **asked)
+
+
+def test_what_these_seconds_do_not_tell_is_refused_with_those_that_would() -> None:
+    asked: dict[str, Any] = {"axes": ("roll", "pitch"), "band": (0.5, 8.0), "draws": 1}
+    with pytest.raises(ManeuverError, match=r"tau_f_upper 6\d.*%, expected at most 50 %.* It would take 1\d.* s"):
+        sp.design_maneuver(sp.vehicle("coax"), UNKNOWN, limits=LIMITS | {"attitude": 6.0, "rate": 60.0}, **asked)
 
 
 def test_limits_that_nothing_keeps_are_refused() -> None:

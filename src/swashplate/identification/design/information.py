@@ -39,6 +39,10 @@ DELAY_SIGMA = 0.05
 """Prior standard deviation [s] of the delay that is unknown, as in the fits."""
 
 
+_TOLD, _PART = 1e-12, 1e-18
+"""Share of the information below which a direction is not told, and the part in one from which a parameter is not."""
+
+
 @dataclass(frozen=True)
 class Sensed:
     """A linear model with slopes by the parameters in question.
@@ -156,9 +160,7 @@ def bounds_from(information: Array) -> Array:
     scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
     scaled = total / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
-    with np.errstate(divide="ignore"):
-        inverse = np.where(values > 1e-12, 1.0 / values, np.inf)
-    variance = np.array(
-        [np.sum(np.where(vectors[i] ** 2 > 1e-20, vectors[i] ** 2 * inverse, 0.0)) for i in range(len(values))]
-    )
+    told = values > _TOLD
+    variance = np.sum(vectors[:, told] ** 2 / values[told], axis=1)
+    variance[np.any(vectors[:, ~told] ** 2 > _PART, axis=1)] = np.inf
     return np.asarray((np.sqrt(variance) / scale)[:-1])
