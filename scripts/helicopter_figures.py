@@ -232,7 +232,7 @@ def paper_figures() -> None:
             row = [(words, black, shown), model]
             for form, name, style in (("0/0", "gain and delay", blue), ("1/2", "one zero, two poles", green)):
                 fit = identified(columns, time, pair, form)
-                print(f"  {fit.model[0]!r}   J = {fit.cost:.0f}")
+                print(f"  {fit.solution[0]!r}   J = {fit.cost:.0f}")
                 row.append((name, style, {pair[0]: answered(fit, columns, pair, here)}))
             rates.append((pair[0], time[here], row))
         title = f"Fig. {number + 2}: {pair[0]} in the {axis} sweep, with identified transfer functions.\n{SAID}"
@@ -272,7 +272,7 @@ def trex_figure(file: Path) -> None:
         fit = identified(
             {name: values[:cut] for name, values in columns.items()}, time[:cut], pair, "0/0", band=(0.1, 2.0)
         )
-        print(f"  {fit.model[0]!r}   J = {fit.cost:.0f}")
+        print(f"  {fit.solution[0]!r}   J = {fit.cost:.0f}")
         row: list[Line] = [
             ("T-Rex 550", (BLACK, "-"), {pair[0]: columns[pair[0]][here]}),
             ("gain and delay", (BLUE, "-."), {pair[0]: answered(fit, columns, pair, here)}),

@@ -24,7 +24,7 @@ def result(
     tied = [Estimate(name, "1", 0.1, 0.1, tie=tie) for name, tie in (ties or {}).items()]
     return Result(
         method="made",
-        model=model,
+        solution=model,
         start=model,
         estimates=(*free, *tied),
         names=tuple(values),

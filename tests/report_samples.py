@@ -134,7 +134,7 @@ def fit(
     identified = published.with_values(values, status="identified", source="identified from sweep.mat")
     return Result(
         method=method,
-        model=identified,
+        solution=identified,
         start=published,
         estimates=tuple(estimates),
         constants=tuple(

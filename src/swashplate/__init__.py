@@ -108,7 +108,7 @@ if TYPE_CHECKING:
     from swashplate.validation.residuals import residuals
     from swashplate.validation.validation import Validation
     from swashplate.validation.verb import validate
-    from swashplate.validation.verification import verify
+    from swashplate.validation.verify import verify
 
     __version__: str
 

@@ -68,7 +68,7 @@ _LIGHT: Mapping[str, str] = {
     "uniform_records": "swashplate.flights.conditioning.uniform_records:uniform_records",
     "vehicle": "swashplate.models.catalogue:vehicle",
     "vehicles": "swashplate.models.catalogue:cards_by_name",
-    "verify": "swashplate.validation.verification:verify",
+    "verify": "swashplate.validation.verify:verify",
     "fit_ss": "swashplate.api.fit_ss:fit_ss",
     "validate_linear": "swashplate.api.validate_linear:validate_linear",
 }

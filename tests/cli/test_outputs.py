@@ -34,7 +34,7 @@ def _fit(vehicle: Vehicle, flights: list[Flight]) -> Result[Any, Any]:
     estimate = Estimate("tau_f_upper", "s", 1.6, 1.3, 0.02, float("nan"))
     return Result(
         method="prediction-error",
-        model=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
+        solution=vehicle.with_values({"tau_f_upper": 1.3}, status="identified"),
         start=vehicle,
         estimates=(estimate,),
         names=("tau_f_upper",),

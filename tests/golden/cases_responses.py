@@ -33,10 +33,10 @@ def ardupilot_rates(folder: Path) -> Values:
     fit = sp.fit_state_space(sp.structure("rotor_body"), responses)
     unseen = sitl("heli_sid_allbits_roll_rate.BIN", *MIXER, *RATES)
     found = named("response", extract.of_responses(responses)) | named("model", extract.of_state_space_fit(fit))
-    for s in suggest_gains(fit.model):
+    for s in suggest_gains(fit.solution):
         found |= {f"gain.{name}": float(value) for name, value in s.parameters.items()}
-    found |= named("verify", extract.of_verification(sp.verify(fit.model, unseen)))
-    in_time = fit_in_time(fit.model, unseen, iterations=20)
+    found |= named("verify", extract.of_verification(sp.verify(fit.solution, unseen)))
+    in_time = fit_in_time(fit.solution, unseen, iterations=20)
     return found | named("time", extract.of_time_fit(in_time))
 
 
@@ -113,7 +113,7 @@ def r50_from_sweeps(folder: Path) -> Values:
     random = np.random.default_rng(1)
     off = {n: truth.parameters[n].value * (1.0 + 0.3 * random.choice([-1.0, 1.0])) for n in truth.free}
     fit = sp.fit_state_space(truth.with_values(off), responses)
-    unseen = sp.verify(fit.model, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
+    unseen = sp.verify(fit.solution, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
     found = named("response", extract.of_responses(responses, most=3)) | named("fit", extract.of_state_space_fit(fit))
     return found | named("verify", extract.of_verification(unseen))
 

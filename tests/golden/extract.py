@@ -110,12 +110,12 @@ def of_transfer_function(fit: Any) -> Values:
     """A transfer function fit, models of several outputs one after the other."""
     found = of_accuracies(fit.estimates)
     found |= {"cost": fit.cost, "converged": bool(fit.converged), "correlation": thinned(fit.correlation)}
-    return found | {f"poles.{k}": thinned(m.poles) for k, m in enumerate(fit.model)}
+    return found | {f"poles.{k}": thinned(m.poles) for k, m in enumerate(fit.solution)}
 
 
 def of_state_space_fit(fit: Any) -> Values:
     """A state-space fit to frequency responses."""
-    found = of_accuracies(fit.estimates) | of_state_space(fit.model)
+    found = of_accuracies(fit.estimates) | of_state_space(fit.solution)
     found |= {"cost": fit.cost, "costs": [float(c) for c in fit.costs], "converged": bool(fit.converged)}
     return found | {"correlation": thinned(fit.correlation, 40), "dropped": [s.dropped for s in fit.details.reduction]}
 

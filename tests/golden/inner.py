@@ -10,7 +10,7 @@ from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.time.equation_error import equation_error
 from swashplate.identification.time.linear_frequency_fit import fit_in_frequency
 from swashplate.identification.time.linear_time_fit import fit_in_time
-from swashplate.validation.verification import verify_inside
+from swashplate.validation.verify import verify_inside
 
 __all__ = [
     "Flight",

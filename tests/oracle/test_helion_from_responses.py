@@ -63,7 +63,7 @@ def test_from_numbers_30_percent_off_to_the_published_modes(truth: StateSpaceMod
     off = {n: truth.parameters[n].value * (1.0 + 0.3 * random.choice([-1.0, 1.0])) for n in truth.free}
     fit = fit_state_space(truth.with_values(off), measured(truth, noise=0.01), starts=2)
     assert fit.cost < 2.0, fit
-    found = fit.model.eigenvalues()
+    found = fit.solution.eigenvalues()
     for value in truth.eigenvalues():
         if abs(value) > 2 * np.pi * 0.1:  # the slow modes lie below the band
             assert min(abs(found - value)) < 0.03 * abs(value), (value, found)

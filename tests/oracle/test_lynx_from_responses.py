@@ -93,13 +93,13 @@ def fit(matrices: tuple[Array, Array]) -> StateSpaceFit:
 def test_the_modes_without_start_values(matrices: tuple[Array, Array], fit: StateSpaceFit) -> None:
     assert fit.cost < 8.0, fit
     assert not any("not all of the aircraft" in text for text in fit.warnings), fit.warnings
-    found = fit.model.eigenvalues()
+    found = fit.solution.eigenvalues()
     for value in np.linalg.eigvals(matrices[0]):
         assert min(abs(found - value)) < 0.05 * abs(value), (value, found)
 
 
 def test_a_trim_taken_for_level_is_said(matrices: tuple[Array, Array], fit: StateSpaceFit) -> None:
-    level = fit.model.with_values({"theta0": 0.0, "phi0": 0.0})
+    level = fit.solution.with_values({"theta0": 0.0, "phi0": 0.0})
     refit = fit_state_space(level, measured(*matrices, noise=0.03), starts=1, iterations=15)
     assert refit["theta0"].fixed
     assert refit.cost > 50.0

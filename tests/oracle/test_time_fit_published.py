@@ -46,7 +46,7 @@ def test_unstable_aircraft_is_the_truth_within_a_percent(shared_data: Path) -> N
     table = {r["method"]: r for r in csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))}
     for name in ("Zw", "Mw", "Mq"):
         assert fit[name].value == pytest.approx(float(table["true"][name]), rel=0.01)
-    assert fit.model.eigenvalues()[-1].real > 0.5  # it is unstable
+    assert fit.solution.eigenvalues()[-1].real > 0.5  # it is unstable
     # Over frequencies nothing is integrated: within half a percent of the truth, as the table's estimators are.
     banded = fit_in_frequency(aircraft.with_values(held, free=False), flight, band=(0.05, 2.0))
     assert banded.converged

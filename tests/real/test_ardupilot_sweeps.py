@@ -21,7 +21,7 @@ from swashplate.identification.frequency.transfer_function_fit import fit_transf
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space_file import structure
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 A = np.array([[0, 0, 3588.6, 0], [0, 0, 0, 617.5], [-1, 0, -14.6559, 18.9984], [0, -1, -19.6418, -14.6559]])
 B = np.array([[0, 0], [0, 0], [3.58967, -1.24391], [1.06772, 3.95150]])
@@ -74,13 +74,13 @@ def test_gains_on_and_off_axis(responses: FrequencyResponse) -> None:
 def test_rotor_body_model_has_the_simulators_modes_and_delays(responses: FrequencyResponse) -> None:
     fit = fit_state_space(structure("rotor_body"), responses)
     assert fit.cost < 5.0
-    modes = [v for v in fit.model.eigenvalues() if v.imag > 0.0]
+    modes = [v for v in fit.solution.eigenvalues() if v.imag > 0.0]
     for value, (hertz, damping) in zip(modes, ((10.11, 0.128), (3.73, 0.279)), strict=True):
         assert abs(value) / (2 * np.pi) == pytest.approx(hertz, rel=0.03)
         assert -value.real / abs(value) == pytest.approx(damping, abs=0.02)
     assert fit["tau_roll"].value == pytest.approx(0.0534, abs=0.003)
     assert fit["tau_pitch"].value == pytest.approx(0.0526, abs=0.003)
-    gains = {name: value for s in suggest_gains(fit.model) for name, value in s.parameters.items()}
+    gains = {name: value for s in suggest_gains(fit.solution) for name, value in s.parameters.items()}
     assert gains["ATC_RAT_RLL_FF"] == pytest.approx(1 / 3.5897, rel=0.05)
     assert gains["ATC_RAT_PIT_FF"] == pytest.approx(1 / 3.9515, rel=0.05)
 
@@ -111,7 +111,7 @@ def test_collective_to_vertical_acceleration(shared_data: Path) -> None:
     s = 1j * found.omega[:, None, None]
     assert np.max(gain_errors(found, -27.43 * s / (s + 2.25))) < 0.3
     fit = fit_transfer_function(found, "0/1-1s", input="mixer_collective", band=(0.15, 7.0))
-    values = fit.model[0].values
+    values = fit.solution[0].values
     assert fit.cost < 5.0
     assert values["K"] == pytest.approx(-27.43, rel=0.03)
     assert values["pole"] == pytest.approx(2.25, rel=0.03)
@@ -138,7 +138,7 @@ def test_a_log_that_no_fit_has_seen_refutes_wrong_models_and_not_the_identified_
     """A roll-rate sweep of 3 s under the rate loop, in time."""
     fit = fit_state_space(structure("rotor_body"), responses)
     unseen = flight(shared_data, "heli_sid_allbits_roll_rate.BIN", *INPUTS, *OUTPUTS)
-    found = verify(fit.model, unseen)
+    found = verify(fit.solution, unseen)
     assert found.cost < 0.4, found
     assert all(found[name].theil < 0.03 for name in OUTPUTS), found
     assert found.verdict == "not refuted", found
@@ -147,7 +147,7 @@ def test_a_log_that_no_fit_has_seen_refutes_wrong_models_and_not_the_identified_
         {"Blat": -values["Blat"], "Alon": -values["Alon"]},
         *({name: factor * values[name]} for name in values for factor in (0.5, 1.5)),
     ]
-    verdicts = {str(change): verify(fit.model.with_values(change), unseen).verdict for change in wrong}
+    verdicts = {str(change): verify(fit.solution.with_values(change), unseen).verdict for change in wrong}
     # Half more Lb moves the pitch rate by 1.0 times what is allowed there: these 3 s of a roll sweep cannot tell.
     borderline = verdicts.pop(str({"Lb": 1.5 * values["Lb"]}))
     assert borderline == "not refuted"

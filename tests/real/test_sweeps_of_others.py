@@ -13,7 +13,7 @@ from swashplate.flights.provenance import Provenance
 from swashplate.identification.frequency.response_cost import cost_of, target
 from swashplate.identification.frequency.transfer_function_fit import as_state_space, fit_transfer_function
 from swashplate.identification.responses.respond import respond
-from swashplate.validation.verification import verify_inside
+from swashplate.validation.verify import verify_inside
 
 
 def x8(folder: Path, part: slice) -> Flight:
@@ -40,7 +40,7 @@ def test_x8_second_order_model_of_one_half_answers_as_the_other_half(shared_data
     early = respond(x8(shared_data, slice(0, n // 2)), inputs=["command"], outputs=["p"], band=(0.2, 10.0))
     unseen = target(early, "p", "command", band=(0.7, 8.7))
     assert unseen is not None
-    assert cost_of(fit.model[0].response(unseen.omega), unseen) < 100.0
+    assert cost_of(fit.solution[0].response(unseen.omega), unseen) < 100.0
     # In time on that half, within the fitted band, it is good. Below the band the loop answers disturbances with slow
     # commands, which a model this near to an integrator adds up: 5.9 rad/s of error over the whole record.
     verified = verify_inside(as_state_space(fit), x8(shared_data, slice(0, n // 2)), band=(0.7, 8.7))

@@ -130,7 +130,7 @@ def test_the_sweep_stays_about_hover(logs: list[Path]) -> None:
 def test_the_roll_mode_is_fitted(responses: FrequencyResponse, truth: Callable[[np.ndarray], np.ndarray]) -> None:
     """A second-order roll response: its slow pole is the roll subsidence of the linearised helicopter."""
     fit = sp.fit_transfer_function(responses.select(("p",), ("mixer_roll",)), "0/2", input="mixer_roll")
-    values = fit.model[0].values
+    values = fit.solution[0].values
     damping, natural = values["zeta_pole"], values["omega_pole"]
     slow = natural * (damping - math.sqrt(damping**2 - 1.0))
     free = vehicle("raptor50", rotor_speed="throttle")
@@ -138,5 +138,5 @@ def test_the_roll_mode_is_fitted(responses: FrequencyResponse, truth: Callable[[
     expected = min((-m.real for m in modes if abs(m.imag) < 1e-9 and m.real < -6.0), key=lambda r: abs(r - 10.0))
     assert fit.cost < 10.0
     assert slow == pytest.approx(expected, rel=0.05)
-    ratio = fit.model[0].response(responses.omega) / truth(responses.omega)[:, 0, 0]
+    ratio = fit.solution[0].response(responses.omega) / truth(responses.omega)[:, 0, 0]
     assert np.abs(20.0 * np.log10(np.abs(ratio[responses.omega > 2.0 * np.pi]))).max() < 0.5

@@ -130,7 +130,7 @@ def test_state_space_fit_that_starts_from_the_card_finds_the_flown_rotor() -> No
     free = ("Lb", "Ma", "tau_f", "Ab", "Ba")
     known = {name: start.parameters[name].value for name in start.free if name not in free}
     known |= {"Alon": -1.0, "Blat": 1.0, "Alat": 0.0, "Blon": 0.0, "tau_lat": 0.005, "tau_lon": 0.005}
-    found = fit_state_space(start.with_values(known, free=False), responses, starts=1).model.parameters
+    found = fit_state_space(start.with_values(known, free=False), responses, starts=1).solution.parameters
     for name in free:
         assert found[name].value == pytest.approx(truth.parameters[name].value, rel=0.05), name
     assert abs(start.parameters["Lb"].value / truth.parameters["Lb"].value - 1.0) > 0.15

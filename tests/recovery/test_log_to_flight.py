@@ -61,7 +61,7 @@ def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() ->
 def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> None:
     """The August flight: what the fit found of delays is flown, in still air and in gusts of 0.3 m/s."""
     found = sp.demo()
-    model = found.fit.vehicle
+    model = found.fit.model
     made = sp.design_controller(model, sensors=SENSORS, allowed={"x": 0.1, "y": 0.1})
     assert "identified" in made.late
     check = sp.check_controller(model, made.controller, gusts=indoor(0.3))
@@ -94,7 +94,7 @@ def test_the_raptor_from_its_log_to_a_hundred_aircraft(tmp_path: Path) -> None:
         log = log.with_channel(name, np.concatenate([values[late_by:], np.repeat(values[-1:], late_by)]), like=name)
     free = ("hub_stiffness", "blade_inertia", "wake_distortion")
     fit = sp.identify(card, log.condition(rate=100.0, cutoff=0.0), free=free, method="output-error")
-    model = fit.vehicle
+    model = fit.model
     assert list(input_delays(model).values()) == pytest.approx([0.03] * 4, abs=0.001)
     sensors = "gyro@100,mocap@100+10ms"
     hovers = sp.design_controller(model, sensors=sensors, allowed={"x": 0.1, "y": 0.1})

@@ -16,7 +16,7 @@ from swashplate.identification.frequency.state_space_result import StateSpaceFit
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 BAND = (0.05, 6.0)
 
@@ -83,7 +83,7 @@ def alone(sweeps: list[Flight], truth: StateSpaceModel, output: str, name: str) 
 
 def mode_errors(fit: StateSpaceFit, truth: StateSpaceModel) -> dict[str, float]:
     """Relative error of each true mode faster than 1.5 rad/s: distance of the nearest identified one."""
-    found = fit.model.eigenvalues()
+    found = fit.solution.eigenvalues()
     return {
         f"{v.real:.2f}{v.imag:+.2f}j": float(np.min(np.abs(found - v)) / abs(v))
         for v in truth.eigenvalues()
@@ -110,9 +110,9 @@ def test_the_model_is_found_from_start_values_thirty_percent_off(
     errors = mode_errors(fit, truth)
     assert len(errors) == 4
     assert all(error < 0.05 for error in errors.values()), errors
-    assert fit.model.parameters["Nrfb"].value == -fit.model.parameters["Nped"].value
-    assert fit.model.parameters["Krfb"].value == 2.0 * fit.model.parameters["Nr"].value
-    unseen = verify(fit.model, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
+    assert fit.solution.parameters["Nrfb"].value == -fit.solution.parameters["Nped"].value
+    assert fit.solution.parameters["Krfb"].value == 2.0 * fit.solution.parameters["Nr"].value
+    unseen = verify(fit.solution, r50.fly(truth, "lateral", seed=99, seconds=30.0), outputs=["p", "q", "r"])
     assert all(unseen[name].theil < 0.15 for name in ("p", "r")), unseen
 
 
@@ -127,8 +127,8 @@ def test_twenty_seeds(truth: StateSpaceModel) -> None:
         shares.append(sum(s * n for s, n in within.values()) / sum(n for _, n in within.values()))
         single.append(np.median([alone(sweeps, truth, *pair) for pair in within]))
         fit = fit_state_space(start_off(truth, seed=seed), found, seed=seed)
-        values.append([fit.model.parameters[n].value for n in truth.free])
-        bounds.append([fit.model.parameters[n].cramer_rao for n in truth.free])
+        values.append([fit.solution.parameters[n].value for n in truth.free])
+        bounds.append([fit.solution.parameters[n].cramer_rao for n in truth.free])
         worst.append(max(mode_errors(fit, truth).values()))
     scatter, bound = np.std(values, axis=0, ddof=1), np.mean(bounds, axis=0)
     true = np.array([truth.parameters[n].value for n in truth.free])

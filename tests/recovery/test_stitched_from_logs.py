@@ -65,8 +65,8 @@ def respond(logs: Mapping[str, Flight]) -> sp.FrequencyResponse:
 
 def identified(logs: Mapping[str, Flight]) -> StateSpaceModel:
     found = sp.fit_ss("six_dof_coupled", respond(logs), start=start_values(logs), starts=1)
-    assert found.model is not None
-    return found.model
+    assert found.structure is not None
+    return found.structure
 
 
 def mismatch(stitched: Vehicle, logs: Mapping[str, Flight], speed: float) -> dict[str, float]:

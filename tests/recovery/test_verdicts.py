@@ -24,7 +24,7 @@ from swashplate.identification.responses.respond import respond
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.noise_filter import Piece
 from swashplate.validation.refutation import OPEN, REFUTED, STANDS, Judgement, judge
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 BAND = (0.05, 6.0)
 GUST = 0.5
@@ -61,13 +61,13 @@ def said(model: StateSpaceModel, pieces: list[Piece]) -> Judgement:
 
 def changed(fit: StateSpaceFit, **factors: float) -> StateSpaceModel:
     """The identified model with some parameters multiplied; their bounds stay."""
-    return fit.model.with_values({n: f * fit.model.parameters[n].value for n, f in factors.items()})
+    return fit.solution.with_values({n: f * fit.solution.parameters[n].value for n, f in factors.items()})
 
 
 def strong(fit: StateSpaceFit) -> list[str]:
     """Parameters of which half more or less makes some response unacceptable (J above 100); the strongest first."""
     found = {}
-    for name in fit.model.free:
+    for name in fit.solution.free:
         worst = []
         for factor in (0.5, 1.5):
             model = changed(fit, **{name: factor})
@@ -83,7 +83,7 @@ def strong(fit: StateSpaceFit) -> list[str]:
 
 def unstable(fit: StateSpaceFit) -> dict[str, StateSpaceModel]:
     values = {"Nr": 6.0, "Zw": 2.0, "Xu": 1.0, "Yv": 1.0, "Kr": -4.0}
-    return {f"{n} = {v:+g}": fit.model.with_values({n: v}) for n, v in values.items()}
+    return {f"{n} = {v:+g}": fit.solution.with_values({n: v}) for n, v in values.items()}
 
 
 def reversed_controls(fit: StateSpaceFit) -> StateSpaceModel:
@@ -94,11 +94,11 @@ def reversed_controls(fit: StateSpaceFit) -> StateSpaceModel:
 def drawn(fit: StateSpaceFit, seed: int) -> StateSpaceModel:
     """Every parameter off by a normal share of its own bound, independently of the others: harsher than the fit is."""
     random = np.random.default_rng(seed)
-    p = fit.model.parameters
-    return fit.model.with_values(
+    p = fit.solution.parameters
+    return fit.solution.with_values(
         {
             n: p[n].value + random.standard_normal() * p[n].cramer_rao
-            for n in fit.model.free
+            for n in fit.solution.free
             if np.isfinite(p[n].cramer_rao)
         }
     )
@@ -116,7 +116,7 @@ def other_structures(fit: StateSpaceFit) -> dict[str, StateSpaceModel]:
     }
     made = {}
     for name, out in lacking.items():
-        model = fit.model.with_values(dict.fromkeys(out, 0.0), free=False)
+        model = fit.solution.with_values(dict.fromkeys(out, 0.0), free=False)
         # A response that such a model does not have at all has no decibels to be fitted.
         h = {
             t.name: model.response(t.omega)[:, model.outputs.index(t.output), model.inputs.index(t.input)]
@@ -140,21 +140,22 @@ def test_a_dozen_wrong_models_are_refuted(fit: StateSpaceFit, unseen: list[Piece
 def test_a_dozen_models_within_their_own_bounds_are_not(
     truth: StateSpaceModel, fit: StateSpaceFit, unseen: list[Piece]
 ) -> None:
-    models = [truth, fit.model, *(drawn(fit, seed) for seed in range(10))]
+    models = [truth, fit.solution, *(drawn(fit, seed) for seed in range(10))]
     assert [said(model, unseen).verdict for model in models] == [STANDS] * 12
 
 
 def test_what_the_record_cannot_tell_is_said(truth: StateSpaceModel, fit: StateSpaceFit, unseen: list[Piece]) -> None:
     """Without a sweep, with an input at rest, with hopeless bounds, or too short."""
     calm = replace(unseen[2], inputs=unseen[2].inputs * [1, 1, 1, 0])
-    assert "collective" in said(fit.model, [calm]).silent
+    assert "collective" in said(fit.solution, [calm]).silent
     vague = replace(
-        fit.model, parameters={n: replace(p, cramer_rao=100.0 * abs(p.value)) for n, p in fit.model.parameters.items()}
+        fit.solution,
+        parameters={n: replace(p, cramer_rao=100.0 * abs(p.value)) for n, p in fit.solution.parameters.items()},
     )
     assert said(vague, unseen).verdict == OPEN
     assert "too wide" in " ".join(said(vague, unseen).reasons) or "so wide" in " ".join(said(vague, unseen).reasons)
     short = replace(unseen[0], inputs=unseen[0].inputs[:60], outputs=unseen[0].outputs[:60])
-    assert said(fit.model, [short]).verdict == OPEN
+    assert said(fit.solution, [short]).verdict == OPEN
 
 
 def test_a_record_of_gusts_alone_refutes_nobody(
@@ -178,7 +179,7 @@ def test_an_unstable_model_gets_the_same_stretches_as_any_other(truth: StateSpac
         },
         record.provenance,
     )
-    right, wrong = (verify(model, thin, low=0.1) for model in (fit.model, unstable(fit)["Nr = +6"]))
+    right, wrong = (verify(model, thin, low=0.1) for model in (fit.solution, unstable(fit)["Nr = +6"]))
     assert [t.source for t in right.traces] == [t.source for t in wrong.traces]
     assert (right.constants, right.samples) == (wrong.constants, wrong.samples)
     assert right.verdict == STANDS

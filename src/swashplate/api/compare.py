@@ -85,7 +85,7 @@ def _of_models(named: Mapping[str, Any]) -> CaseParts:
 
 
 def _linear(one: Any) -> Linear:
-    made = one.vehicle if isinstance(one, Result) else one
+    made = one.model if isinstance(one, Result) else one
     if isinstance(made, Vehicle):
         return linearize(made) if made.structure is None else made.structure
     if isinstance(made, LinearModel | StateSpaceModel):

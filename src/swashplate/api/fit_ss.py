@@ -28,7 +28,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.registry import nearest
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.validation.structure_reduction import reduce as reduced
-from swashplate.validation.verification import verify, verify_inside
+from swashplate.validation.verify import verify, verify_inside
 
 Linear: TypeAlias = Vehicle | StateSpaceModel | str | Path
 """A linear model, or its name or file."""
@@ -147,10 +147,10 @@ def fit_ss(
     verification = None
     if flights:
         say("flying the model along what the fit has not seen")
-        verification = marked(verify_inside(fit.model, flights, band=band), responses.sources)
+        verification = marked(verify_inside(fit.solution, flights, band=band), responses.sources)
     advice = suggest_gains(fit, responses) if gains else ()
     material = ResponseMaterial(responses, fit=fit, search=found, verification=verification, gains=advice)
-    return LinearStudy(material, model=fit.model, remarks=remarks)
+    return LinearStudy(material, structure=fit.solution, remarks=remarks)
 
 
 def _listed(model: Linear | Sequence[Linear] | None) -> Sequence[Linear]:

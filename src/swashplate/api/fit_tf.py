@@ -9,7 +9,7 @@ from swashplate.api.linear_study import LinearStudy, marked
 from swashplate.api.saying import Say, silent
 from swashplate.errors import IdentificationError
 from swashplate.flights.conditioning.uniform_records import uniform_records
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines
 from swashplate.identification.frequency.transfer_function_fit import (
     as_state_space,
@@ -19,7 +19,7 @@ from swashplate.identification.frequency.transfer_function_forms import TriedStr
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.validation.verification import verify_inside
+from swashplate.validation.verify import verify_inside
 
 
 def fit_tf(
@@ -82,7 +82,7 @@ def fit_tf(
             fixed=fixed,
             least_coherence=least_coherence,
         )
-    unseen = (hold_out,) if isinstance(hold_out, Flight) else tuple(hold_out)
+    unseen = as_flights(hold_out)
     remarks: tuple[str, ...] = ()
     model = verification = None
     try:
@@ -98,7 +98,7 @@ def fit_tf(
         flights = uniform_records(unseen, wanted, rate=rate, cutoff=cutoff, names=called)
         verification = marked(verify_inside(model, flights, band=band), responses.sources)
     advice = suggest_gains(fit, responses) if gains else ()
-    measured = responses.select(tuple(m.output for m in fit.model), (input,))
+    measured = responses.select(tuple(m.output for m in fit.solution), (input,))
     read = (*margin_lines(responses, fit, fit.targets), *handling_lines(measured, (fit,))) if margins else ()
     material = ResponseMaterial(measured, (fit,), trials, verification=verification, gains=advice)
-    return LinearStudy(material, margins=read, model=model, remarks=remarks)
+    return LinearStudy(material, margins=read, structure=model, remarks=remarks)

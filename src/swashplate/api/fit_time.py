@@ -12,7 +12,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core import stopping
 from swashplate.identification.time.linear_time_fit import fit_in_time
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 
 def fit_time(
@@ -73,6 +73,6 @@ def fit_time(
     fit = stopping.told(fit)
     say("flying the model")
     unseen = uniform_records(hold_out, channels, rate=rate, cutoff=cutoff, names=names) or records
-    verification = marked(verify(fit.model, unseen, outputs=wanted), fit.settings["records"])
+    verification = marked(verify(fit.solution, unseen, outputs=wanted), fit.settings["records"])
     material = ResponseMaterial(time_fit=fit, verification=verification)
-    return LinearStudy(material, fitted=records, model=fit.model)
+    return LinearStudy(material, fitted=records, structure=fit.solution)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from swashplate import atomic
 from swashplate.api.saying import Say, silent
+from swashplate.api.study import Study
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core import stopping
 from swashplate.identification.core.parameters import parameterize
@@ -25,21 +24,18 @@ from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.models.card import Card
 from swashplate.models.choices import Free
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.html import write_page
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report
 from swashplate.reporting.summary import banners, summary
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
-FILES = ("report.html", "model.toml", "fit.json", "validation.json", "posterior.nc")
-"""What `save` may write."""
 TRACKED = ("prediction-error", "output-error", "nelder-mead")
 """Methods that are checked for a tracked pose before anything is computed."""
 
 
 @dataclass(frozen=True, repr=False)
-class Identification:
+class Identification(Study):
     """A vehicle identified from flights, and how it predicts others.
 
     Attributes:
@@ -47,6 +43,8 @@ class Identification:
         validation: on what the fit has not seen; None without such flights, or for a fit that has failed.
         refused: why a posterior that was asked for may not be used, in words; "" where none was, or it may.
     """
+
+    files: ClassVar[tuple[str, ...]] = ("report.html", "model.toml", "fit.json", "validation.json", "posterior.nc")
 
     fit: Result[Vehicle, FlightDetails]
     validation: Validation | None
@@ -61,27 +59,19 @@ class Identification:
         """What `sp.report` writes."""
         return structure_of(self.fit, self.validation, title=title)
 
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write report.html, fit.json, model.toml, validation.json and, where one was asked for, posterior.nc into a
-        folder; a failed fit has no model."""
-        with atomic.folder_when_complete(folder, ours=FILES) as place:
-            self.write(place)
-        return Path(folder)
-
     def write(self, folder: Path) -> None:
-        """The files of `save` into a folder that is there."""
-        write_page(folder / "report.html", self.page())
+        super().write(folder)
         self.fit.save(folder / "fit.json")
         if self.validation is not None:
             self.validation.save(folder / "validation.json")
         if not self.fit.failed:
-            self.fit.vehicle.save(folder / "model.toml")
+            self.fit.model.save(folder / "model.toml")
         if self.fit.posterior is not None:
             self.fit.posterior.save(folder / "posterior.nc")
 
     def lines(self) -> list[str]:
         """The report's own warnings and five lines, in words."""
-        if not isinstance(self.fit.model, Vehicle):
+        if not isinstance(self.fit.solution, Vehicle):
             return []
         told = [f"! {text}" for _, text in banners(self.fit, self.validation)]
         return told + [f"{label + ':':11} {words}" for label, words, _ in summary(self.fit, self.validation)]
@@ -128,8 +118,8 @@ def identify_and_validate(
         FlightError: where a hold-out is a stretch that the fit sees, or a flight lacks a channel.
         IdentificationError: where no fit can be started.
     """
-    seen = (flights,) if isinstance(flights, Flight) else tuple(flights)
-    unseen = (hold_out,) if isinstance(hold_out, Flight) else tuple(hold_out)
+    seen = as_flights(flights)
+    unseen = as_flights(hold_out)
     check_disjoint([*seen, *unseen], names)
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     check_method(method)

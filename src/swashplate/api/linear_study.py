@@ -2,46 +2,47 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from swashplate import atomic
+from swashplate.api.study import Study
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling_readings import Line
 from swashplate.identification.responses.response_warnings import damaged
+from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
-from swashplate.reporting.html import write_page
+from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
 from swashplate.validation.verification import Verification
 
-FILES = ("report.html", "fit.json", "model.toml", "verification.json")
-"""What `save` may write."""
-
 
 @dataclass(frozen=True, repr=False)
-class LinearStudy:
+class LinearStudy(Study):
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:
         material: responses, fits, trials, search, verification, rival and gains, as far as there are any.
         fitted: flights that the fit was made from, where it was made from flights.
         margins: read off the responses and the model.
-        model: that can be flown and saved; None where there is none.
+        structure: matrices of named expressions, which `model` is made of; None where there is no model.
         remarks: what the user must know beside the fit's own warnings.
     """
+
+    files: ClassVar[tuple[str, ...]] = ("report.html", "fit.json", "model.toml", "verification.json")
 
     material: ResponseMaterial
     fitted: tuple[Flight, ...] = ()
     margins: tuple[Line, ...] = ()
-    model: StateSpaceModel | None = None
+    structure: StateSpaceModel | None = None
     remarks: tuple[str, ...] = ()
 
     @property
@@ -49,6 +50,11 @@ class LinearStudy:
         """The fit: of a state-space model or of transfer functions."""
         m = self.material
         return m.fit or m.time_fit or (m.transfer_functions[0] if m.transfer_functions else None)
+
+    @cached_property
+    def model(self) -> Vehicle | None:
+        """The vehicle, as `swashplate.vehicle` loads it; None where there is none."""
+        return None if self.structure is None else linear_vehicle(self.structure)
 
     @property
     def verification(self) -> Verification | None:
@@ -80,19 +86,12 @@ class LinearStudy:
         """What `sp.report` writes."""
         return compose_responses(self.material, title=title)
 
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write report.html, and fit.json, model.toml and verification.json where there are such, into a folder."""
-        with atomic.folder_when_complete(folder, ours=FILES) as place:
-            self.write(place)
-        return Path(folder)
-
     def write(self, folder: Path) -> None:
-        """The files of `save` into a folder that is there."""
-        write_page(folder / "report.html", self.page())
+        super().write(folder)
         if self.fit is not None:
             self.fit.save(folder / "fit.json")
-        if self.model is not None:
-            atomic.write_text(folder / "model.toml", to_toml(self.model))
+        if self.structure is not None:
+            atomic.write_text(folder / "model.toml", to_toml(self.structure))
         if self.verification is not None:
             self.verification.save(folder / "verification.json")
 

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from swashplate import atomic
 from swashplate.api.saying import Say, silent
-from swashplate.flights.flight import Flight
+from swashplate.api.study import Study
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core.nested import LEVEL, EffectTest
 from swashplate.identification.core.parameters import Free
 from swashplate.identification.nested import NestedFits, fit_nested
 from swashplate.models.choices import PhysicalEffect
 from swashplate.models.vehicle import Vehicle
-from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Cell, Points, Report, Section, Table
 from swashplate.reporting.versions import date, versions
 from swashplate.validation.held_out import AHEAD, Gain, as_document, gains, prediction_errors
 
-FILES = ("report.html", "nested.json", "fit.json")
-"""What `save` writes."""
-
 
 @dataclass(frozen=True, repr=False)
-class NestedComparison:
+class NestedComparison(Study):
     """A structure with and without each part of its physics.
 
     Attributes:
@@ -36,6 +32,8 @@ class NestedComparison:
         held_out: by effect's name, how much better the fit with it predicts flights that no fit has seen; empty without
             such flights.
     """
+
+    files: ClassVar[tuple[str, ...]] = ("report.html", "nested.json", "fit.json")
 
     fits: NestedFits
     held_out: Mapping[str, Sequence[Gain]] = field(default_factory=dict)
@@ -75,15 +73,8 @@ class NestedComparison:
             "held_out": as_document(self.held_out),
         }
 
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write report.html, nested.json and fit.json into a folder."""
-        with atomic.folder_when_complete(folder, ours=FILES) as place:
-            self.write(place)
-        return Path(folder)
-
     def write(self, folder: Path) -> None:
-        """The files of `save` into a folder that is there."""
-        write_page(folder / "report.html", self.page())
+        super().write(folder)
         atomic.write_json(folder / "nested.json", self.to_document())
         self.fits.fit.save(folder / "fit.json")
 
@@ -164,8 +155,8 @@ def identify_nested(
         FlightError: where a hold-out is a stretch that the fits see, or a flight lacks a channel.
         IdentificationError: without effects, or where no fit can be started.
     """
-    seen = (flights,) if isinstance(flights, Flight) else tuple(flights)
-    unseen = (hold_out,) if isinstance(hold_out, Flight) else tuple(hold_out)
+    seen = as_flights(flights)
+    unseen = as_flights(hold_out)
     check_disjoint([*seen, *unseen], names)
     fits = fit_nested(
         vehicle,

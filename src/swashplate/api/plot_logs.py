@@ -13,7 +13,7 @@ from swashplate.atomic import make_folder, write_bytes
 from swashplate.errors import FlightError, SwashError
 from swashplate.extras import library
 from swashplate.flights.conditioning.synchronise import synchronise
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.registry import listed
 from swashplate.reporting.figures.of_flight import label, over_time, spectrogram, spectrum
 from swashplate.reporting.figures.still import still
@@ -106,7 +106,7 @@ def plot_logs(
         FlightError: a channel that no log has; logs that cannot be aligned as asked; several logs in a spectrogram.
         SwashError: another suffix, a place that cannot be written to, a library that is missing.
     """
-    given = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    given = as_flights(flights)
     if path is not None and Path(path).suffix.lower() not in SUFFIXES:
         raise SwashError(
             f"ends in '{Path(path).suffix}', expected one of {', '.join(SUFFIXES)}.", where=Path(path), channel="-o"

@@ -76,9 +76,7 @@ def _model(point: Point) -> StateSpaceModel:
         return structure(point)
     if isinstance(point, LinearModel):
         return point.to_structure()
-    if isinstance(point, Result):
-        return structure_of(point.model)
-    return structure_of(point)
+    return structure_of(point.model if isinstance(point, Result) else point)
 
 
 def _with_trim(model: StateSpaceModel, told: PointTrim | None, name: str) -> StateSpaceModel:

@@ -8,11 +8,12 @@ from swashplate.api.fit_ss import Linear, linear
 from swashplate.api.linear_study import LinearStudy
 from swashplate.api.saying import Say, silent
 from swashplate.flights.conditioning.uniform_records import uniform_records
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.sections_responses import ResponseMaterial
-from swashplate.validation.verification import Verification, verify_inside
+from swashplate.validation.verification import Verification
+from swashplate.validation.verify import verify_inside
 
 
 def validate_linear(
@@ -39,7 +40,7 @@ def validate_linear(
     Raises:
         FlightError: an input that the flights lack, or no output that model and flights share.
     """
-    identified, raw = linear(model), (flights,) if isinstance(flights, Flight) else tuple(flights)
+    identified, raw = linear(model), as_flights(flights)
     compared = None if published is None else _other(published)
     say("flying the model along the inputs")
 
@@ -48,7 +49,7 @@ def validate_linear(
         return verify_inside(one, flown, band=band)
 
     found, rival = along(identified), None if compared is None else along(compared)
-    return LinearStudy(ResponseMaterial(verification=found, rival=rival), model=identified)
+    return LinearStudy(ResponseMaterial(verification=found, rival=rival), structure=identified)
 
 
 def _other(vehicle: Vehicle) -> StateSpaceModel:

@@ -149,7 +149,7 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
     doubts = [check.words for result in results for check in (*result.checks, *disagreements) if not check.good]
     return Result(
         method="bench",
-        model=vehicle.with_card(card),
+        solution=vehicle.with_card(card),
         start=vehicle,
         estimates=tuple(
             Estimate(

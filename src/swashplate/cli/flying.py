@@ -132,7 +132,7 @@ def carried_out(
     A fit that is stopped is kept as far as it came; the exit code is then 128 and the signal's number.
     The folder is made first: a place that cannot be written to is found before an hour of computing.
     """
-    from swashplate.api.linear_study import FILES
+    from swashplate.api.linear_study import LinearStudy
     from swashplate.cli.console import as_json, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.identification.core.stopping import stoppable
@@ -140,7 +140,7 @@ def carried_out(
     with (
         stoppable() as stop,
         progress(quiet=quiet or json) as line,
-        folder_when_complete(out, ours=FILES) as folder,
+        folder_when_complete(out, ours=LinearStudy.files) as folder,
     ):
         made = make(line.say)
         if folder is not None:

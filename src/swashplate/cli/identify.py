@@ -162,12 +162,13 @@ def identify(
 
 def carried_out(make: Callable[[Callable[..., None]], Made], *, out: Path | None, quiet: bool) -> Made:
     """What was asked, with its files, which appear in `out` together when all are complete."""
-    from swashplate.api.identification import FILES
-    from swashplate.api.nested import FILES as OF_NESTED
+    from swashplate.api.identification import Identification
+    from swashplate.api.nested import NestedComparison
     from swashplate.cli.console import progress
     from swashplate.cli.outputs import folder_when_complete
 
-    with progress(quiet=quiet) as line, folder_when_complete(out, ours=tuple({*FILES, *OF_NESTED})) as folder:
+    ours = (*Identification.files, *NestedComparison.files)
+    with progress(quiet=quiet) as line, folder_when_complete(out, ours=ours) as folder:
         made = make(line.say)
         if folder is not None:
             line.say("writing the report")
@@ -184,12 +185,11 @@ def show(made: Identification | NestedComparison, *, out: Path | None, json: boo
     if json:
         typer.echo(as_json(made.to_document()))
     elif not quiet:
-        from swashplate.api.identification import FILES
         from swashplate.cli.outputs import place_of
 
         fit = made.fits.fit if isinstance(made, NestedComparison) else made.fit
-        console().print(fit_table(fit) if hasattr(fit.model, "card") else repr(fit))
+        console().print(fit_table(fit) if hasattr(fit.solution, "card") else repr(fit))
         if fit.posterior is not None:
             typer.echo(f"\n{fit.posterior!r}")
-        place = place_of(out, "report.html", FILES) if out else "not written (give --out DIR)"
+        place = place_of(out, "report.html", made.files) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))

@@ -17,6 +17,18 @@ def lateness(vehicle: Vehicle, controller: Controller | None, *, given: Mapping[
         controller: what flies it, which may believe in delays that the vehicle's card does not know.
         given: delays that somebody asked for [s], one for all or by input.
     """
+    inside = vehicle.traits.delayed_by
+    own = (
+        f"commands {1e3 * vehicle.card.values()[inside]:.3g} ms ({inside}, in the model's equations)" if inside else ""
+    )
+    further = _further(vehicle, controller, given=given, inside=own)
+    return f"{own}; further: {further}" if own and further else own or further
+
+
+def _further(
+    vehicle: Vehicle, controller: Controller | None, *, given: Mapping[str, float] | float | None, inside: str
+) -> str:
+    """What is late beside what the equations delay."""
     known, believed = input_delays(vehicle), dict(getattr(controller, "delays", {}))
     if given is not None:
         found, whose = complete_delays(vehicle, given), "as given"
@@ -29,6 +41,8 @@ def lateness(vehicle: Vehicle, controller: Controller | None, *, given: Mapping[
         found, whose = known, "identified"
     elif any(believed.values()):
         found, whose = believed, "as the controller was designed for: the model knows none"
+    elif inside:
+        return ""
     else:
         return "nothing: no delay of this model is known, --delay says one"
     return f"{_listed(found) or 'nothing'} ({whose})"

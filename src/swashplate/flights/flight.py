@@ -308,3 +308,8 @@ class Flight:
             lines.append(f"  {name} ({n} samples, {rate}): {', '.join(map(str, data.data_vars))}")
         lines += [f"  {i + 1}. {step.operation} {dict(step.details)}" for i, step in enumerate(self.history)]
         return "\n".join(lines)
+
+
+def as_flights(flights: Flight | Iterable[Flight]) -> tuple[Flight, ...]:
+    """One flight or several as a tuple."""
+    return (flights,) if isinstance(flights, Flight) else tuple(flights)

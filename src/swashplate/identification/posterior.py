@@ -103,7 +103,7 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
     if vague or not result.names or not np.all(np.isfinite(covariance)):
         told = "has no standard deviation." if vague else "knows no spread: nothing was free."
         raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
-    low, high = bounds_of(result.model, result.names)
+    low, high = bounds_of(result.solution, result.names)
     mean = np.array([result[name].value for name in result.names])
     found = normal_within(mean, covariance, low, high, count=draws * chains, seed=seed, where=where)
     return Posterior(

@@ -91,6 +91,7 @@ class Traits:
         power: of a state, the shaft power [W]; None where it has none.
         balance: from the vehicle before a fit, the one after it and the motors' trims, what keeps it in balance, in
             words; None where nothing is to be said.
+        delayed_by: of the card, the seconds by which its equations themselves delay every command; "" for none.
         voltage_seconds: over which a logged voltage is averaged each way: long where it sags slowly and is noisy, short
             where the motors' commands are shares of it.
     """
@@ -122,4 +123,5 @@ class Traits:
     doubts: Doubts | None = None
     power: Callable[[Model, Array, Array, Environment], float] | None = None
     balance: Callable[[Model, Model, Mapping[str, float]], Sequence[str]] | None = None
+    delayed_by: str = ""
     voltage_seconds: float = 8.0

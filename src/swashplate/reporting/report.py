@@ -107,7 +107,7 @@ def _along_flight(found: ModelComparison, title: str | None) -> Report:
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:
-    models = [one for one in given if isinstance(one, Result) and isinstance(one.model, StateSpaceModel)]
+    models = [one for one in given if isinstance(one, Result) and isinstance(one.solution, StateSpaceModel)]
     material = ResponseMaterial(
         responses=_only([one for one in given if isinstance(one, FrequencyResponse)], "frequency response"),
         transfer_functions=tuple(one for one in given if _is_of(one, tuple)),  # type: ignore[misc]
@@ -119,7 +119,7 @@ def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:
 
 
 def _is_of(one: object, kind: type) -> bool:
-    return isinstance(one, Result) and isinstance(one.model, kind)
+    return isinstance(one, Result) and isinstance(one.solution, kind)
 
 
 def _only(found: Sequence[Any], what: str) -> Any:

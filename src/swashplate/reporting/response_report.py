@@ -56,11 +56,11 @@ def compose_responses(material: ResponseMaterial, *, title: str | None = None) -
 
 def _title(m: ResponseMaterial) -> str:
     if m.fit:
-        return f"{m.fit.model.name} identified from frequency responses"
+        return f"{m.fit.name} identified from frequency responses"
     if m.transfer_functions:
         return "Transfer functions from frequency responses"
     if m.time_fit:
-        return f"{m.time_fit.model.name} identified in time"
+        return f"{m.time_fit.name} identified in time"
     if m.responses:
         return "Frequency responses"
     assert m.verification is not None
@@ -90,7 +90,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         rows.append(("Responses", f"{words}, from {listed(r.sources, most=4)}.", "plain"))
     if m.transfer_functions:
         words = "; ".join(
-            f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.model, f.costs, strict=True)
+            f"{model!r} (J {c:.0f})" for f in m.transfer_functions for model, c in zip(f.solution, f.costs, strict=True)
         )
         rows.append(("Model", words, sections_responses.tone(max(c for f in m.transfer_functions for c in f.costs))))
     if m.fit:
@@ -98,7 +98,7 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         rows.append(
             (
                 "Model",
-                f"{f.model.title}: J_ave {f.cost:.1f} over {len(f.targets)} responses.",
+                f"{f.solution.title}: J_ave {f.cost:.1f} over {len(f.targets)} responses.",
                 sections_responses.tone(f.cost),
             )
         )

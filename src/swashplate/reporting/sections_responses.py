@@ -134,7 +134,7 @@ def fit_parameters_section(fit: StateSpaceFit) -> Section:
         )
     if fit.details.reduced_modes:
         blocks.append(Text(f"What all of the reduction did to the {fit.details.reduced_modes}."))
-    modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.model.eigenvalues())}
+    modes = {"start": _modes(fit.start.eigenvalues()), "identified": _modes(fit.solution.eigenvalues())}
     blocks += [_mode_table(fit.details.modes), eigenvalues(modes)] if fit.details.modes else [eigenvalues(modes)]
     if len(fit.names) > 1:
         blocks.append(correlation_matrix(fit.names, fit.correlation))
@@ -186,7 +186,7 @@ def time_fit_section(fit: Result[StateSpaceModel, TimeDetails]) -> Section:
             "ones the true scatter is larger, as the corrected ones say.",
         )
     )
-    blocks.append(eigenvalues({"identified": _modes(fit.model.eigenvalues())}))
+    blocks.append(eigenvalues({"identified": _modes(fit.solution.eigenvalues())}))
     return Section("parameters", "Parameters", tuple(blocks))
 
 
@@ -216,8 +216,8 @@ def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
 
 def fit_costs_section(fit: StateSpaceFit) -> Section:
     """J of each response, and the mismatch within what a pilot would not notice."""
-    pairs = [(fit.model.outputs.index(t.output), fit.model.inputs.index(t.input), t.omega) for t in fit.targets]
-    answers = [fit.model.response(omega)[:, o, i] for o, i, omega in pairs]
+    pairs = [(fit.solution.outputs.index(t.output), fit.solution.inputs.index(t.input), t.omega) for t in fit.targets]
+    answers = [fit.solution.response(omega)[:, o, i] for o, i, omega in pairs]
     found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
     blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(found)]
     if fit.details.left_out:
@@ -229,10 +229,10 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
     """Transfer functions with their costs and parameters, and what the usual structures would cost."""
     blocks: list[Block] = []
     for k, fit in enumerate(m.transfer_functions):
-        blocks += [Text(f"{model!r}") for model in fit.model]
+        blocks += [Text(f"{model!r}") for model in fit.solution]
         blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
-        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.model, fit.targets, strict=True)]
+        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.solution, fit.targets, strict=True)]
         own = "" if k == 0 else f"-{k + 1}"
         blocks += [replace(one, identifier=f"{one.identifier}{own}") for one in (of_fit(fit), mismatch_figure(found))]
     if m.trials:

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.vehicle import Vehicle
@@ -29,6 +30,7 @@ from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_steps
 from swashplate.simulation.step_size import check_step
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start
+from swashplate.simulation.tumbling import euler_rows, from_euler, steep, tumbling
 
 if TYPE_CHECKING:
     from swashplate.simulation.sensors import Sensors
@@ -48,6 +50,8 @@ def simulate(
     seed: int | None = None,
 ) -> Flight:
     """Fly a vehicle through given inputs; classical Runge-Kutta of order 4, float64.
+
+    A flight that pitches beyond 80 degrees is integrated with a quaternion; its roll, pitch and yaw are those of it.
 
     Args:
         vehicle: what flies.
@@ -82,17 +86,18 @@ def simulate(
     first = surroundings._replace(**dict(zip(SURROUNDINGS, rows[0, len(vehicle.input_names) :], strict=True)))
     x0 = start_row(vehicle, start, first)
     check_step(vehicle, np.asarray(x0), rows[0, : len(vehicle.input_names)], first, rate=rate, substeps=substeps)
-    states = np.asarray(
-        trajectory(
-            equations_of(vehicle),
-            x0,
-            acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first),
-            parameter_row(vehicle, surroundings),
-            1.0 / rate,
-            substeps=substeps,
-            held=interpolation == "held",
+    acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
+    numbers = parameter_row(vehicle, surroundings)
+
+    def flown(moved: Vehicle, begin: Array) -> Array:
+        held = interpolation == "held"
+        return np.asarray(
+            trajectory(equations_of(moved), begin, acting, numbers, 1.0 / rate, substeps=substeps, held=held)
         )
-    )
+
+    states = flown(vehicle, np.asarray(x0))
+    if not vehicle.traits.linear and steep(states):
+        states = euler_rows(flown(tumbling(vehicle), from_euler(np.asarray(x0))), np.asarray(x0))
     flight = simulated_flight(
         vehicle, time, states, rows, details={"rate": rate, "substeps": substeps, "interpolation": interpolation}
     )

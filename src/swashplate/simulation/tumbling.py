@@ -25,6 +25,7 @@ from swashplate.physics.rigid_body import RigidBody
 _FLOATS = FloatBackend()
 _PHI: Final = 6  # where attitude begins in a row
 _P: Final = 9  # and where the rates do
+_STEEP: Final = math.radians(80.0)
 
 
 class TumblingBody(NamedTuple):
@@ -114,3 +115,19 @@ def to_euler(row: Array, before: Array) -> Array:
     angles = [was + math.remainder(now - was, 2.0 * math.pi) for now, was in zip(found, last, strict=True)]
     angles[1] = found.theta
     return np.concatenate([row[:_PHI], angles, row[_PHI + 4 :]])
+
+
+def steep(states: Array) -> bool:
+    """Whether rows of states with Euler angles, shape (n, n_states), come so near to the vertical that these lose
+    digits: beyond 80 degrees the rates of roll and yaw are six times those of the body and more."""
+    pitch = np.abs(states[:, _PHI + 1])
+    return bool(np.any(pitch[np.isfinite(pitch)] > _STEEP))
+
+
+def euler_rows(rows: Array, before: Array) -> Array:
+    """Rows of `tumbling`, shape (n, n_states + 1), as rows of the vehicle, turns counted on from the row `before`."""
+    made = []
+    for row in rows:
+        before = to_euler(row, before)
+        made.append(before)
+    return np.array(made)

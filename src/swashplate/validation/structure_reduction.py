@@ -18,7 +18,8 @@ from swashplate.identification.frequency.state_space_result import ReductionStep
 from swashplate.identification.frequency.state_space_words import CR_TARGET, I_TARGET
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.validation.refutation import REFUTED
-from swashplate.validation.verification import Verification, verify
+from swashplate.validation.verification import Verification
+from swashplate.validation.verify import verify
 
 GROWTH, LEAST_GROWTH = 0.05, 0.5
 """J_ave may grow by this share, or by this much, in the whole reduction."""
@@ -59,7 +60,7 @@ def reduce(
         return verify(model, hold_out, band=limits) if hold_out else None
 
     allowed = fit.cost + max(LEAST_GROWTH, GROWTH * fit.cost)
-    whole = along(fit.model)
+    whole = along(fit.solution)
     history: list[ReductionStep] = list(fit.details.reduction)
     tried: set[str] = set()
     present = fit
@@ -69,7 +70,7 @@ def reduce(
             break
         name, reason = choice
         tried.add(name)
-        p = present.model.parameters[name]
+        p = present.solution.parameters[name]
         # A time constant of zero, say, is no structure with one parameter less.
         ways = [("", p.dropped)] if p.lower <= p.dropped <= p.upper else []
         if present[name].sigma_percent > HOPELESS:
@@ -77,10 +78,10 @@ def reduce(
         for remark, value in ways:
             new = _without(present, name, value)
             after = float("inf") if new is None else new.cost
-            modes, gone = ("", False) if new is None else moved_modes(fit.details.modes, new.model.eigenvalues())
+            modes, gone = ("", False) if new is None else moved_modes(fit.details.modes, new.solution.eigenvalues())
             veto = "a mode has gone or moved beyond its bounds" if gone else ""
             if new is not None and after <= allowed and not veto and whole is not None:
-                veto = _worse(whole, along(new.model))
+                veto = _worse(whole, along(new.solution))
             kept = new is not None and after <= allowed and not veto
             history.append(ReductionStep(name, reason + remark, present.cost, after, kept, veto, modes))
             if progress is not None:
@@ -89,7 +90,7 @@ def reduce(
                 present = new
                 break
     estimates = tuple(replace(p, start=fit[p.name].start) for p in present.estimates)
-    total, _ = moved_modes(fit.details.modes, present.model.eigenvalues())
+    total, _ = moved_modes(fit.details.modes, present.solution.eigenvalues())
     return replace(
         present,
         start=fit.start,
@@ -145,7 +146,7 @@ def _worse(before: Verification, after: Verification | None) -> str:
 
 def _without(fit: StateSpaceFit, name: str, value: float) -> StateSpaceFit | None:
     """The fit again with one parameter held at a value; None where nothing answers then."""
-    model = fit.model.with_values({name: value}, free=False)
+    model = fit.solution.with_values({name: value}, free=False)
     if not model.free:
         return None
     try:

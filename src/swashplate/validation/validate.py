@@ -13,7 +13,7 @@ from swashplate.arrays import Array
 from swashplate.errors import CardError, FlightError, SwashError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.time.feedback import excitation
@@ -93,7 +93,7 @@ def validate(
     alone = _same_numbers(vehicle, published)
     noise, prior = observer_of(vehicle)
     trims = vehicle.card.observer.get("trims", {})
-    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    flights = as_flights(flights)
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
     shortest = calibration + _STARTS + min(horizons)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate.errors import FlightError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.schema import channel
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import records
@@ -23,7 +23,8 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
-from swashplate.validation.verification import Trace, Verification, verified
+from swashplate.validation.verification import Trace, Verification
+from swashplate.validation.verify import verified
 
 
 def verify_vehicle(
@@ -49,7 +50,7 @@ def verify_vehicle(
     """
     enable_double_precision()
     enable_compilation_cache()
-    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    flights = as_flights(flights)
     known = measurable(vehicle)
     shared = tuple(n for n in (outputs or known) if n in known and all(n in f for f in flights))
     if not shared:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload
 
 from swashplate.errors import SwashError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.transfer_function_fit import TransferFunctionDetails, as_state_space
 from swashplate.identification.time.flight_details import FlightDetails
@@ -15,7 +15,8 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.validation.spans import CALIBRATION, HORIZONS
 from swashplate.validation.validation import Validation
-from swashplate.validation.verification import Verification, verify
+from swashplate.validation.verification import Verification
+from swashplate.validation.verify import verify
 
 
 @overload
@@ -82,8 +83,8 @@ def validate(
         SwashError: for a calibration that is too short, or `published` beside a model that has no card to compare with.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
-    flown = (flights,) if isinstance(flights, Flight) else tuple(flights)
-    held = model.model if isinstance(model, Result) else model
+    flown = as_flights(flights)
+    held = model.solution if isinstance(model, Result) else model
     rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
     # What flies nonlinear vehicles compiles; linear models need none of it, and it takes a second to import.
     if rigid and outputs is None:
@@ -119,7 +120,7 @@ def along_inputs(
     Raises:
         FlightError: an input that the flights lack, or no output that both have.
     """
-    held = model.model if isinstance(model, Result) else model
+    held = model.solution if isinstance(model, Result) else model
     if isinstance(held, Vehicle) and held.structure is None:
         from swashplate.validation.vehicle_verification import verify_vehicle
 

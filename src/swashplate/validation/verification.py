@@ -1,17 +1,10 @@
-"""Verification in time: an identified linear model flown along a record that no fit has seen.
-
-Two questions. Does the record refute the model? One-step predictions behind one noise filter tell (`refutation`). How
-close does it come? It is flown along stretches of one length, whatever the model is like. The record's reference is not
-the model's trim: constant biases of the outputs, constant shifts of the modes' rates and one constant of each mode are
-solved for by least squares, as the book does (Tischler and Remple 2012, ch. 14), and so they are for a rival whose
-controls do nothing. Everything else that moves has to come from the model and the recorded inputs.
-"""
+"""What a verification in time found: per output, the traces to look at, the verdict and its reasons."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,36 +12,15 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.atomic import write_json
-from swashplate.errors import FlightError
-from swashplate.flights.conditioning.filters import filtered
 from swashplate.flights.flight import Flight
-from swashplate.identification.core.records import uniform_table
-from swashplate.identification.responses.response_warnings import damaged
-from swashplate.identification.time.linear_simulation import answers
-from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
-from swashplate.validation.black_box import CROSSED, Ceiling
-from swashplate.validation.ceiling_along import ceiling_along
-from swashplate.validation.floors import Floor, floors
-from swashplate.validation.noise_filter import Piece
-from swashplate.validation.refutation import REFUTED, STANDS, Judgement, judge
+from swashplate.validation.floors import Floor
+from swashplate.validation.refutation import STANDS, Judgement
 
 GOOD_J, GOOD_TIC = 2.0, 0.30
 """J_rms and Theil's coefficient up to which a rotorcraft model is called good (Tischler and Remple 2012)."""
-
-_WEIGHT = {"rad": np.degrees(1.0), "rad/s": np.degrees(1.0), "m/s": 1.0 / 0.3048, "m/s^2": 1.0 / 0.3048}
-"""1 deg, 1 deg/s, 1 ft/s and 1 ft/s^2 weigh alike."""
-
-_TOP, _ORDER = 0.45, 3
-"""Highest corner of a band as a share of the sample rate, and order of its filter (each way)."""
-
-PERIODS, LOW = 3.0, 0.1
-"""Periods of the band's low end in one stretch, and that low end [Hz] where no band is given."""
-
-HOLD, HOLD_RATE, NO_CONTROL = "hold", "hold rate", "no control"
-"""Naive rivals: the mean, a straight line, the model's own motion with the controls still (all by least squares)."""
 
 
 @dataclass(frozen=True)
@@ -186,218 +158,3 @@ class Verification(Shown):
         lines += [f"  {floor.channel}: {floor.scatter}{floor.words}" for floor in self.floors]
         lines += [f"! {text}" for text in self.warnings]
         return "\n".join(lines if self.inside is None else [*lines, repr(self.inside)])
-
-
-def verify_inside(
-    model: StateSpaceModel, flights: Flight | Sequence[Flight], *, band: tuple[float, float] | None
-) -> Verification:
-    """`verify` on the records as they are and, where the model was fitted over a band, within that band too.
-
-    What a model does outside its band is not told by the fit: a record's slow drift, say, which a loop fights with
-    commands that a near-integrator then adds up. The verdict is on the band.
-    """
-    whole = verify(model, flights, low=band[0] if band else None, judged=band is None)
-    if band is None:
-        return whole
-    inside = verify(model, flights, band=band)
-    return replace(whole, inside=inside, judgement=inside.judgement)
-
-
-def verify(
-    model: Vehicle | StateSpaceModel,
-    flights: Flight | Sequence[Flight],
-    *,
-    outputs: Sequence[str] | None = None,
-    shifts: bool = True,
-    band: tuple[float, float] | None = None,
-    low: float | None = None,
-    judged: bool = True,
-) -> Verification:
-    """Fly a model along recorded inputs and compare; judge whether the records refute it.
-
-    Args:
-        model: an identified model: a vehicle of a state-space file, or what it is made of.
-        flights: conditioned; not used for the fit.
-        outputs: which to compare; all that model and flights share where None.
-        shifts: solve for constant shifts of the modes' rates too (else for biases and the modes' constants only).
-        band: limits [Hz] within which inputs and outputs are compared (filtered alike, without phase); all where None.
-        low: lowest frequency of interest [Hz], of which a stretch holds three periods; the band's, or 0.1, where None.
-        judged: ask the records whether they refute it; the verdict is "cannot be judged" otherwise.
-
-    Raises:
-        FlightError: an input that the flights lack, no output that both have, or flights at different rates.
-    """
-    flights, model = (flights,) if isinstance(flights, Flight) else tuple(flights), structure_of(model)
-    shared = tuple(n for n in (outputs or model.outputs) if all(n in f for f in flights) and n in model.outputs)
-    if not shared:
-        raise FlightError(
-            f"flight and model share no output; the model has {', '.join(model.outputs)}.",
-            where=flights[0].provenance.source or None,
-            hint="Map the flight's columns to these names.",
-        )
-    warnings = damaged(flights) if band is None else []  # said once
-    stretch = PERIODS / (low or (band[0] if band else LOW))
-    m = len(model.inputs)
-    traces: list[Trace] = []
-    pieces: list[Piece] = []
-    costs: dict[str, list[Array]] = {HOLD: [], HOLD_RATE: [], NO_CONTROL: []}
-    constants = 0
-    weight = np.array([_WEIGHT.get(model.units.get(n, ""), 1.0) for n in shared])
-    for flight in flights:
-        for piece in flight.split():
-            time, table = uniform_table(piece, (*model.inputs, *shared), who=f"'{model.name}'")
-            dt = float((time[-1] - time[0]) / (time.size - 1))
-            source = piece.provenance.source or "flight"
-            moved = table - table.mean(axis=0)
-            pieces.append(Piece(source, moved[:, :m], moved[:, m:], dt))
-            if band is not None:
-                table = filtered(table, rate=1.0 / dt, cutoff=(band[0], min(band[1], _TOP / dt)), order=_ORDER)
-            count = max(1, round(time.size * dt / stretch))
-            for part in np.array_split(np.arange(time.size), count):
-                name = f"{source} {time[part][0]:.2f}-{time[part][-1]:.2f} s"
-                trace, still, free = _flown(model, shared, name, time[part], table[part], dt, shifts)
-                traces.append(trace)
-                constants += free
-                costs[NO_CONTROL].append(still * weight)
-                ramp = np.linspace(-1.0, 1.0, part.size)[:, None]
-                level = trace.flight - trace.flight.mean(axis=0)
-                costs[HOLD].append(level * weight)
-                costs[HOLD_RATE].append((level - ramp * (ramp.T @ level) / np.sum(ramp**2)) * weight)
-    if max(p.dt for p in pieces) > (1.0 + 1e-6) * min(p.dt for p in pieces):
-        raise FlightError(
-            f"the flights have different rates (steps of {sorted({round(p.dt, 9) for p in pieces})} s).",
-            hint="Condition all of them to the same rate.",
-        )
-    return verified(
-        model,
-        shared,
-        traces,
-        units=model.units,
-        warnings=warnings,
-        flights=flights,
-        settings={"shifts": shifts, "band_hz": list(band) if band else None},
-        judgement=judge(model, pieces, shared, band=band) if judged else None,
-        rivals={name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) for name, parts in costs.items()},
-        constants=constants,
-    )
-
-
-def verified(
-    model: StateSpaceModel | Vehicle,
-    outputs: tuple[str, ...],
-    traces: Sequence[Trace],
-    *,
-    units: Mapping[str, str],
-    warnings: Sequence[str],
-    flights: tuple[Flight, ...],
-    settings: Mapping[str, Any],
-    judgement: Judgement | None = None,
-    rivals: Mapping[str, float] | None = None,
-    constants: int = 0,
-) -> Verification:
-    """What a model did along records, with its figures.
-
-    Args:
-        model: what was flown. outputs: compared. traces: the records. units: by output.
-        warnings, flights, settings, judgement, rivals, constants: see `Verification`.
-    """
-    rows, told = _judged(units, outputs, traces), list(warnings)
-    lost = [f"{o.output} ({o.theil:.2f})" for o in rows if o.theil > GOOD_TIC]
-    if lost:
-        refuted = judgement is not None and judgement.verdict == REFUTED
-        why = "The records refute it." if refuted else "What moved them may be no input (gusts)."
-        told.append(f"Theil's coefficient above {GOOD_TIC:g}: {', '.join(lost)}. The model does not follow. {why}")
-    weight = np.array([_WEIGHT.get(units.get(n, ""), 1.0) for n in outputs])
-    errors = np.concatenate([t.flight - t.model for t in traces]) * weight
-    cost = float(np.sqrt(np.mean(errors**2)))
-    closer = [name for name, other in (rivals or {}).items() if other <= cost]
-    if closer:
-        told.append(f"a naive predictor is as close as the model: {', '.join(closer)}.")
-    return Verification(
-        model=model,
-        cost=cost,
-        outputs=rows,
-        traces=tuple(traces),
-        warnings=tuple(told),
-        flights=flights,
-        settings={
-            "outputs": list(outputs),
-            **settings,
-            "stretch_s": max(float(t.time[-1] - t.time[0]) for t in traces),
-        },
-        judgement=judgement,
-        rivals=dict(rivals or {}),
-        constants=constants,
-        samples=sum(t.flight.size for t in traces),
-        floors=_beside(outputs, traces, banded=bool(settings.get("band_hz"))),
-    )
-
-
-def _beside(outputs: tuple[str, ...], traces: Sequence[Trace], *, banded: bool) -> tuple[Floor, ...]:
-    """What the fits stand beside; "hold" is the mean of each stretch, and what moves is the flight about it."""
-    times = [t.time for t in traces]
-    moved = [(t.flight - t.flight.mean(axis=0)) ** 2 for t in traces]
-    box = (
-        Ceiling(CROSSED, refused="a band's filters, which have no phase, look ahead")
-        if banded
-        else ceiling_along(times, [t.inputs for t in traces], [t.flight for t in traces])
-    )
-    squares = {"model": [(t.flight - t.model) ** 2 for t in traces], HOLD: moved}
-    return floors(
-        outputs,
-        float("inf"),
-        times,
-        squares,
-        dict.fromkeys(squares, moved),
-        expected=np.full(len(outputs), np.nan),
-        ceilings=[box],
-    )
-
-
-def _flown(
-    model: StateSpaceModel, outputs: tuple[str, ...], name: str, time: Array, table: Array, dt: float, shifts: bool
-) -> tuple[Trace, Array, int]:
-    """One stretch; what the constants alone leave of the flight (n, n_outputs); how many there are."""
-    m, n, k = len(model.inputs), len(model.states), len(outputs)
-    inputs, measured = table[:, :m], table[:, m:]
-    forced, basis = answers(model, outputs, inputs - inputs.mean(axis=0), dt)
-    answer = forced.sum(axis=2)
-    if not shifts:
-        basis = np.delete(basis, np.s_[n : 2 * n], axis=2)
-    weight = np.array([_WEIGHT.get(model.units.get(o, ""), 1.0) for o in outputs])
-    flat = (basis * weight[None, :, None]).reshape(time.size * k, -1)
-    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-    wanted = np.stack([(values * weight).ravel() for values in (measured - answer, measured)], axis=1)
-    found, _, rank, _ = np.linalg.lstsq(flat / size, wanted, rcond=1e-8)
-    solved, still = (found / size[:, None]).T
-    trace = Trace(
-        source=name,
-        time=time,
-        flight=measured,
-        model=answer + basis @ solved,
-        inputs=inputs,
-        biases=dict(zip(outputs, map(float, solved[-k:]), strict=True)),
-        shifts={f"mode {i + 1}": float(v) for i, v in enumerate(solved[n : 2 * n])} if shifts else {},
-    )
-    return trace, measured - basis @ still, int(rank)
-
-
-def _judged(
-    units: Mapping[str, str], outputs: tuple[str, ...], traces: Sequence[Trace]
-) -> tuple[OutputVerification, ...]:
-    made = []
-    for k, name in enumerate(outputs):
-        # Deviations from each stretch's own mean: a bias that was solved for is no merit.
-        y = np.concatenate([t.flight[:, k] - t.flight[:, k].mean() for t in traces])
-        model_y = np.concatenate([t.model[:, k] - t.flight[:, k].mean() for t in traces])
-        error, flight, own = (float(np.sqrt(np.mean(np.square(v)))) for v in (y - model_y, y, model_y))
-        made.append(
-            OutputVerification(
-                name,
-                units.get(name, ""),
-                error,
-                error / max(flight + own, 1e-300),
-                100.0 * (1.0 - error / max(flight, 1e-300)),
-            )
-        )
-    return tuple(made)

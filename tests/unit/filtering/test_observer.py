@@ -18,7 +18,8 @@ import pytest
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.constant_gain import steady_sigmas, with_steady_gain
-from swashplate.control.lqg.controller import Lqg, carried_from, carried_row, lqg_step, numbers_from
+from swashplate.control.lqg.controller import Lqg
+from swashplate.control.lqg.controller_step import carried_from, carried_row, lqg_step, numbers_from
 from swashplate.control.lqg.design import design
 from swashplate.control.lqg.observer_trial import trial
 from swashplate.errors import ControllerError

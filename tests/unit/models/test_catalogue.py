@@ -77,7 +77,10 @@ def test_fits_and_exports_take_the_vehicle(mettler: sp.Vehicle) -> None:
     one = np.ones(h.shape)
     told = (h, 0.99 * one, 0.99 * one[:, :, 0], 0.02 * one, one[:, 0], one[:, :, 0], one[:, :1, :])
     fit = sp.fit_state_space(heave, FrequencyResponse(omega, truth.inputs, truth.outputs, *told), starts=1)
+    assert isinstance(fit.model, sp.Vehicle)
     assert structure_of(fit.model).parameters["Zw"].value == pytest.approx(-1.1, rel=1e-3)
+    assert all(isinstance(one, sp.Vehicle) for one in fit.draw(2, seed=0))
+    assert sp.simulate(fit.model, {"mixer_collective": np.zeros(20)}, rate=50.0).values("w").max() == 0.0
     files = export_model(mettler, "control", name="m").files
     assert files == export_model(structure_of(mettler), "control", name="m").files
     with pytest.raises(CardError, match="has no matrices of named parameters"):

@@ -259,7 +259,7 @@ def test_hashes_follow_the_numbers_and_nothing_else(monkeypatch: pytest.MonkeyPa
 
 def test_a_vehicle_without_hover_says_why() -> None:
     sound = fit()
-    heavy = replace(sound, model=sound.model.with_values({"mass": 1.9}))
+    heavy = replace(sound, solution=sound.model.with_values({"mass": 1.9}))
     found, problems = hover_modes(heavy, None)
     assert set(found) == {"published"}
     assert "identified vehicle has no eigenvalues" in problems[0]

@@ -19,6 +19,7 @@ from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, euler_rates
 from swashplate.physics.quaternion import euler_of, quaternion_of, quaternion_rates
+from swashplate.simulation import integrate
 from swashplate.simulation.stepping import Stepping
 from swashplate.simulation.tumbling import from_euler, to_euler
 
@@ -120,3 +121,23 @@ def test_the_live_page_flies_through_the_vertical_and_begins_again() -> None:
     world.reset()
     assert not world.trouble
     assert np.abs(fly(world, 0.2)[ANGLES]).max() < 0.1
+
+
+def test_a_simulated_flight_through_the_vertical_is_what_its_gyros_add_up_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 100 Hz; with Euler angles the same flight is twelve degrees off, without a word."""
+    flown = vehicle("crazyflie")
+    hover = sp.trim(flown)
+    held = {name: np.full(51, value) for name, value in hover.commands().items()}
+    begin = {**hover.states(), "z": -200.0, "phi": 0.02, "theta": 1.2, "q": 6.0}
+
+    def away() -> float:
+        flight = sp.simulate(flown, held, start=begin, rate=100.0, delays=0.0)
+        attitude, gyros = flight.array(("phi", "theta", "psi")), flight.array(("p", "q", "r"))
+        turned = Rotation.from_euler("ZYX", attitude[0, ::-1])
+        for now, then in zip(gyros[1:], gyros[:-1], strict=True):
+            turned *= Rotation.from_rotvec(0.5 / 100.0 * (now + then))
+        return float(np.degrees((turned.inv() * Rotation.from_euler("ZYX", attitude[-1, ::-1])).magnitude()))
+
+    assert away() < 0.05
+    monkeypatch.setattr(integrate, "steep", lambda states: False)
+    assert away() > 5.0

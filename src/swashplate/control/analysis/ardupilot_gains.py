@@ -202,7 +202,7 @@ def suggest_gains(
 
 def _channels(model: StateSpaceModel | Fitted) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Outputs and inputs."""
-    held = model if isinstance(model, StateSpaceModel) else model.model
+    held = model if isinstance(model, StateSpaceModel) else model.solution
     if isinstance(held, StateSpaceModel):
         return held.outputs, held.inputs
     return tuple(m.output for m in held), (held[0].input,)

@@ -75,8 +75,8 @@ class RateLoop:
         """The model in time; None for a transfer function that cannot be stepped."""
         if isinstance(self.model, StateSpaceModel):
             return self.model
-        if isinstance(self.model.model, StateSpaceModel):
-            return self.model.model
+        if isinstance(self.model.solution, StateSpaceModel):
+            return self.model.solution
         try:
             return as_state_space(self.model)
         except IdentificationError:
@@ -159,7 +159,7 @@ class RateLoop:
     @property
     def unstable(self) -> float:
         """Size of the fastest growing mode [rad/s], zero for none."""
-        m = self.model if isinstance(self.model, StateSpaceModel) else self.model.model
+        m = self.model if isinstance(self.model, StateSpaceModel) else self.model.solution
         modes = m.eigenvalues() if isinstance(m, StateSpaceModel) else m[0].poles
         return float(np.max(np.abs(modes[modes.real > 1e-6]), initial=0.0))
 

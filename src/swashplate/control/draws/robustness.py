@@ -44,6 +44,8 @@ def draw_models(
     """
     result = fit if isinstance(fit, Result) else load(fit, equations=model if isinstance(model, Vehicle) else None)
     where = "the fit" if isinstance(fit, Result) else str(fit)
+    if isinstance(model, Vehicle):
+        model = model.structure or model
     known = model.card.parameters if isinstance(model, Vehicle) else model.parameters
     strange = sorted(set(result.names) - set(known))
     if strange:

@@ -16,7 +16,8 @@ from jaxtyping import Float
 from swashplate.arrays import Array
 from swashplate.control.laws.autopilot import Autopilot, Memory, Reference, step, unpack
 from swashplate.control.laws.height_yaw import HeightYawMemory
-from swashplate.control.lqg.controller import Law, Lqg, SensedStep
+from swashplate.control.lqg.controller import Lqg, SensedStep
+from swashplate.control.lqg.controller_step import Law
 from swashplate.errors import ControllerError
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import jax_backend

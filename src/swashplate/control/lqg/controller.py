@@ -1,16 +1,15 @@
 """A linear-quadratic controller with an observer, one pure step: readings in, commands out.
 
 `Lqg` is a controller for `simulate_closed_loop`: there its step first makes the readings from the true flight, with
-noise, biases, rates and delays. `lqg_step`, what an aircraft runs, sees readings only. That commands act late is the
-simulation's matter: a controller believes in delays, and an aircraft has its own.
+noise, biases, rates and delays; `lqg_step`, what an aircraft runs, sees readings only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -19,11 +18,21 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from swashplate.arrays import Array
-from swashplate.control.lqg.law import LAW_MEMORY, Feedback, lqr_law
+from swashplate.control.lqg.controller_step import (
+    Law,
+    carried_from,
+    carried_row,
+    carried_size,
+    lqg_step,
+    numbers_from,
+    numbers_row,
+    sizes,
+)
+from swashplate.control.lqg.law import Feedback
 from swashplate.errors import ControllerError
-from swashplate.filtering import constant_gain, disturbances, observer
+from swashplate.filtering import disturbances, observer
 from swashplate.filtering.batched_matrices import StackMatrices
-from swashplate.filtering.matrix_operations import JaxMatrices, Matrices
+from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import BIASED, readings
 from swashplate.models.vehicle import Vehicle
@@ -38,150 +47,6 @@ _BLOCK, _BLOCK_STEADY = 32, 256
 """Measured on two cores with 1 MB of cache each: 128 covariances take a third more time than 32."""
 
 
-Law = Callable[[list[Any], list[Any], list[Any], Any, list[Any]], tuple[list[Any], list[Any]]]
-"""(memory, states, late commands, voltage, reference) to (memory, commands), as `lqr_law`."""
-
-
-class Carried(NamedTuple):
-    """What a step carries to the next.
-
-    Attributes:
-        estimate: of the observer.
-        given: commands, newest first, a row per sample, as many as the longest delay and one.
-        counts: samples since each sensor last took a reading, and with constant gains the phase of their cycle.
-        law: memory of the feedback.
-    """
-
-    estimate: ObserverEstimate
-    given: list[list[Any]]
-    counts: list[Any]
-    law: list[Any]
-
-
-def late_inputs(plan: ObserverPlan) -> list[int]:
-    """The input of each late command, in the order of the design's states."""
-    return [j for j, delay in enumerate(plan.delays) for _ in range(delay)]
-
-
-def lqg_step(
-    plan: ObserverPlan,
-    numbers: Numbers,
-    feedback: Feedback,
-    carried: Carried,
-    y: Any,
-    voltage: Any,
-    reference: list[Any],
-    M: Matrices,
-    law: Law | None = None,
-) -> tuple[Carried, list[Any]]:
-    """One step of the controller.
-
-    Args:
-        plan, numbers, feedback: the controller.
-        carried: from the last step.
-        y: readings of all channels, a column; those not due may be anything finite. Without sensors the states.
-        voltage: the battery's [V].
-        reference: the row of `REFERENCES`.
-        M: the operations.
-        law: another feedback on the estimates than the linear-quadratic one.
-
-    Returns:
-        What is carried on, and the commands within their limits.
-    """
-    xp, late = M.xp, late_inputs(plan)
-    before = [carried.given[delay][j] for j, delay in enumerate(plan.delays)]
-    waiting = [carried.given[ago][j] for j, delay in enumerate(plan.delays) for ago in range(delay)]
-    estimate = carried.estimate
-    taken, counts = [], []
-    if plan.sensors:
-        since = carried.counts[: len(plan.sensors)]
-        due = [
-            xp.where(xp.abs(count - at.arrives) < 0.5, 1.0, 0.0) for count, at in zip(since, plan.sampling, strict=True)
-        ]
-        taken = [xp.where(count < 0.5, 1.0, 0.0) for count in since]
-        counts = [
-            xp.where(count > at.every - 1.5, 0.0, count + 1.0) for count, at in zip(since, plan.sampling, strict=True)
-        ]
-        w = M.column([*before, voltage])
-        if plan.period:
-            phase = carried.counts[-1]
-            estimate = constant_gain.corrected_steadily(plan, numbers, estimate, y, phase, w, M)
-            counts.append(xp.where(phase > plan.period - 1.5, 0.0, phase + 1.0))
-        else:
-            estimate, _, _ = observer.corrected(plan, numbers, estimate, y, due, w, M)
-        x = M.scalars(estimate.mean)[: plan.n]
-    else:
-        x = M.scalars(y)
-    names = plan.equations.vehicle.state_names
-    decided = law or partial(lqr_law, names=names, late_of=late, feedback=feedback, dt=plan.dt, M=M)
-    kept, commands = decided(carried.law, x, waiting, voltage, reference)
-    given = [commands, *carried.given[:-1]]
-    if plan.sensors:
-        acting = [given[delay][j] for j, delay in enumerate(plan.delays)]
-        moved = constant_gain.predicted_steadily if plan.period else observer.predicted
-        estimate = moved(plan, numbers, estimate, M.column([*acting, voltage]), taken, M)
-    return Carried(estimate, given, counts, kept), commands
-
-
-# ---- rows --------------------------------------------------------------------------------------------------------
-def sizes(plan: ObserverPlan) -> tuple[int, int, int]:
-    """Of what is carried: estimates, rows of their covariance (none with constant gains), counts."""
-    if not plan.sensors:
-        return 0, 0, 0
-    N = len(plan.names)
-    return N, 0 if plan.period else N, len(plan.sensors) + (1 if plan.period else 0)
-
-
-def carried_size(plan: ObserverPlan) -> int:
-    N, rows, counts = sizes(plan)
-    return N + rows * rows + (max(plan.delays) + 1) * plan.inputs + counts + LAW_MEMORY
-
-
-def carried_from(plan: ObserverPlan, row: Float[jax.Array, "memory ..."], M: JaxMatrices) -> Carried:
-    """What is carried, from a flat row."""
-    N, rows, counts = sizes(plan)
-    m, depth = plan.inputs, max(plan.delays) + 1
-    covariance, rest = M.matrix(row[N : N + rows * rows], rows, rows), row[N + rows * rows :]
-    given = [[rest[i * m + j] for j in range(m)] for i in range(depth)]
-    rest = rest[depth * m :]
-    return Carried(
-        ObserverEstimate(M.matrix(row[:N], N, 1), covariance),
-        given,
-        [rest[i] for i in range(counts)],
-        [rest[counts + i] for i in range(LAW_MEMORY)],
-    )
-
-
-def carried_row(carried: Carried, M: JaxMatrices) -> Any:
-    flat = [value for row in carried.given for value in row] + carried.counts + carried.law
-    return jnp.concatenate([*(M.flat(part) for part in carried.estimate), M.row(flat)])
-
-
-def _shapes(plan: ObserverPlan, speeds: int) -> list[tuple[int, ...]]:
-    n, m, late = plan.n, plan.inputs, sum(plan.delays)
-    N, channels = len(plan.names), len(plan.channels)
-    parameters = len(plan.equations.vehicle.parameter_names) + 2
-    of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), ()]
-    steady = [(plan.period, N, channels)] if plan.period else []
-    return [(parameters,), (6,), (N,), (channels,), *steady, *of_feedback]
-
-
-def numbers_row(numbers: Numbers, feedback: Feedback) -> Array:
-    parts = [part for part in (*numbers, *feedback) if part is not None]
-    return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
-
-
-def numbers_from(plan: ObserverPlan, speeds: int, row: Float[jax.Array, " numbers"]) -> tuple[Numbers, Feedback]:
-    parts, place = [], 0
-    for shape in _shapes(plan, speeds):
-        size = int(np.prod(shape))
-        parts.append(row[place : place + size].reshape(shape))
-        place += size
-    own = len(parts) - len(Feedback._fields)
-    return Numbers(*parts[:own]), Feedback(*parts[own:])
-
-
-# ---- in simulation -----------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class SensedStep:
     """The controller with its sensors, as `simulate_closed_loop` calls it; equal for equal plans.

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.lqg.controller import Carried, Lqg, lqg_step, sizes
+from swashplate.control.lqg.controller import Lqg
+from swashplate.control.lqg.controller_step import Carried, lqg_step, sizes
 from swashplate.control.lqg.law import LAW_MEMORY
 from swashplate.filtering.matrix_operations import Scalars
 from swashplate.filtering.observer import ObserverEstimate

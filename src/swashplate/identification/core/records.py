@@ -133,6 +133,8 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     wanted = (*vehicle.input_names, *outputs)
     time, table = uniform_table(flight, wanted, who=f"'{vehicle.name}'")
     source = flight.provenance.source or "flight"
+    if "theta" in outputs and not vehicle.traits.linear:
+        _refuse_steep(time, table[:, wanted.index("theta")], source)
     nominal = float(environment_of(vehicle).voltage)
     known = "voltage" in flight
     n_inputs = len(vehicle.input_names)
@@ -150,6 +152,20 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
     )
 
 
+def _refuse_steep(time: Array, pitch: Array, source: str) -> None:
+    steep = np.flatnonzero(np.abs(pitch) > _STEEP)
+    if steep.size:
+        most, first, last = np.degrees(np.abs(pitch).max()), time[steep[0]], time[steep[-1]]
+        raise FlightError(
+            f"pitches to {most:.0f} degrees ({first:.2f} to {last:.2f} s): a fit carries roll, pitch and yaw, "
+            "which have no rates near the vertical.",
+            where=source,
+            channel="theta",
+            hint="Give the stretches before and after: FILE@START-STOP.",
+        )
+
+
+_STEEP = np.radians(80.0)
 _STILL = 1e-6
 """Change of a command that is no change: what interpolation leaves of a constant."""
 

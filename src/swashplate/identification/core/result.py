@@ -19,6 +19,7 @@ from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.posterior_draws import Posterior, adjusted
 from swashplate.identification.core.sources import DataSource
+from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
 from swashplate.shown import Shown
 
@@ -137,7 +138,8 @@ class Result(Shown, Generic[Model, Details]):
 
     Attributes:
         method: name of the estimator.
-        model: what was identified. start: the same before the fit.
+        solution: what was identified: a vehicle, matrices of named expressions, or transfer functions; `model` is a
+            vehicle always. start: the same before the fit.
         estimates: the model's numbers, free ones in the order of `names`, then (or among them) tied and fixed ones.
         names: free parameters in the order of the matrices below.
         covariance, covariance_corrected: of the free parameters in their units (p, p); the second allows for coloured
@@ -162,7 +164,7 @@ class Result(Shown, Generic[Model, Details]):
     """
 
     method: str
-    model: Model
+    solution: Model
     start: Model
     estimates: tuple[Estimate, ...]
     names: tuple[str, ...]
@@ -228,16 +230,17 @@ class Result(Shown, Generic[Model, Details]):
     @property
     def name(self) -> str:
         """The model's name."""
-        return str(getattr(self.model, "name", "transfer functions"))
+        return str(getattr(self.solution, "name", "transfer functions"))
 
-    @property
-    def vehicle(self) -> Any:
-        """The model as `swashplate.vehicle` loads it from its file: it trims, flies, exports and is controlled.
+    @cached_property
+    def model(self) -> Vehicle:
+        """The identified vehicle, as `swashplate.vehicle` loads it from its file: it trims, flies and is controlled.
 
         Raises:
             IdentificationError: transfer functions with more zeros than poles, which cannot be flown.
         """
-        return resolve("vehicle_of_result")(self)
+        made: Vehicle = resolve("vehicle_of_result")(self)
+        return made
 
     # ---- models that the data cannot tell apart ----------------------------------------------------------------
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
@@ -265,7 +268,7 @@ class Result(Shown, Generic[Model, Details]):
         if vague or not self.names or not np.all(np.isfinite(covariance)):
             told = "has no standard deviation." if vague else "knows no spread: nothing was free."
             raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
-        low, high = bounds_of(self.model if within is None else within, self.names)
+        low, high = bounds_of(self.solution if within is None else within, self.names)
         if self.posterior is not None and self.posterior.method != "laplace":
             found = self._of_posterior(low, high, count, seed=seed, corrected=corrected)
             drawn = {name: found[:, i] for i, name in enumerate(self.names)}
@@ -292,13 +295,13 @@ class Result(Shown, Generic[Model, Details]):
             )
         return kept[np.random.default_rng(seed).choice(len(kept), count, replace=count > len(kept))]
 
-    def draw(self, count: int, *, seed: int) -> tuple[Model, ...]:
-        """Models that the data cannot tell from the identified one (see `draw_values`, which it takes).
+    def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:
+        """Vehicles that the data cannot tell from the identified one (see `draw_values`, which it takes).
 
         Raises:
             IdentificationError: as `draw_values`; or for a model whose numbers cannot be changed.
         """
-        if not hasattr(self.model, "with_values"):
+        if not hasattr(self.solution, "with_values"):
             raise IdentificationError("numbers of it cannot be drawn.", where=self.name)
         made: Drawable = self.model
         drawn = self.draw_values(count, seed=seed)

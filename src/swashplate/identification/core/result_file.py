@@ -28,7 +28,7 @@ from swashplate.models.vehicle import Vehicle
 
 KIND, SCHEMA = "result", 1
 _HINT = "`swash identify --out DIR` (or fit-ss, fit-tf, fit-time) writes DIR/fit.json."
-_SPECIAL = ("model", "start", "details", "seconds", "fitted")
+_SPECIAL = ("solution", "model", "start", "details", "seconds", "fitted")
 _RARE = {"comparisons", "posterior"}
 """Entries that a document may lack."""
 _TOLD = {"kind", "schema", "costs"}
@@ -48,7 +48,7 @@ def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[s
         "kind": KIND,
         "schema": SCHEMA,
         **{f.name: encode(getattr(result, f.name)) for f in fields(result) if f.name not in left_out},
-        "model": _of_model(result.model),
+        "model": _of_model(result.solution),
         "start": _of_model(result.start),
         "details": encode(result.details),
         "costs": {c.name: encode(cost) for c, cost in zip(result.comparisons, result.costs, strict=False)},
@@ -78,7 +78,7 @@ def from_document(
         )
     hints = typing.get_type_hints(Result)
     table: dict[str, Any] = {}
-    names = {f.name for f in fields(Result)} - {"seconds", "fitted"}
+    names = {f.name for f in fields(Result)} - {"seconds", "solution", "fitted"} | {"model"}
     for name in names - _RARE | (set(document) - _TOLD):
         if name not in names:
             raise DocumentError("is not known here.", where=where, channel=name[:60])
@@ -89,7 +89,7 @@ def from_document(
     details = document["details"]
     made: Result[Any, Any] = Result(
         **table,
-        model=_model_of(document["model"], where=where, at="model", equations=equations),
+        solution=_model_of(document["model"], where=where, at="model", equations=equations),
         start=_model_of(document["start"], where=where, at="start", equations=equations),
         details=None if details is None else part(details, where=where, at="details"),
     )

@@ -185,7 +185,7 @@ def result_of(
     marginal = accuracy.marginal_information(optimum.information, row.prior(optimum.row)[2], row.places("parameter"))
     return Result(
         method=method,
-        model=model({e.name: e for e in estimates}),
+        solution=model({e.name: e for e in estimates}),
         start=start,
         estimates=estimates,
         names=row.names[:k],

@@ -58,7 +58,8 @@ class ResponseMargins:
     """Of a broken loop, the least of each kind where it crosses several times; NaN where it never does.
 
     Attributes:
-        crossover: frequency of unit gain [rad/s]. phase_margin: there, -180 to 180 [deg].
+        crossover: frequency of unit gain [rad/s].
+        phase_margin: there [deg], -180 to 180; of an unstable loop with the whole turns that it is beyond.
         omega_180: frequency of -180 degrees, or whole turns further [rad/s]. gain_margin: there [dB].
         delay_margin: the least further delay that destabilises [s], at whichever crossing; 0 where a stable plant's
             loop is unstable already.
@@ -208,14 +209,21 @@ def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Respo
         loop: L(j omega).
         error: its random error; None where it is not known.
     """
-    curve = _curve(omega, loop, error, None)
+    curve, delay = _attitude_phase(_curve(omega, loop, error, None)), _delay_margin(omega, loop, error)
+    unstable = delay.value == 0.0
     nothing = ReadNumber(float("nan"))
     pm = gm = cross = phase_cross = nothing
-    margin = [(abs(_wrapped(curve.at(curve.phase, w) + 180.0)), w) for w in curve.crossings(curve.gain, 0.0)]
+
+    def over(w: float) -> float:
+        """Degrees above -180; of an unstable loop with the turns that it is beyond them."""
+        degrees = curve.at(curve.phase, w) + 180.0
+        return degrees if unstable else _wrapped(degrees)
+
+    margin = [(abs(over(w)), w) for w in curve.crossings(curve.gain, 0.0)]
     if margin:
         at = min(margin)[1]
         cross = ReadNumber(at, curve.sigma(at, gain=True))
-        value = _wrapped(curve.at(curve.phase, at) + 180.0)
+        value = over(at)
         # Along the curve the phase at unit gain also moves as the crossing does.
         turn = curve.slope(curve.phase, at) * curve.sigma(at, gain=True)
         pm = ReadNumber(value, float(np.hypot(np.degrees(curve.at(curve.error, at)), turn)))
@@ -223,13 +231,13 @@ def margins(omega: Array, loop: Complex, *, error: Array | None = None) -> Respo
     room = [(abs(curve.at(curve.gain, w)), w) for k in turns for w in curve.crossings(curve.phase, 180.0 + 360.0 * k)]
     if room:
         # Where it is unstable already, the gain that has to go.
-        unstable = pm.value < 0.0 if margin else float(np.median(curve.gain)) > 0.0
-        at = (min(room) if not unstable else min((-curve.at(curve.gain, w), w) for _, w in room))[1]
+        lost = unstable or pm.value < 0.0 if margin else float(np.median(curve.gain)) > 0.0
+        at = (min(room) if not lost else min((-curve.at(curve.gain, w), w) for _, w in room))[1]
         phase_cross = ReadNumber(at, curve.sigma(at))
         slide = curve.slope(curve.gain, at) * curve.sigma(at)
         spread = 20.0 * np.log10(1.0 + curve.at(curve.error, at))
         gm = ReadNumber(-curve.at(curve.gain, at), float(np.hypot(spread, slide)))
-    return ResponseMargins(cross, pm, phase_cross, gm, _delay_margin(omega, loop, error))
+    return ResponseMargins(cross, pm, phase_cross, gm, delay)
 
 
 def _delay_margin(omega: Array, loop: Complex, error: Array | None) -> ReadNumber:

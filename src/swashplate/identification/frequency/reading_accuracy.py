@@ -36,9 +36,9 @@ class Answers:
 
 def has_pair(fit: Fitted, output: str, input: str) -> bool:
     """Whether the fitted model joins these channels."""
-    if isinstance(fit.model, StateSpaceModel):
-        return output in fit.model.outputs and input in fit.model.inputs
-    return any((m.output, m.input) == (output, input) for m in fit.model)
+    if isinstance(fit.solution, StateSpaceModel):
+        return output in fit.solution.outputs and input in fit.solution.inputs
+    return any((m.output, m.input) == (output, input) for m in fit.solution)
 
 
 def response_of(fit: Fitted, output: str, input: str, omega: Array) -> Complex:
@@ -90,16 +90,16 @@ def _free(fit: Fitted) -> list[Estimate]:
 def _with_slopes(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Complex, Complex]:
     """H(j omega) (n,) and the derivatives of its logarithm by each free parameter (n, n_free)."""
     free = [p.name for p in _free(fit)]
-    if isinstance(fit.model, StateSpaceModel):
-        model = fit.model
+    if isinstance(fit.solution, StateSpaceModel):
+        model = fit.solution
         pair = (model.outputs.index(output), model.inputs.index(input), omega)
         at = np.array([model.parameters[name].value for name in free])
         (h,), (slopes,) = model.sensitivities(tuple(free), at, [pair])
         with np.errstate(divide="ignore", invalid="ignore"):
             return h, slopes / h[:, None]
-    model_of = next(m for m in fit.model if (m.output, m.input) == (output, input))
+    model_of = next(m for m in fit.solution if (m.output, m.input) == (output, input))
     h, own = model_of.with_slopes(omega)
-    several = len(fit.model) > 1
+    several = len(fit.solution) > 1
     by_name = {f"{n} {output}" if several and n in model_of.form.own_names else n: slope for n, slope in own.items()}
     zero = np.zeros(omega.size, dtype=np.complex128)
     columns = [by_name.get(name, zero) for name in free]

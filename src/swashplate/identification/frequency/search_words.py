@@ -41,7 +41,7 @@ def reasons(pick: Contender, others: Sequence[Contender], leaner: Mapping[str, C
     ]
     if alike:
         lines.append(f"! these responses cannot tell it from {', '.join(alike[:_NAMED])}: they fit alike.")
-    if misfits(pick.fit.model, pick.fit.targets):
+    if misfits(pick.fit.solution, pick.fit.targets):
         lines.append("! none of these is all of the aircraft: the pick is the least wrong one, see its warnings.")
     return lines
 

@@ -159,4 +159,4 @@ def _matched(model: StateSpaceModel, targets: Sequence[Target], *, seed: int) ->
     if not targets:
         raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
     found = fit_targets(model, targets, seed=seed, iterations=40)
-    return model.with_values({name: found.model.parameters[name].value for name in found.names})
+    return model.with_values({name: found.solution.parameters[name].value for name in found.names})

@@ -188,7 +188,7 @@ def fit_targets(
     problems += [NOT_FOLLOWED] if failed else []
     return Result(
         method="frequency responses",
-        model=found,
+        solution=found,
         start=model,
         estimates=estimates,
         names=model.free,

@@ -91,7 +91,7 @@ class _Search:
             settings={"sources": list(self.responses.sources), "method": self.responses.method}
             | self.choice.settings(),
         )
-        found = Contender(model.name, fit, squared_misfit(fit.model, targets))
+        found = Contender(model.name, fit, squared_misfit(fit.solution, targets))
         self.tried[model.name] = found
         return found
 
@@ -106,7 +106,7 @@ class _Search:
         least = min(among, key=lambda one: one.misfit)
         lowest = min(self.score(one, least) for one in among)
         level = [one for one in among if self.score(one, least) <= lowest + LEVEL]
-        return min(level, key=lambda one: (one.parameters, [tuple(PARTS).index(p) for p in parts_in(one.fit.model)]))
+        return min(level, key=lambda one: (one.parameters, [tuple(PARTS).index(p) for p in parts_in(one.fit.solution)]))
 
     def round(self, models: Sequence[StateSpaceModel], *, like: Contender | None = None) -> list[Contender]:
         """A first look at each; those that are not hopeless are followed."""
@@ -205,7 +205,7 @@ def _grown(search: _Search) -> tuple[Contender, dict[str, Contender]]:
     idle: set[str] = set()
     for _ in range(ROUNDS):
         parts = tuple(best.name.split("+"))
-        missed = bool(misfits(best.fit.model, best.fit.targets))
+        missed = bool(misfits(best.fit.solution, best.fit.targets))
         better: list[str] = []
         for group in additions(parts, search.responses, every=missed):
             named = {"+".join(p for p in PARTS if p in (*parts, n)): n for n in group if n not in idle}
@@ -260,7 +260,7 @@ def _judged(
     near = [c for c in near if search.score(c, best) <= search.score(best, best) + CLOSE][:4]
     for one in near:
         search.say(f"{one.name} along the hold-out")
-        search.tried[one.name] = replace(one, held_out=judge(one.fit.model))
+        search.tried[one.name] = replace(one, held_out=judge(one.fit.solution))
     near = [search.tried[one.name] for one in near]
     own = search.tried[best.name]
     ahead = min(near, key=lambda c: c.held_out)
@@ -285,6 +285,6 @@ def _finished(search: _Search, pick: Contender, model: StateSpaceModel) -> Conte
         ceilings=ceilings, left_out=left_out, starts=2, seed=search.seed, data=search.responses.data,
         settings={**pick.fit.settings, "started_from": "search"},
     )  # fmt: skip
-    done = replace(pick, fit=fit, misfit=squared_misfit(fit.model, targets)) if fit.cost <= pick.cost else pick
+    done = replace(pick, fit=fit, misfit=squared_misfit(fit.solution, targets)) if fit.cost <= pick.cost else pick
     search.tried[pick.name] = done
     return done

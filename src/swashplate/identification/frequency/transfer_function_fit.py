@@ -58,7 +58,7 @@ class TransferFunctionDetails:
 
     def lines(self, result: Result[Any, Any]) -> list[str]:
         """What a printed result says of it."""
-        return [f"  {model!r}   J = {cost:.1f}" for model, cost in zip(result.model, result.costs, strict=True)]
+        return [f"  {model!r}   J = {cost:.1f}" for model, cost in zip(result.solution, result.costs, strict=True)]
 
 
 TransferFunctionFit = Result[tuple[TransferFunction, ...], TransferFunctionDetails]
@@ -242,7 +242,7 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     failed = not followed(optimum.row, costs)
     return Result(
         method="frequency responses",
-        model=made,
+        solution=made,
         start=tuple(models({**spread, **first})),
         estimates=estimates,
         names=tuple(free),
@@ -305,16 +305,16 @@ def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function")
     Raises:
         IdentificationError: more zeros than poles: such a model has no states that could be flown.
     """
-    poles = np.real(np.atleast_1d(np.poly(fit.model[0].poles)))
+    poles = np.real(np.atleast_1d(np.poly(fit.solution[0].poles)))
     order = poles.size - 1
-    source = fit.model[0].input
+    source = fit.solution[0].input
     states = {f"x{k + 1}": "" for k in range(order)}
     equations: dict[str, dict[str, str]] = {f"x{k + 1}": {f"x{k + 2}": "1"} for k in range(order - 1)}
     if order:
         last = {f"x{k + 1}": repr(-float(poles[order - k])) for k in range(order)}
         equations[f"x{order}"] = {**last, source: "1"}
     outputs, delays = {}, {}
-    for model, wanted in zip(fit.model, fit.targets, strict=True):
+    for model, wanted in zip(fit.solution, fit.targets, strict=True):
         top = model.coefficients[0]
         if top.size > order + 1:
             raise IdentificationError(
@@ -328,7 +328,7 @@ def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function")
     document = {
         "kind": "state-space",
         "name": name,
-        "title": "; ".join(map(repr, fit.model)),
+        "title": "; ".join(map(repr, fit.solution)),
         "trust": "Within the band of the fit; a transfer function knows one input.",
         "states": states,
         "inputs": {source: channel(source).unit},
@@ -342,6 +342,6 @@ def as_state_space(fit: TransferFunctionFit, *, name: str = "transfer_function")
 
 def vehicle_of(result: Result[Any, Any]) -> Vehicle:
     """What `Result.vehicle` is, for any kind of model."""
-    if isinstance(result.model, Vehicle):
-        return result.model
-    return linear_vehicle(result.model if isinstance(result.model, StateSpaceModel) else as_state_space(result))
+    if isinstance(result.solution, Vehicle):
+        return result.solution
+    return linear_vehicle(result.solution if isinstance(result.solution, StateSpaceModel) else as_state_space(result))

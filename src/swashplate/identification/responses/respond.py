@@ -12,7 +12,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.uniform_records import renamed_channels
 from swashplate.flights.consistency import refuse_inconsistent
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.identification.core.record_facts import (
     INJECTED,
@@ -89,7 +89,7 @@ def respond(
         FlightError: no channel or no record to work on, or a raw flight whose channels contradict each other; messages
             name them.
     """
-    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    flights = as_flights(flights)
     inputs, outputs = tuple(inputs), tuple(outputs)
     doubled = set(inputs) & set(outputs)
     if not inputs or not outputs or doubled:

@@ -35,6 +35,7 @@ from swashplate.identification.core.banded_least_squares import (
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.records import Record
+from swashplate.identification.time.collocation_begin import noise_entry, rough_noise, step_within
 from swashplate.identification.time.collocation_equations import (
     NOWHERE,
     CollocationPlan,
@@ -48,9 +49,6 @@ from swashplate.identification.time.collocation_equations import (
     rate_slopes,
 )
 from swashplate.simulation.dynamics import enable_double_precision
-
-_LEAST, _MOST = 1e-4, 1e3
-"""Noise in sizes of what it disturbs: below the least it is none (and the factor would lose its digits)."""
 
 _GUST = 0.3
 """First guess: share of a state's size by which its rate is disturbed."""
@@ -120,9 +118,9 @@ class CollocationErrors:
             made += [Entry(f"bias {o}[{k}]", "nuisance", 0.0, 0.1 * around[o]) for o in biases]
         self._count = len(made)  # of what is no noise
         place = {entry.name: i for i, entry in enumerate(made)}
-        made += [_noise_entry(f"gust {s}", _GUST * size[s], size[s]) for s in states]
+        made += [noise_entry(f"gust {s}", _GUST * size[s], size[s]) for s in states]
         made += [
-            _noise_entry(f"noise {o}", rough, around[o]) for o, rough in zip(outputs, _rough(records), strict=True)
+            noise_entry(f"noise {o}", rough, around[o]) for o, rough in zip(outputs, rough_noise(records), strict=True)
         ]
         self._row = Row(tuple(made))
         self._plans = tuple(
@@ -207,7 +205,7 @@ class CollocationErrors:
                     break
                 continue
             matrix = found.information + prior + np.diag(damping * found.diagonal + 1e-300)
-            step = _within(matrix, -(found.pull + prior @ (numbers - mean)), low - numbers, high - numbers)
+            step = step_within(matrix, -(found.pull + prior @ (numbers - mean)), low - numbers, high - numbers)
             moved = [x + d.reshape(x.shape) for x, d in zip(paths, found.states(step), strict=True)]
             then, those = judged(numbers + step, moved)
             if then < cost:
@@ -386,32 +384,3 @@ class CollocationErrors:
             )
             for record, seen in zip(self.records, self._filtered(row), strict=True)
         )
-
-
-def _noise_entry(name: str, start: float, size: float) -> Entry:
-    low, high = np.log(_LEAST * size), np.log(_MOST * size)
-    return Entry(
-        name, "noise", float(np.clip(np.log(start), low, high)), 1.0, float(low), float(high), logarithmic=True
-    )
-
-
-def _rough(records: Sequence[Record]) -> Array:
-    """What third differences say of the noise of each output: 20 variances if white, and little of smooth motion."""
-    third = np.concatenate([np.diff(record.outputs, n=3, axis=0) for record in records])
-    return np.asarray(np.sqrt(np.mean(third**2, axis=0) / 20.0) + 1e-300)
-
-
-def _within(matrix: Array, pull: Array, low: Array, high: Array) -> Array:
-    """The solution of a linear system with what would leave its bounds held there, and the rest solved again."""
-    held, step = np.zeros(pull.size, dtype=bool), np.zeros(pull.size)
-    for _ in range(pull.size + 1):
-        free = ~held
-        right = pull[free] - matrix[np.ix_(free, held)] @ step[held]
-        scale = np.sqrt(np.diag(matrix)[free])
-        step[free] = np.linalg.lstsq(matrix[np.ix_(free, free)] / np.outer(scale, scale), right / scale)[0] / scale
-        away = free & ((step < low) | (step > high))
-        if not away.any():
-            break
-        step[away] = np.clip(step, low, high)[away]
-        held |= away
-    return np.clip(step, low, high)

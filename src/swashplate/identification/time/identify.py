@@ -111,7 +111,7 @@ def identify_flight(
         )
     return Result(
         method=method,
-        model=identified,
+        solution=identified,
         start=vehicle,
         estimates=parameters,
         constants=told,

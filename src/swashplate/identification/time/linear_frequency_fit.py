@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.accuracy import blind_directions, marginal_information, sandwich
 from swashplate.identification.core.records import uniform_table
 from swashplate.identification.core.result import Estimate, Result, correlation_of
@@ -52,7 +52,7 @@ def fit_in_frequency(
     Raises:
         IdentificationError: no line of a record inside the band, or no free parameter.
     """
-    flights, model = (flights,) if isinstance(flights, Flight) else tuple(flights), structure_of(model)
+    flights, model = as_flights(flights), structure_of(model)
     names = tuple(outputs or model.outputs)
     if not model.free:
         raise IdentificationError("has no free parameter.", channel=model.name)
@@ -115,7 +115,7 @@ def fit_in_frequency(
     )
     return Result(
         method=METHOD,
-        model=model.with_values(dict(zip(model.free, map(float, start[:k]), strict=True))),
+        solution=model.with_values(dict(zip(model.free, map(float, start[:k]), strict=True))),
         start=model,
         estimates=estimates,
         names=model.free,

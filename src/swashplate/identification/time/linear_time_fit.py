@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
 from swashplate.identification.core.result import Result
@@ -67,7 +67,7 @@ def fit_in_time(
         FlightError: where a flight was low-passed.
     """
     began = time.perf_counter()
-    flights, model = (flights,) if isinstance(flights, Flight) else tuple(flights), structure_of(model)
+    flights, model = as_flights(flights), structure_of(model)
     names = tuple(outputs or model.outputs)
     check_method(method)
     ahead = ahead_of(horizon, method)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from swashplate.errors import IdentificationError
-from swashplate.flights.flight import Flight
+from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.parameters import Free, Parameterization, parameterize
 from swashplate.identification.core.records import records
@@ -79,7 +79,7 @@ def fit_vehicle(
     enable_double_precision()
     enable_compilation_cache()
     outputs = tuple(outputs)
-    flights = (flights,) if isinstance(flights, Flight) else tuple(flights)
+    flights = as_flights(flights)
     refuse_lowpassed(flights)
     check_biases(biases, outputs)
     table = parameterize(vehicle, free, ties=ties, priors=priors)

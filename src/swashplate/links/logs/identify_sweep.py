@@ -106,7 +106,7 @@ def _study(responses: Any, chosen: Channels, unseen: Flight, say: Callable[..., 
     fit_tf = resolve("fit_tf")
     found = fit_tf(responses, input=chosen.input, say=say)
     form = str(found.material.transfer_functions[0].details.form.text)
-    held = (unseen,) if found.model is not None else ()
+    held = (unseen,) if found.structure is not None else ()
     words, gains = "", True
     try:
         resolve("suggest_gains")(found.fit, responses)
@@ -133,7 +133,7 @@ def _phase(h: Complex) -> Array:
 def _bode(responses: Any, study: Any, chosen: Channels) -> dict[str, Any]:
     h, coherence, _ = responses.pair(chosen.output, chosen.input)
     fitted = study.material.transfer_functions[0]
-    model = fitted.model[0].response(responses.omega)
+    model = fitted.solution[0].response(responses.omega)
     measured, phase = _phase(h), _phase(np.asarray(model, dtype=np.complex128))
     good = np.isfinite(measured)
     if good.any():  # both on the same turn
@@ -158,7 +158,7 @@ def _fit(study: Any) -> dict[str, Any]:
         for row in fitted.estimates
         if row.value
     ]
-    return {"formula": repr(fitted.model[0]), "cost": fitted.cost, "rows": rows, "form": fitted.details.form.text}
+    return {"formula": repr(fitted.solution[0]), "cost": fitted.cost, "rows": rows, "form": fitted.details.form.text}
 
 
 def _verified(study: Any, chosen: Channels, seen: Part) -> dict[str, Any] | None:
@@ -241,7 +241,7 @@ def _files(study: Any, responses: Any, record: Flight, part: Flight, folder: Pat
     files: dict[str, Make] = {"report.html": lambda: saved("report.html")}
     if any(g.parameters for g in study.material.gains):
         files["gains.param"] = parameters
-    if study.model is not None:
+    if study.structure is not None:
         files["model.toml"] = lambda: saved("model.toml")
     if study.verification is not None:
         files["verification.json"] = lambda: saved("verification.json")

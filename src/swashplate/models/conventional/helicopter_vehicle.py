@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -104,6 +105,8 @@ TRAITS = Traits(
     power=shaft_power,
 )
 
+LATE = replace(TRAITS, delayed_by="servo_delay")
+
 
 def conventional(card: Card) -> Vehicle:
     """The single-rotor helicopter with a card's numbers and options (see `helicopter_options`).
@@ -166,6 +169,6 @@ def conventional(card: Card) -> Vehicle:
         derivatives=partial(derivatives, options=options),
         specific_force=partial(specific_force, options=options),
         trim_held=(("throttle", 1.0),) if options.throttle else (),
-        traits=TRAITS,
+        traits=LATE if options.delay else TRAITS,
         options=options,
     )

@@ -6,27 +6,23 @@ in a notebook.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from swashplate.control.analysis.ardupilot_gains import Suggestion
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
-from swashplate.flights.inspect import Inspection
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.registry import nearest
+from swashplate.registry import Registry, nearest
 from swashplate.reporting.figures import bode_matrix
 from swashplate.reporting.figures.interactive import interactive
-from swashplate.reporting.figures.of_comparison import section_of_comparison, section_of_residuals
-from swashplate.reporting.figures.of_flight import over_time, section_of_flight, section_of_inspection
+from swashplate.reporting.figures.of_flight import over_time
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.sections_responses import gains_section
 from swashplate.reporting.structure import Cell, Figure, Report, Section, Table, Text
-from swashplate.validation.compare import ModelComparison
-from swashplate.validation.residuals import Residuals
 from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
@@ -35,34 +31,45 @@ if TYPE_CHECKING:
     from swashplate.simulation.derivatives_over_speed import Derivatives
 
 
+_HERE, _MODELS = "swashplate.reporting.figures", "swashplate.reporting.figures.of_models"
+SECTIONS: Registry[Callable[[Any], Section]] = Registry(
+    "sections",
+    what="an object that shows itself",
+    own={
+        "Flight": f"{_HERE}.of_flight:section_of_flight",
+        "Inspection": f"{_HERE}.of_flight:section_of_inspection",
+        "FrequencyResponse": f"{_HERE}.views:section_of_responses",
+        "ModelComparison": f"{_HERE}.of_comparison:section_of_comparison",
+        "Residuals": f"{_HERE}.of_comparison:section_of_residuals",
+        "Suggestion": f"{_HERE}.views:section_of_gains",
+        "TrimCurve": f"{_MODELS}:section_of_trims",
+        "Derivatives": f"{_MODELS}:section_of_derivatives",
+        "LinearModel": f"{_MODELS}:section_of_linear_model",
+    },
+)
+"""What shows an object, by the name of its class; loaded when it is asked for, for those of models need JAX."""
+
+
 def section_of(shown: Any) -> Section:
     """What an object shows; the first figure is the main one.
 
     Raises:
         SwashError: an object that shows nothing.
     """
-    if isinstance(shown, Flight):
-        return section_of_flight(shown)
-    if isinstance(shown, Inspection):
-        return section_of_inspection(shown)
-    if isinstance(shown, FrequencyResponse):
-        return _of_responses(shown)
-    if isinstance(shown, ModelComparison):
-        return section_of_comparison(shown)
-    if isinstance(shown, Residuals):
-        return section_of_residuals(shown)
-    if isinstance(shown, Suggestion):
-        return gains_section([shown])
-    if any(kind.__module__.startswith("swashplate.simulation.") for kind in type(shown).__mro__):
-        from swashplate.reporting.figures.of_models import section_of_model  # needs JAX, as whoever has such an object
-
-        return section_of_model(shown)
+    for kind in type(shown).__mro__:
+        if kind.__name__ in SECTIONS:
+            return SECTIONS[kind.__name__](shown)
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
+
+
+def section_of_gains(suggestion: Suggestion) -> Section:
+    """One loop's gains, as in a report."""
+    return gains_section([suggestion])
 
 
 def _has_modes(shown: Any) -> bool:
     """Whether its report would look for modes at hover, which a figure does not wait for."""
-    return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.model, "card"))
+    return isinstance(shown, Validation) or (isinstance(shown, Result) and hasattr(shown.solution, "card"))
 
 
 def _of_report(page: Report, shown: Any) -> Section:
@@ -83,7 +90,7 @@ def _of_report(page: Report, shown: Any) -> Section:
     return Section("shown", page.title, (*words, *picture, *rest, summary))
 
 
-def _of_responses(found: FrequencyResponse) -> Section:
+def section_of_responses(found: FrequencyResponse) -> Section:
     """Coherent bands of every pair, and Bode plots of those that have one."""
     rows = []
     for output in found.outputs:

@@ -21,7 +21,7 @@ TIME = np.arange(N) / 50.0
 def _channels() -> dict[str, np.ndarray]:
     """Channels that can be told from each other, in an order of their own."""
     names = (*reversed(POSE), "servo_pitch", "motor_upper", "servo_roll", "motor_lower")
-    return {name: i + np.sin((i + 1) * TIME) for i, name in enumerate(names)}
+    return {name: 0.1 * i + 0.1 * np.sin((i + 1) * TIME) for i, name in enumerate(names)}
 
 
 def _flight(time: np.ndarray = TIME, **changes: np.ndarray | None) -> Flight:
@@ -77,6 +77,7 @@ def _holed() -> np.ndarray:
         ([], "there is no flight"),
         ([_flight(psi=None, servo_roll=None)], "a.mat: servo_roll, psi: lacks what 'coax' needs"),
         ([_flight(theta=_holed())], "a.mat: theta: holds values that are not finite"),
+        ([_flight(theta=1.5 * np.sin(TIME))], "a.mat: theta: pitches to 86 degrees (1.20 to 5.08 s)"),
         ([_flight(TIME + 0.004 * np.sin(40.0 * TIME))], "a.mat: time steps vary from"),
         ([_flight(), _flight(TIME / 2.0)], "different rates (steps of [0.01, 0.02] s)"),
         (

@@ -128,5 +128,5 @@ def test_a_response_that_comes_later_than_the_others_of_its_input_is_fitted(resp
     there = replace(responses, response=truth.response(responses.omega)[:, rows][:, :, columns] * scatter)
     found = sp.fit_state_space(own, there, starts=1)
     for name in ("tau_col", "tau_r_col"):
-        assert found.model.numbers()[name] == pytest.approx(values[name], abs=3e-3)
+        assert found.solution.numbers()[name] == pytest.approx(values[name], abs=3e-3)
     assert found.cost < 0.2 * sp.fit_state_space(HEAVE_YAW, there, starts=1).cost

@@ -38,7 +38,7 @@ def drawn(fit: TransferFunctionFit, number: int) -> list[TransferFunction]:
     chosen = np.random.default_rng(5).multivariate_normal(
         [p.value for p in free], 0.01 * fit.correlation * np.outer(bounds, bounds), size=number
     )
-    (model,) = fit.model
+    (model,) = fit.solution
     return [
         replace(model, values={**model.values, **dict(zip((p.name for p in free), map(float, row), strict=True))})
         for row in chosen
@@ -123,6 +123,14 @@ def test_a_loop_that_is_unstable_already_stands_no_delay(gain: float, stands: bo
     assert (found.delay_margin.value > 0.0) == stands
 
 
+def test_the_phase_margin_of_an_unstable_loop_never_reads_as_a_good_one() -> None:
+    """5 / s behind 0.8 s of delay turns by -319 degrees at its crossover: wrapped, that was +131 degrees of margin."""
+    omega = np.geomspace(0.1, 50.0, 800)
+    found = margins(omega, 5.0 / (1j * omega) * np.exp(-0.8j * omega))
+    assert found.delay_margin.value == 0.0
+    assert found.phase_margin.value == pytest.approx(90.0 - np.degrees(4.0), abs=0.2)
+
+
 def test_every_axis_is_judged_by_its_own_input() -> None:
     model = structure("rotor_body").with_values(TRUTH)
     omega = np.geomspace(0.6, 80.0, 120)
@@ -152,7 +160,7 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     bounds = np.array([fit[name].sigma for name in fit.names])
     for row in np.random.default_rng(6).multivariate_normal(np.zeros(bounds.size), fit.correlation, size=300):
         moved = {n: fit[n].value + 0.1 * b * float(x) for n, b, x in zip(fit.names, bounds, row, strict=True)}
-        steps.append(np.log(fit.model.with_values(moved).response(omega)[:, 1, 0] / band.response))
+        steps.append(np.log(fit.solution.with_values(moved).response(omega)[:, 1, 0] / band.response))
     assert band.gain == pytest.approx(10.0 * np.std(np.real(steps), axis=0), rel=0.2)
     assert band.phase == pytest.approx(10.0 * np.std(np.imag(steps), axis=0), rel=0.2)
     lines = handling_lines(found, (fit,))

@@ -114,5 +114,5 @@ def test_a_hidden_rotor_comes_back_from_wrong_signs(seed: int) -> None:
     truth = shaken("hybrid", seed=seed)
     fit = fit_state_space(structure("hybrid"), measured(truth, ("p", "q", "r", "ax", "ay", "az"), noise=0.02))
     assert fit.cost < 1.0
-    modes = fit.model.eigenvalues()
+    modes = fit.solution.eigenvalues()
     assert all(np.min(np.abs(modes - v)) < 0.02 * abs(v) for v in truth.eigenvalues())

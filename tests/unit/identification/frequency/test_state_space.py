@@ -25,7 +25,7 @@ from swashplate.models.linear.state_space_file import parse, structure, structur
 from swashplate.simulation.discretisation import first_order_hold
 from swashplate.validation import structure_reduction
 from swashplate.validation.structure_reduction import moved_modes, reduce
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 12.0, 80)
 
@@ -167,14 +167,14 @@ def test_fit_finds_the_truth_and_comes_back_from_its_file(tmp_path: Path) -> Non
     fit = fit_state_space(structure("rotor_body"), exact(rotor()))
     assert fit.cost < 0.05  # the points are interpolated between lines
     for name, value in ROTOR.items():
-        assert fit.model.parameters[name].value == pytest.approx(value, rel=0.02), name
+        assert fit.solution.parameters[name].value == pytest.approx(value, rel=0.02), name
     assert not fit.problems
     assert all(p.sigma >= p.insensitivity > 0.0 for p in fit.estimates)
     assert "J_ave" in repr(fit)
     again = sp.load(fit.save(tmp_path / "fit.json"))
     assert repr(again) == repr(fit)
     assert again.costs == fit.costs
-    assert to_toml(again.model) == to_toml(fit.model)
+    assert to_toml(again.solution) == to_toml(fit.solution)
     np.testing.assert_array_equal(again.comparisons[0].residuals, fit.comparisons[0].residuals)
     assert again.details.modes == fit.details.modes
     page = sp.report(again, exact(rotor()), path=tmp_path / "report.html").read_text(encoding="utf-8")
@@ -184,7 +184,7 @@ def test_fit_finds_the_truth_and_comes_back_from_its_file(tmp_path: Path) -> Non
     plain = again.draw_values(500, seed=1, corrected=False)
     assert np.std(plain["tau_f"]) == pytest.approx(fit["tau_f"].sigma, rel=0.15)
     assert not fit.failed
-    assert fit.vehicle.structure == fit.model
+    assert fit.model.structure == fit.solution
     same = sp.identify(structure("rotor_body"), exact(rotor()))
     assert [e.value for e in same.estimates] == [e.value for e in fit.estimates]
 
@@ -210,8 +210,8 @@ def test_cramer_rao_is_what_noise_scatters() -> None:
     for seed in range(60):
         fit = fit_state_space(true, _at_points(true, noise=0.03, seed=seed), starts=1)
         corrected.append([fit[n].sigma_corrected for n in fit.names])
-        found.append([fit.model.parameters[n].value for n in fit.names])
-        bounds.append([fit.model.parameters[n].cramer_rao for n in fit.names])
+        found.append([fit.solution.parameters[n].value for n in fit.names])
+        bounds.append([fit.solution.parameters[n].cramer_rao for n in fit.names])
     factor = np.std(found, axis=0) / np.mean(bounds, axis=0) / (np.sqrt(2.0) * 0.03 * 20 / np.log(10))
     assert np.all((factor > 0.7) & (factor < 1.3)), factor
     # The corrected bound knows how large the errors are: it is the scatter itself.
@@ -253,7 +253,7 @@ def test_reduction_takes_out_what_is_not_there_and_keeps_what_is() -> None:
     dropped = {step.dropped for step in smaller.details.reduction if step.kept}
     assert {"Lp", "Mq"} <= dropped
     assert not dropped & {"Lb", "Ma", "tau_f", "tau_roll"}
-    assert smaller.model.parameters["Lp"].value == 0.0
+    assert smaller.solution.parameters["Lp"].value == 0.0
     assert smaller.cost < fit.cost * 1.05 + 0.5 + 0.5
     assert any("without a hold-out" in text for text in smaller.warnings)
     done = reduce(replace(smaller, details=replace(smaller.details, reduction=())))
@@ -299,7 +299,7 @@ def test_the_cap_on_the_cost_is_for_all_steps_together(monkeypatch: pytest.Monke
 
 def test_a_mode_that_goes_or_moves_beyond_its_bounds_vetoes_a_drop() -> None:
     fit = fit_state_space(rotor(), exact(rotor(), noise=0.02))
-    values = fit.model.eigenvalues()
+    values = fit.solution.eigenvalues()
     assert not moved_modes(fit.details.modes, values)[1]
     first = min(fit.details.modes, key=lambda mode: mode.frequency)
     apart = 4.0 * np.hypot(first.frequency_bound, first.frequency * first.damping_bound) / first.frequency
@@ -312,7 +312,7 @@ def test_a_mode_that_goes_or_moves_beyond_its_bounds_vetoes_a_drop() -> None:
 def test_a_mode_that_is_hardly_told_may_still_not_go_elsewhere() -> None:
     fit = fit_state_space(rotor(), exact(rotor(), noise=0.02))
     vague = [replace(mode, frequency_bound=0.25 * mode.frequency) for mode in fit.details.modes]
-    values = fit.model.eigenvalues()
+    values = fit.solution.eigenvalues()
     words, lost = moved_modes(vague, values)
     assert (words, lost) == (f"modes: {len(vague)} within 1 %", False)
     assert not moved_modes(vague, 1.2 * values)[1], "within its bounds"
@@ -326,7 +326,7 @@ def test_a_reduction_drops_nothing_to_a_value_outside_its_bounds_and_sums_up() -
     fit = reduce(fit_state_space(started, exact(model, noise=0.01), starts=1))
     dropped = {step.dropped: step for step in fit.details.reduction if step.kept}
     assert "Zlag" in dropped
-    assert fit.model.parameters["rate_lag"].value >= 0.1
+    assert fit.solution.parameters["rate_lag"].value >= 0.1
     assert not any(s.dropped == "rate_lag" and s.reason.endswith("%") and s.kept for s in fit.details.reduction)
     (total,) = (line for line in repr(fit).splitlines() if "taken out in all" in line)
     assert "Zlag" in total

@@ -100,7 +100,7 @@ def test_an_edited_structure_stays_as_edited_and_namesakes_stay_apart() -> None:
     assert {c.name for c in found.tried} == {"heave+yaw+inflow+torque #1", "heave+yaw+inflow+torque #2"}
     assert found.pick.name.endswith("#2"), "a delay of 0.2 s is wrong"
     alone = search_structures(heave_and_yaw(), structures=[held])
-    assert alone.pick.fit.model.parameters["tau_ped"].value == 0.2
+    assert alone.pick.fit.solution.parameters["tau_ped"].value == 0.2
 
 
 def test_candidates_are_what_the_channels_allow() -> None:
@@ -121,10 +121,10 @@ def test_candidates_are_what_the_channels_allow() -> None:
 
 def test_the_verb_searches_prints_and_has_a_page() -> None:
     study = sp.fit_ss([*NEAR[:1], "compose:heave+yaw"], heave_and_yaw(), search=True, fixed={"tau_ped": 0.015})
-    assert study.model is not None
+    assert study.structure is not None
     assert "*heave+yaw+inflow+torque" in repr(study)
     assert study.to_document()["search"]["picked"] == "heave+yaw+inflow+torque"
-    assert not study.model.parameters["tau_ped"].free
+    assert not study.structure.parameters["tau_ped"].free
     page = study.page()
     assert any(section.title == "Structures that were tried" for section in page.sections)
     with pytest.raises(CardError, match="no parameter of any structure of this search"):
@@ -144,6 +144,6 @@ def test_a_point_that_is_far_off_counts_less_than_its_square(found: StructureSea
     wrong[3] *= np.exp(2.0)
     error = 0.0 if one.error is None else float(one.error[3])
     times = 2.0 / np.hypot(error, 0.03)
-    grown = squared_misfit(found.pick.fit.model, [replace(one, measured=wrong)])
+    grown = squared_misfit(found.pick.fit.solution, [replace(one, measured=wrong)])
     assert grown < 0.3 * times**2
-    assert grown > squared_misfit(found.pick.fit.model, [one])
+    assert grown > squared_misfit(found.pick.fit.solution, [one])

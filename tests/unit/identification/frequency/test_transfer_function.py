@@ -18,7 +18,7 @@ from swashplate.identification.frequency.transfer_function_forms import suggest
 from swashplate.identification.frequency.unnoticeable_dynamics import envelopes, mismatch
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.transfer_function import Form, TransferFunction
-from swashplate.validation.verification import verify
+from swashplate.validation.verify import verify
 
 OMEGA = 2 * np.pi * np.geomspace(0.1, 10.0, 90)
 
@@ -94,7 +94,7 @@ def test_fit_finds_the_truth_and_shares_poles() -> None:
     other = TransferFunction(SECOND.form, {**SECOND.values, "K": 3.0, "zero": 20.0, "tau": 0.06}, "angle", "stick")
     fit = fit_transfer_function(exact(SECOND, other), "1/2", input="stick")
     assert fit.cost < 1e-2  # the points are interpolated between lines
-    for found, true in zip(fit.model, (SECOND, other), strict=True):
+    for found, true in zip(fit.solution, (SECOND, other), strict=True):
         for name, value in true.values.items():
             assert found.values[name] == pytest.approx(value, rel=2e-3)
     assert sum(p.name == "omega_pole" for p in fit.estimates) == 1
@@ -103,7 +103,7 @@ def test_fit_finds_the_truth_and_shares_poles() -> None:
 
 def test_fixed_stays_and_unknown_is_refused() -> None:
     fit = fit_transfer_function(exact(SECOND), "1/2", input="stick", fixed={"tau": 0.03})
-    assert fit.model[0].values["tau"] == 0.03
+    assert fit.solution[0].values["tau"] == 0.03
     with pytest.raises(IdentificationError, match="is no parameter of the form 1/2"):
         fit_transfer_function(exact(SECOND), "1/2", input="stick", fixed={"tua": 0.03})
     with pytest.raises(IdentificationError, match="nowhere over a quarter of an octave"):
@@ -151,7 +151,7 @@ def test_zeros_and_lead_lags_of_any_order(text: str) -> None:
     true = TransferFunction(form, {name: values[name] for name in form.names}, "rate", "stick")
     fit = fit_transfer_function(exact(true, noise=0.002), form, input="stick")
     assert fit.cost < 0.1
-    found, known = np.sort_complex(fit.model[0].zeros), np.sort_complex(true.zeros)
+    found, known = np.sort_complex(fit.solution[0].zeros), np.sort_complex(true.zeros)
     np.testing.assert_allclose(found, known, rtol=0.1)
     if text == "2/1":
         with pytest.raises(IdentificationError, match="cannot be flown"):
@@ -162,8 +162,8 @@ def test_gain_and_delay_of_the_paper() -> None:
     """Bhandari et al. (2005), eq. 15: Q/B1 = 17 e^(-0.0020 s)."""
     true = TransferFunction(Form(0, 0), {"K": 17.0, "tau": 0.002}, "rate", "stick")
     fit = fit_transfer_function(exact(true), "0/0", input="stick")
-    assert fit.model[0].values["K"] == pytest.approx(17.0, rel=1e-6)
-    assert fit.model[0].values["tau"] == pytest.approx(0.002, rel=1e-3)
+    assert fit.solution[0].values["K"] == pytest.approx(17.0, rel=1e-6)
+    assert fit.solution[0].values["tau"] == pytest.approx(0.002, rel=1e-3)
 
 
 def test_bias_of_the_gain_and_delay_is_solved_for_in_time() -> None:
@@ -252,7 +252,7 @@ def test_transfer_functions_are_reported_validated_and_come_back_from_their_file
     assert "omega_pole" in page
     again = sp.load(fit.save(tmp_path / "fit.json"))
     assert repr(again) == repr(fit)
-    assert again.model == fit.model
+    assert again.solution == fit.solution
     assert again["tau"].fixed
     random = np.random.default_rng(1)
     stick = np.repeat(random.standard_normal(100), 10)

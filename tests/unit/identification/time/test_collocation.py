@@ -109,7 +109,7 @@ def test_a_structure_is_fitted_as_the_vehicle_with_the_delay_of_its_input() -> N
     two = sp.identify(rolling(), flown, free=list(TRUTH), outputs=OUTPUTS, method="collocation")
     for name in TRUTH:
         assert one[name].value == pytest.approx(two[name].value, abs=two[name].sigma)
-        assert one.model.parameters[name].value == one[name].value
+        assert one.solution.parameters[name].value == one[name].value
     assert one["late"].value == pytest.approx(0.07, abs=3.0 * one["late"].sigma)
     assert one["late"].sigma < 0.005
 
