@@ -105,13 +105,16 @@ def _from_zero(
 
     up = np.flatnonzero((x <= 0.0) & (np.roll(x, -1) > 0.0))
     first = int(up[np.argmin(np.roll(x, -1)[up] - x[up])])
-    # Few lines may pass exactly through a sample, where rounding gives the sign.
-    edge = 0.0 if amplitudes is None else 0.5
-    at = brentq(
-        lambda t: float(_sum(harmonics, phases, np.asarray([t]), amplitudes)[0]),
-        (first - edge) / x.size,
-        (first + 1 + edge) / x.size,
-        xtol=1e-14,
+
+    def value(turn: float) -> float:
+        return float(_sum(harmonics, phases, np.asarray([turn]), amplitudes)[0])
+
+    ends = first / x.size, (first + 1) / x.size
+    # Few lines may touch zero at a sample, where rounding gives the sign.
+    at = (
+        brentq(value, *ends, xtol=1e-14)
+        if value(ends[0]) <= 0.0 < value(ends[1])
+        else min(ends, key=lambda t: abs(value(t)))
     )
     turned = np.mod(phases + 2.0 * np.pi * harmonics * at, 2.0 * np.pi)
     return tuple(turned.tolist()), float(np.max(np.abs(x)))

@@ -7,7 +7,7 @@ held at the optimum), so that every direction has a standard deviation of about 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -19,12 +19,15 @@ import jax.numpy as jnp
 import numpy as np
 from blackjax.adaptation.step_size import dual_averaging_adaptation
 from blackjax.diagnostics import effective_sample_size, potential_scale_reduction
+from blackjax.mcmc.hmc import HMCState
 
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
-from swashplate.identification.core.scoring import Traced
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.simulation.dynamics import enable_double_precision
 
+Density = Callable[[Any, Any, Any], Any]
+Target = tuple[Density, Hashable, Mapping[str, Any]]
 _NEAR = 8.0
 """Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
 _INSIDE = 0.5
@@ -59,7 +62,7 @@ def effective(draws: Array) -> Array:
 
 
 def sample(
-    traced: Traced,
+    traced: TracedCost,
     row: Row,
     optimum: Array,
     covariance: Array,
@@ -113,7 +116,7 @@ def sample(
     return chain
 
 
-def _alive(target: Any, start: Any) -> Any:
+def _alive(target: Target, start: jax.Array) -> Any:
     """The sampler's state at a start, which comes nearer to the optimum as long as the model diverges there."""
     state = _begin(*target, start)
     for _ in range(6):
@@ -130,7 +133,7 @@ def _together(found: list[list[tuple[Array, Array]]], steps: Array) -> Chains:
     return Chains(rows, {name: stats[:, :, i] for i, name in enumerate(_STATS)}, steps)
 
 
-def _warmed(target: Any, warmup: int, key: Any, state: Any) -> tuple[Any, float]:
+def _warmed(target: Target, warmup: int, key: jax.Array, state: HMCState) -> tuple[Any, float]:
     begin, update, final = dual_averaging_adaptation(_ACCEPTED)
     adapting = begin(_FIRST_STEP)
     for k in range(warmup):
@@ -140,7 +143,9 @@ def _warmed(target: Any, warmup: int, key: Any, state: Any) -> tuple[Any, float]
     return state, float(final(adapting)) if warmup else _FIRST_STEP
 
 
-def _drawn(target: Any, key: Any, state: Any, step: float, first: int, count: int) -> tuple[Any, Array, Array]:
+def _drawn(
+    target: Target, key: jax.Array, state: HMCState, step: float, first: int, count: int
+) -> tuple[Any, Array, Array]:
     rows, stats = [], []
     for k in range(first, first + count):
         state, row, told = _step(*target, jax.random.fold_in(key, (1 << 20) + k), state, step)
@@ -150,7 +155,7 @@ def _drawn(target: Any, key: Any, state: Any, step: float, first: int, count: in
 
 
 # ---- the density in whitened numbers ---------------------------------------------------------------------------------
-def _prepared(traced: Traced, row: Row, optimum: Array, covariance: Array) -> dict[str, Any]:
+def _prepared(traced: TracedCost, row: Row, optimum: Array, covariance: Array) -> dict[str, Any]:
     """The arrays that the density needs, those of the likelihood among them."""
     enable_double_precision()
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
@@ -176,7 +181,7 @@ def _prepared(traced: Traced, row: Row, optimum: Array, covariance: Array) -> di
     return {"likelihood": traced.data, **{name: jnp.asarray(value) for name, value in numbers.items()}}
 
 
-def _unbent(data: Any, z: Any) -> tuple[Any, Any]:
+def _unbent(data: Mapping[str, Any], z: jax.Array) -> tuple[Any, Any]:
     """The scaled row of whitened numbers, and the logarithm of what the bent scales stretch.
 
     A scale with a near bound is bent so that the bound lies at infinity: exponential for one bound, logistic for two;
@@ -203,7 +208,7 @@ def _unbent(data: Any, z: Any) -> tuple[Any, Any]:
     return value, stretch.sum()
 
 
-def _density(function: Any, plan: Any, data: Any, z: Any) -> Any:
+def _density(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
     row, stretch = _unbent(data, z)
     away = row - data["mean"]
     total = -function(plan, data["likelihood"], row) - 0.5 * away @ data["prior"] @ away + stretch
@@ -212,12 +217,14 @@ def _density(function: Any, plan: Any, data: Any, z: Any) -> Any:
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def _begin(function: Any, plan: Any, data: Any, z: Any) -> Any:
+def _begin(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
     return blackjax.nuts.init(z, lambda place: _density(function, plan, data, place))
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def _step(function: Any, plan: Any, data: Any, key: Any, state: Any, step: Any) -> tuple[Any, Any, Any]:
+def _step(
+    function: Density, plan: Hashable, data: Mapping[str, Any], key: jax.Array, state: HMCState, step: float
+) -> tuple[Any, Any, Any]:
     """The next state, its scaled row and its statistics."""
     following, info = blackjax.nuts.build_kernel()(
         key,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ def huber(whitened: Array) -> float:
     return float(losses(whitened, np).sum())
 
 
-def losses(whitened: Any, xp: Any) -> Any:
+def losses(whitened: Array, xp: ModuleType) -> Any:
     """The loss of each whitened residual, in NumPy or JAX."""
     size = xp.abs(whitened)
     return xp.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2)

@@ -40,7 +40,7 @@ class Likelihood(Protocol):
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedCost:
     """A likelihood's cost as JAX differentiates and compiles it.
 
     Attributes:

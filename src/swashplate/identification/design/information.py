@@ -102,7 +102,7 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _with_slopes(equations: Equations, x: Any, w: Any, p: Any, directions: Any) -> Any:
+def _with_slopes(equations: Equations, x: Array, w: Array, p: Array, directions: Array) -> Any:
     """Slopes of the rates by states and inputs, and their slopes along directions of the parameters."""
     slopes = jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))
     moved = jax.vmap(lambda d: jax.jvp(lambda row: slopes(x, w, row), (p,), (d,))[1])(directions)

@@ -9,7 +9,7 @@ derivative through the equations sample by sample).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial, wraps
 from typing import Any
@@ -154,7 +154,7 @@ def _beginning(
     return reaching, gain, FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
 
 
-def traced_cost(plan: FilterPlan, data: Any, row: Any) -> Any:
+def traced_cost(plan: FilterPlan, data: Mapping[str, Any], row: jax.Array) -> Any:
     """Negative log-likelihood of the counted innovations (traceable), as `PredictionError.cost` has it.
 
     Args:

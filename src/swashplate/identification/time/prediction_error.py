@@ -24,7 +24,7 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
-from swashplate.identification.core.scoring import Traced
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time import innovations_ahead
 from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, traced_cost, unpack
 from swashplate.identification.time.kinematics import PREDICTED
@@ -223,9 +223,9 @@ class PredictionError:
         gradient, information, values, _ = self._accumulate(row)
         return self._cost(*values), gradient, information
 
-    def traced(self) -> Traced:
+    def traced(self) -> TracedCost:
         """The cost as a function that JAX differentiates."""
-        return Traced(traced_cost, self._plan, self._data | {"counted": jnp.asarray(self.counted)})
+        return TracedCost(traced_cost, self._plan, self._data | {"counted": jnp.asarray(self.counted)})
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
         given = (self._plan, self._data, jnp.asarray(row))

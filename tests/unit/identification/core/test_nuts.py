@@ -12,7 +12,7 @@ import pytest
 
 from swashplate.identification.core import nuts
 from swashplate.identification.core.parameter_row import Entry, Row
-from swashplate.identification.core.scoring import Traced
+from swashplate.identification.core.scoring import TracedCost
 
 WALL = 1.5
 """Sigmas from the mean to the lower bound of the second number."""
@@ -40,7 +40,7 @@ def chains() -> nuts.Chains:
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = TIED * np.outer(PLAN, PLAN)
     covariance[2, 2] = 1.0
-    traced = Traced(half_squares, PLAN, {"tied": TIED})
+    traced = TracedCost(half_squares, PLAN, {"tied": TIED})
     asked: dict[str, Any] = {"chains": 3, "warmup": 100, "block": 400, "most": 800, "seed": 4}
     return nuts.sample(traced, ROW, np.zeros(3), covariance, enough=lambda _: False, **asked)
 
@@ -80,7 +80,7 @@ def test_chains_that_never_meet_are_told() -> None:
 @pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (-1.0, np.inf), (-np.inf, 2.0), (-1.0, 2.0), (-0.1, 0.2)])
 def test_the_stretch_of_a_bent_scale_is_its_slope(bounds: tuple[float, float]) -> None:
     row = Row((Entry("one", "parameter", 0.0, 1.0, lower=bounds[0], upper=bounds[1]),))
-    data = nuts._prepared(Traced(half_squares, (), {}), row, np.zeros(1), np.eye(1))
+    data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.eye(1))
     for place in (-2.0, 0.0, 1.3):
         z = jnp.array([place])
         (value,), stretch = nuts._unbent(data, z)
