@@ -1,8 +1,9 @@
-"""The pictures of pages in docs/pictures: the live page and the reports, as Chromium draws them.
+"""The pictures of pages in docs/pictures: those of the newcomers' journeys, the live page and reports, by Chromium.
 
     python scripts/screenshots.py [NAME ...]
 
-Needs Chromium, playwright and the live page's libraries (`make page`). About a minute and a half of processor time.
+The journeys of tests/browser/test_journeys.py are run and keep their own pictures; `journeys` as NAME runs them alone.
+Needs Chromium, playwright, nbclient and the live page's libraries (`make page`). About two minutes of processor time.
 """
 
 from __future__ import annotations
@@ -84,11 +85,20 @@ def live(browser: Any, name: str, vehicle: str) -> None:
                 process.wait(timeout=20.0)
 
 
+def journeys() -> None:
+    """The newcomers' own pictures, the minute of flight among them."""
+    tests = ["tests/browser/test_journeys.py", "-m", "", "-n", "0", "-q", "-k", "not processor and not 5.0"]
+    around = {**os.environ, "SWASH_PICTURES": str(PICTURES)}
+    subprocess.run([sys.executable, "-m", "pytest", *tests], cwd=PICTURES.parents[1], env=around, check=True)
+
+
 def main(wanted: list[str]) -> None:
+    if not wanted or "journeys" in wanted:
+        journeys()
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(CHROMIUM))
-        for name, vehicle in (("live-page", "raptor50"), ("live-coax", "coax")):
+        for name, vehicle in (("live-coax", "coax"),):
             if not wanted or name in wanted:
                 live(browser, name, vehicle)
         for name, (lines, page) in REPORTS.items():

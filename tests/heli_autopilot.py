@@ -48,7 +48,7 @@ def read_line(answer: bytes) -> dict[str, list[float]]:
         ("windvane", "direction"),
         ("windvane", "speed"),
         ("", "velocity_wind"),
-        ("", "rpm_1"),
+        ("rpm", "rpm_1"),
     ):
         start = text.index(section) + len(section) + 1 if section else 1
         at = text.index(key, start) + len(key) + 2
@@ -63,7 +63,7 @@ def read_line(answer: bytes) -> dict[str, list[float]]:
 
 def _quickly(answer: bytes) -> dict[str, list[float]]:
     told = json.loads(answer)
-    told.update(told.pop("imu"), **told.pop("windvane"))
+    told.update(told.pop("imu"), **told.pop("windvane"), **told.pop("rpm"))
     return {key: value if isinstance(value, list) else [value] for key, value in told.items() if key != "battery"}
 
 
@@ -159,7 +159,7 @@ class HeliAutopilot:
         send: gives a packet to the physics and returns its answer.
         rate: frames per second [Hz] (SIM_RATE_HZ). every: the loops run in every so many of them.
         outputs: 16 or 32.
-        sweep: (axis 0 roll or 1 pitch, function of time since it began) added after the rate controllers.
+        sweep: (axis 0 roll to 3 collective, function of time since it began) added after the rate controllers.
         sticks: roll, pitch, yaw and collective that reach the servos while it does not fly.
         log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
     """
@@ -288,7 +288,10 @@ class HeliAutopilot:
             if self.sweep is not None:
                 axis, signal = self.sweep
                 swept = signal(now - self._since)
-                mixer[axis] += swept
+                if axis < 3:
+                    mixer[axis] += swept
+                else:
+                    collective += swept
         else:
             self._heading = attitude[2]
             self._sums[:] = 0.0

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 from swashplate import public
 
 if TYPE_CHECKING:
+    from swashplate.api.accept_autopilot import accept_autopilot
+    from swashplate.api.autopilot_gains import autopilot_gains
     from swashplate.api.bench import evaluate_bench, simulate_bench
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
@@ -90,6 +92,7 @@ if TYPE_CHECKING:
     from swashplate.models.coax_choices import CHOICES
     from swashplate.models.conventional.new_card import new_card
     from swashplate.models.vehicle import Vehicle
+    from swashplate.physics.earth import Earth
     from swashplate.physics.environment import Environment
     from swashplate.physics.frames import Vector
     from swashplate.reporting.report import report
@@ -116,6 +119,7 @@ __all__ = [
     "CHOICES",
     "QUIET",
     "Card",
+    "Earth",
     "Environment",
     "Flight",
     "FrequencyResponse",
@@ -127,7 +131,9 @@ __all__ = [
     "Vector",
     "Vehicle",
     "__version__",
+    "accept_autopilot",
     "autopilot",
+    "autopilot_gains",
     "check_autopilot",
     "check_controller",
     "compare",

@@ -20,6 +20,7 @@ from swashplate.extras import EXTRA_OF, missing
 _LIGHT: Mapping[str, str] = {
     "CHOICES": "swashplate.models.coax_choices:CHOICES",
     "Card": "swashplate.models.card:Card",
+    "Earth": "swashplate.physics.earth:Earth",
     "Environment": "swashplate.physics.environment:Environment",
     "Flight": "swashplate.flights.flight:Flight",
     "FrequencyResponse": "swashplate.identification.responses.frequency_response:FrequencyResponse",
@@ -75,6 +76,8 @@ _LIGHT: Mapping[str, str] = {
 _COMPUTING: Mapping[str, str] = {
     "QUIET": "swashplate.simulation.sensors:QUIET",
     "Sensors": "swashplate.simulation.sensors:Sensors",
+    "accept_autopilot": "swashplate.api.accept_autopilot:accept_autopilot",
+    "autopilot_gains": "swashplate.api.autopilot_gains:autopilot_gains",
     "autopilot": "swashplate.control.laws.autopilot:autopilot",
     "check_autopilot": "swashplate.api.check_autopilot:check_autopilot",
     "check_controller": "swashplate.api.check_controller:check_controller",

@@ -24,6 +24,8 @@ from logs_page import table
 from swashplate.links.web.libraries import PAGE
 
 SIZES = {"desk": (1400, 900), "telephone": (390, 844)}
+servers: dict[str, int] = {}
+"""Process by address."""
 _WAIT = 60.0  # s; a busy machine draws slowly
 
 
@@ -41,6 +43,7 @@ def served(*arguments: str | Path, cwd: Path) -> Iterator[str]:
         assert process.stdout is not None
         found = re.search(r"http://\S+", process.stdout.readline())
         assert found is not None
+        servers[found[0]] = process.pid
         try:
             yield found[0]
         finally:
@@ -259,52 +262,6 @@ def test_a_shaken_gyro_gets_notches_to_copy(browser: Any, address: str, tmp_path
         f"INS_HNTCH_{line}" for line in ("ENABLE,1", "MODE,2", "REF,1", "FREQ,22.5", "BW,11.2", "HMNCS,2")
     ]
     visit.close()
-
-
-def test_from_a_dropped_log_to_gains_in_two_clicks(
-    browser: Any, address: str, shared_data: Path, tmp_path: Path
-) -> None:
-    visit = Visit(browser, address, "telephone")
-    visit.page.evaluate(
-        "window.clicks = 0; addEventListener('click', (event) => event.isTrusted && (window.clicks += 1), true)"
-    )
-    visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
-    drawn(visit)
-    visit.page.locator("#sweeps button").click()
-    visit.until("document.querySelector('#identify progress')")
-    visit.until("document.getElementById('identify').dataset.state === 'done'", seconds=240.0)
-    assert visit.of("window.clicks") <= 4
-    told = visit.text("#identify")
-    assert "ATC_RAT_RLL_P" in told
-    assert "NO verification" in told, "this log holds nothing but its sweep"
-    titles = visit.of("[...document.querySelectorAll('.curves strong')].map(e => e.textContent)")
-    assert titles[:2] == ["Step of the target", "Disturbance: 0.1 of the command"]
-    assert "Coherence, from 0.6 on it counts" in titles
-    labels = visit.of("document.querySelectorAll('.curves canvas').length")
-    assert labels == len(titles)
-    with visit.page.expect_download() as download:
-        visit.page.click("a[href='/download/gains.param']")
-    assert Path(download.value.path()).read_text().startswith("ATC_RAT_RLL_FF,0.2")
-    with visit.page.context.expect_page() as opened:
-        visit.page.click("a[href='/download/report.html']")
-    opened.value.wait_for_selector("html[data-drawn=all]", state="attached", timeout=60_000)
-    opened.value.close()
-    visit.close()
-
-
-@pytest.mark.proof
-def test_gains_are_there_a_minute_after_a_log_was_dropped(browser: Any, shared_data: Path, tmp_path: Path) -> None:
-    """From an empty page of a server that has just been started, as a newcomer has it."""
-    with served(cwd=tmp_path) as url:
-        visit = Visit(browser, url, clear=False)
-        began = time.monotonic()
-        visit.drop(shared_data / "ardupilot_sitl" / "heli_sid_roll_mix.BIN")
-        visit.until("document.querySelector('#sweeps button')")
-        visit.page.locator("#sweeps button").click()
-        visit.until("document.getElementById('identify').dataset.state === 'done'", seconds=240.0)
-        assert time.monotonic() - began < 60.0
-        assert "ATC_RAT_RLL_P" in visit.text("#identify")
-        visit.close()
 
 
 def test_an_identification_is_cancelled(browser: Any, address: str, shared_data: Path) -> None:

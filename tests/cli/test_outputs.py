@@ -106,7 +106,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
     for verb in ("identify", "validate"):
         monkeypatch.setattr(identification, verb, getattr(done, verb))
     monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
-    monkeypatch.setattr("swashplate.api.study.write_page", lambda path, results: done.report(*results, path=path))
+    monkeypatch.setattr(
+        "swashplate.api.report_folder.write_page", lambda path, results: done.report(*results, path=path)
+    )
     return done
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from swashplate.api.link import mapping_of
-from swashplate.errors import LinkError, SwashError
+from swashplate.errors import SwashError
 from swashplate.links.ardupilot.parameters import as_written
 from swashplate.links.ardupilot.parameters import parameters as for_ardupilot
 from swashplate.links.mavlink.comparison import ComparedParameter, compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
+from swashplate.links.mavlink.greeting import ARDUPILOT, AUTOPILOT_NAMES, PX4, greet
 from swashplate.links.mavlink.health import Health, listen_to_health
 from swashplate.links.mavlink.parameter_reading import ask_by_name, read_parameters
 from swashplate.links.px4.parameters import parameters as for_px4
@@ -25,12 +25,8 @@ Firmware = Literal["ardupilot", "px4"]
 ADDRESSES: Mapping[Firmware, str] = {"ardupilot": "tcp:127.0.0.1:5762", "px4": "udp:127.0.0.1:14540"}
 """Where a simulated autopilot speaks MAVLink and no ground station is: SERIAL1 of ArduPilot's SITL, PX4's port for
 programs aboard."""
-_NAMES = {3: "ArduPilot", 12: "PX4"}
-_AUTOPILOTS: Mapping[Firmware, int] = {"ardupilot": 3, "px4": 12}
+_AUTOPILOTS: Mapping[Firmware, int] = {"ardupilot": ARDUPILOT, "px4": PX4}
 """MAV_AUTOPILOT."""
-_NO_AUTOPILOT = 8
-_ROTORCRAFT = (0, 2, 3, 4, 13, 14, 15, 29, 35)
-"""MAV_TYPE that copter firmware has: no frame yet, and 2 to 12 rotors, coaxial, helicopter."""
 _RATES = ("SCHED_LOOP_RATE", "INS_GYRO_RATE", "INS_GYRO_FILTER", "IMU_GYRO_RATEMAX", "IMU_INTEG_RATE")
 """Told where there are such parameters; no vehicle asks for a value."""
 
@@ -76,7 +72,8 @@ class AutopilotCheck:
 
     def __repr__(self) -> str:
         right = sum(p.verdict == "right" for p in self.parameters)
-        lines = [f"{_NAMES[_AUTOPILOTS[self.firmware]]} at {self.address}: {'pass' if self.passed else 'FAIL'}"]
+        who = AUTOPILOT_NAMES[_AUTOPILOTS[self.firmware]]
+        lines = [f"{who} at {self.address}: {'pass' if self.passed else 'FAIL'}"]
         lines.append(f"parameters: {right} of {len(self.parameters)} as the vehicle needs them")
         rows = [(p.name, f"{p.expected:g}", "-" if p.found is None else f"{p.found:g}", p.verdict) for p in self._odd()]
         if rows:
@@ -128,7 +125,7 @@ def check_autopilot(
     expected = _expected(vehicle, firmware, name, servos)
     packed = firmware == "px4"
     with Connection(mavlink or ADDRESSES[firmware], timeout=timeout) as connection:
-        _greet(connection, firmware, timeout)
+        greet(connection, _AUTOPILOTS[firmware], timeout)
         reading = read_parameters(connection, packed=packed)
         ask_by_name(connection, reading, expected, packed=packed)
         health = listen_to_health(connection, duration=listen)
@@ -158,34 +155,6 @@ def _expected(vehicle: Vehicle, firmware: Firmware, name: str | None, servos: st
     if firmware == "px4":
         return as_written(for_px4(mapping_of(vehicle, servos, name=name, suffix="_px4")))
     return as_written(for_ardupilot(mapping_of(vehicle, servos, name=name, suffix=""), vehicle, trim(vehicle)))
-
-
-def _greet(connection: Connection, firmware: Firmware, timeout: float) -> None:
-    """Wait for the autopilot's heartbeat, and refuse what is not the vehicle.
-
-    Raises:
-        LinkError: naming what is there.
-    """
-    until, wanted = time.monotonic() + timeout, _AUTOPILOTS[firmware]
-    while (left := until - time.monotonic()) > 0.0:
-        connection.send("heartbeat", 6, _NO_AUTOPILOT, 0, 0, 4)  # a ground station; TCP ports of SITL wait for bytes
-        for _, message in connection.receive(min(left, 0.5)):
-            if message.get_type() != "HEARTBEAT" or message.autopilot == _NO_AUTOPILOT:
-                continue
-            if message.autopilot != wanted:
-                other = _NAMES.get(message.autopilot, f"autopilot number {message.autopilot}")
-                raise LinkError(f"{other} answers, expected {_NAMES[wanted]}.", where=connection.address)
-            if message.type not in _ROTORCRAFT:
-                told = f"a vehicle of MAVLink's type {message.type} answers, expected a helicopter or a multicopter."
-                raise LinkError(told, where=connection.address, hint="Is it ArduCopter's binary?")
-            connection.system = message.get_srcSystem()
-            return
-    raise LinkError(
-        f"no autopilot was heard within {timeout:g} s.",
-        where=connection.address,
-        channel="--mavlink",
-        hint="Is it running, and its physics (swash link) too? A ground station may hold the port; give another one.",
-    )
 
 
 def _arming(health: Health) -> list[str]:

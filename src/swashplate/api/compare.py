@@ -21,6 +21,7 @@ from swashplate.reporting.cases_of_responses import compare_responses
 from swashplate.reporting.cases_of_results import compare_estimates
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.validation.compare import ModelComparison, along_flights
+from swashplate.validation.verb import fitted
 
 Case: TypeAlias = FrequencyResponse | Result[Any, Any] | Vehicle | StateSpaceModel | LinearModel | str | Path
 """What can stand beside others: a response, a fit, a model, or its name, file or folder of results."""
@@ -114,14 +115,14 @@ def _called(one: Any, path: Path | None, paths: Sequence[Path | None], k: int) -
     if isinstance(one, Vehicle):
         return one.card.called if one.structure is None else one.structure.name
     if path is None:
-        return str(getattr(one, "name", "") or f"case {k + 1}")
+        return str(getattr(fitted(one), "name", "") or f"case {k + 1}")
     alike = sum(other is not None and other.name == path.name for other in paths)
     return "/".join(path.parts[-2:]) if alike > 1 else path.name
 
 
 def _read(one: Any) -> Any:
     if not isinstance(one, str | Path):
-        return one
+        return fitted(one)
     path = Path(one)
     if path.is_dir():
         found = next((path / name for name in _FILES if (path / name).is_file()), None)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say, silent
-from swashplate.api.study import Study
 from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
@@ -35,7 +35,7 @@ TRACKED = ("prediction-error", "output-error", "nelder-mead")
 
 
 @dataclass(frozen=True, repr=False)
-class Identification(Study):
+class Identification(ReportFolder):
     """A vehicle identified from flights, and how it predicts others.
 
     Attributes:
@@ -49,6 +49,11 @@ class Identification(Study):
     fit: Result[Vehicle, FlightDetails]
     validation: Validation | None
     refused: str = ""
+
+    @property
+    def model(self) -> Vehicle:
+        """The vehicle with the identified numbers."""
+        return self.fit.model
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON, without time histories."""

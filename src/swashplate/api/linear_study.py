@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from swashplate import atomic
-from swashplate.api.study import Study
+from swashplate.api.report_folder import ReportFolder
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling_readings import Line
@@ -26,7 +26,7 @@ from swashplate.validation.verification import Verification
 
 
 @dataclass(frozen=True, repr=False)
-class LinearStudy(Study):
+class LinearStudy(ReportFolder):
     """A linear model: how it was fitted, how it follows records, and what can be read off it.
 
     Attributes:

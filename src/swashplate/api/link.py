@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Literal
 
 from swashplate.atomic import write_text
-from swashplate.errors import SwashError
+from swashplate.control.analysis.cascade_gains import cascade_gains
+from swashplate.errors import ControllerError, SwashError
+from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import parameter_file, parameters
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
@@ -19,6 +21,7 @@ from swashplate.links.recorder import Recorder, recover
 from swashplate.links.sensing import Sensing
 from swashplate.links.servos import ServoMapping, packaged, servo_mapping
 from swashplate.links.sockets import is_loopback, listen_tcp, listen_udp
+from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
@@ -194,15 +197,23 @@ def link_px4(
 
 
 def write_ardupilot_parameters(
-    vehicle: Vehicle, path: str | Path, *, trim: Trim, name: str | None = None, servos: str | Path | None = None
+    vehicle: Vehicle,
+    path: str | Path,
+    *,
+    trim: Trim,
+    name: str | None = None,
+    servos: str | Path | None = None,
+    notice: Say = print,
 ) -> Path:
-    """Write ArduPilot's parameters for a vehicle in hover; returns the file.
+    """Write ArduPilot's parameters for a vehicle in hover, gains of all loops included; returns the file.
+
+    The gains are those of `autopilot_gains`. Where none hold their margins the file has none, and `notice` is told.
 
     Args:
         vehicle: what ArduPilot will fly.
         path: of the file.
         trim: its hover.
-        name, servos: as of `link_ardupilot`.
+        name, servos, notice: as of `link_ardupilot`.
 
     Raises:
         SwashError: where the folder is missing or there is no servo mapping.
@@ -210,7 +221,13 @@ def write_ardupilot_parameters(
     file = Path(path)
     if not file.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
-    found = parameters(mapping_of(vehicle, servos, name=name, suffix=""), vehicle, trim)
+    mapping = mapping_of(vehicle, servos, name=name, suffix="")
+    found = parameters(mapping, vehicle, trim)
+    late = complete_delays(vehicle, input_delays(vehicle) or ASSUMED_DELAY)
+    try:
+        found |= written_gains(cascade_gains(vehicle, trim, ardupilot_law(mapping, vehicle, trim), delays=late).law)
+    except ControllerError as error:
+        notice(f"The file has no gains, ArduPilot's own would fly: {error.problem}")
     return write_text(file, parameter_file(found, title=vehicle.card.title))
 
 
@@ -241,12 +258,12 @@ def _plant(
         recover(file, notice)
         recorder = Recorder(file, like=unflown(aircraft, record_rate=rate), say=notice)
     made = Surroundings(around, sag)
-    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=_engine(notice))
+    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=link_engine(notice))
     plant.prepare()
     return plant, recorder
 
 
-def _engine(notice: Say) -> MakeEngine:
+def link_engine(notice: Say) -> MakeEngine:
     """The vehicle's own C where this machine can compile it, which is quicker; XLA elsewhere."""
     from swashplate.export.stepping_c import CompiledEngine, can_compile
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from swashplate import atomic
+from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say, silent
-from swashplate.api.study import Study
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core.nested import LEVEL, EffectTest
@@ -24,7 +24,7 @@ from swashplate.validation.held_out import AHEAD, Gain, as_document, gains, pred
 
 
 @dataclass(frozen=True, repr=False)
-class NestedComparison(Study):
+class NestedComparison(ReportFolder):
     """A structure with and without each part of its physics.
 
     Attributes:

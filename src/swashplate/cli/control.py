@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from swashplate.cli import autopilot_gains, control_check, decouple_linear, observability, options
 from swashplate.cli import conditions as given
-from swashplate.cli import control_check, decouple_linear, observability, options
 from swashplate.cli import controller_options as shared
 from swashplate.cli.lateness import Delay, delays_from
 
@@ -20,6 +20,7 @@ app.command("check", short_help="Margins, handling qualities and steps of a cont
 app.command("observability", short_help="What sensors can see of a vehicle, and what they cannot.")(
     observability.observability
 )
+app.command("gains", short_help="Gains of ArduPilot or PX4 for a vehicle, with margins.")(autopilot_gains.gains)
 app.command("decouple", short_help="Decouple the axes of any linear model.")(decouple_linear.decouple)
 
 

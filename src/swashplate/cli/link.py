@@ -10,6 +10,7 @@ import typer
 
 from swashplate.cli import conditions as given
 from swashplate.cli import options
+from swashplate.cli.link_accept import accept
 
 if TYPE_CHECKING:
     from swashplate.models.vehicle import Vehicle
@@ -78,7 +79,9 @@ def ardupilot(
     write_parameters: Annotated[
         Path | None,
         typer.Option(
-            "--write-parameters", metavar="FILE", help="Write ArduPilot's parameters for this vehicle and end."
+            "--write-parameters",
+            metavar="FILE",
+            help="Write ArduPilot's parameters and gains for this vehicle, and end.",
         ),
     ] = None,
     check: Check = False,
@@ -106,7 +109,7 @@ def ardupilot(
     where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
     if write_parameters is not None:
         verbs.write_ardupilot_parameters(
-            where.vehicle, write_parameters, name=vehicle, servos=servos, trim=where.trims()[0]
+            where.vehicle, write_parameters, name=vehicle, servos=servos, trim=where.trims()[0], notice=_say
         )
         if not quiet:
             _say(f"written: {write_parameters}")
@@ -185,6 +188,9 @@ def px4(
         notice=_say,
         say=_silent if quiet else _say,
     )
+
+
+app.command("accept")(accept)
 
 
 def _check(

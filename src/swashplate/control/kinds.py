@@ -107,6 +107,7 @@ CONTROLLERS: Registry[ControllerKind[Any]] = Registry(
     "controllers",
     what="type of controller",
     own={
+        "ardupilot": "swashplate.control.laws.ardupilot.kind:KIND",
         "autopilot": "swashplate.control.laws.autopilot_kind:KIND",
         "lqg": "swashplate.control.lqg.kind:KIND",
         "observed-autopilot": "swashplate.control.laws.observed_autopilot_kind:KIND",

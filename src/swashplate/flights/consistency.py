@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.attitude import interpolate, quaternion_from_euler, rotation
+from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, rotation
 from swashplate.flights.conditioning.derive import body_rates, differentiate
 from swashplate.flights.conditioning.filters import within
 from swashplate.flights.conditioning.resample import common, unbroken
@@ -33,7 +32,7 @@ UNCHECKED = "consistency_not_checked"
 _BANDS = (((0.2, 3.0), 5.0), ((0.1, 0.8), 10.0))
 """Bands [Hz] with windows [s]: above drift, below rotor shake and what a delay of 50 ms turns round; and a slow one."""
 _LOCAL = ("vx", "vy", "vz")
-_FASTEST = 100.0  # Hz
+_FASTEST = 50.0  # Hz: over ten times the highest corner; what is sampled faster is averaged down to it first
 _SHORTEST = 60  # samples
 _FEWEST = 3  # windows in which an axis must move
 _TOGETHER = 0.8  # correlation from which two channels show one motion, whatever their ratio
@@ -79,7 +78,7 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
         for names in _families(flight, RATES, made):
             found += _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
     if all(name in flight for name in POSITION):
-        place = [_series(flight, name) for name in POSITION]
+        place = [_thinned(*_series(flight, name)) for name in POSITION]
 
         def local(grid: Array) -> Array:
             return _moving(place, grid)
@@ -147,6 +146,22 @@ def _series(flight: Flight, name: str) -> tuple[Array, Array]:
     return time[good], values[good]
 
 
+def _thinned(time: Array, table: Array) -> tuple[Array, Array]:
+    """Means over blocks of samples, so that a fast recording comes down to between 50 and 100 Hz; shapes (n,), (n, m).
+
+    A block that spans a gap is left out. A slower recording is returned as it is.
+    """
+    step = float(np.median(np.diff(time))) if time.size > 1 else np.inf
+    k = int(1.0 / (step * _FASTEST)) if step > 0.0 else 1
+    if k < 2 or time.size < k:
+        return time, table
+    blocks = time.size // k
+    stamps = time[: blocks * k].reshape(blocks, k)
+    whole = stamps[:, -1] - stamps[:, 0] < 2.0 * k * step
+    means = table[: blocks * k].reshape(blocks, k, *table.shape[1:]).mean(axis=1)
+    return stamps.mean(axis=1)[whole], means[whole]
+
+
 @dataclass(frozen=True)
 class _Attitude:
     """Stamps, quaternions, and the axes about which they tell the turn (roll and pitch only without a heading)."""
@@ -167,7 +182,8 @@ def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
         good = np.isfinite(table).all(axis=1) & (np.linalg.norm(table, axis=1) > 0.5)
         if good.sum() < 2:
             return None
-        return _Attitude(flight.time(QUATERNION[0])[good], table[good], (0, 1, 2))
+        # Free of sign flips, so that a mean over a block is near the attitude of its middle.
+        return _Attitude(*_thinned(flight.time(QUATERNION[0])[good], continuous(table[good])), (0, 1, 2))
     there = tuple(name for name in ATTITUDE if name in flight)
     if not {"phi", "theta"} <= set(there) or len({flight.stream_of(name) for name in there}) > 1:
         return None
@@ -188,7 +204,11 @@ def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
             )
         )
         table = np.radians(table)
-    return _Attitude(flight.time("phi")[good], quaternion_from_euler(table), tuple(range(len(there))))
+    for column in (0, 2):  # a mean over the wrap of roll or yaw would be no angle
+        if np.ptp(table[:, column]) > np.pi:
+            table[:, column] = np.unwrap(table[:, column])
+    stamps, table = _thinned(flight.time("phi")[good], table)
+    return _Attitude(stamps, quaternion_from_euler(table), tuple(range(len(there))))
 
 
 def _moving(place: Sequence[tuple[Array, Array]], grid: Array) -> Array:
@@ -232,12 +252,16 @@ def _pieces(flight: Flight, names: Sequence[str], time: Array, reference: Refere
     table = np.stack([flight.values(name) for name in names], axis=-1)
     stamps = flight.time(names[0])
     good = np.isfinite(table).all(axis=1) & np.isfinite(stamps)
-    stamps, table = stamps[good], table[good]
+    stamps, table = _thinned(stamps[good], table[good])
     if stamps.size < _SHORTEST or time.size < _SHORTEST:
         return
     own = 1.0 / float(np.median(np.diff(stamps)))
     rate = min(own, 1.0 / float(np.median(np.diff(time))), _FASTEST)
-    table = uniform_filter1d(table, max(1, round(own / rate)), axis=0)  # vibration must not fold into the band
+    width = round(own / rate)
+    if width > 1:  # vibration must not fold into the band
+        from scipy.ndimage import uniform_filter1d  # a quarter of a second that most logs need not wait
+
+        table = uniform_filter1d(table, width, axis=0)
     gap = max(_MAX_GAP, 2.5 / rate)
     for start, stop in common(unbroken(time, max_gap=gap), unbroken(stamps, max_gap=gap)):
         grid = start + np.arange(int((stop - start) * rate)) / rate
@@ -356,7 +380,7 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
     """The accelerometers' mean along body z: what neither falls nor climbs away feels its weight, -9.81 m/s^2 level."""
     found = []
     for (name,) in _families(flight, ("az",), made):
-        stamps, values = _series(flight, name)
+        stamps, values = _thinned(*_series(flight, name))
         if values.size < _SHORTEST:
             continue
         down = np.ones(values.size)

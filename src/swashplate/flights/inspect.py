@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from swashplate.arrays import Array
 from swashplate.flights.consistency import consistency
@@ -47,7 +46,8 @@ class StreamSummary:
         rate: sample rate [Hz] from the median step; NaN for a single sample.
         jitter: scatter of the steps that are no gaps: 1.4826 times the median absolute deviation [s].
         gaps: steps longer than three usual ones there; longest_gap: the longest of them [s] (0 where there is none).
-        rates: the slowest and the fastest usual rate [Hz]: autopilots log some messages slowly outside tests.
+        rates: the slowest and the fastest usual rate [Hz]: autopilots log some messages slowly outside tests. Both are
+            `rate` where no step is three times another one.
     """
 
     name: str
@@ -194,10 +194,15 @@ def _summarise_stream(name: str, data: xr.Dataset) -> StreamSummary:
         nothing = float("nan")
         return StreamSummary(name, time.size, edge, edge, nothing, nothing, 0, 0.0, (nothing, nothing))
     steps = np.diff(time)
-    median, usual = float(np.median(steps)), median_filter(steps, size=_TURN, mode="mirror")
-    rates = (1.0 / float(usual.max()), 1.0 / float(usual.min()))
-    if rates[1] <= _GAP * rates[0]:  # one rate
-        usual = np.full(steps.shape, median)
+    median = float(np.median(steps))
+    rates, usual = (1.0 / median, 1.0 / median), np.full(steps.shape, median)
+    if float(steps.max()) > _GAP * float(steps.min()):
+        from scipy.ndimage import median_filter  # a quarter of a second that an even log need not wait
+
+        by_turns = median_filter(steps, size=_TURN, mode="mirror")
+        rates = (1.0 / float(by_turns.max()), 1.0 / float(by_turns.min()))
+        if rates[1] > _GAP * rates[0]:
+            usual = by_turns
     long = steps > _GAP * usual
     return StreamSummary(
         name,

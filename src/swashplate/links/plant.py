@@ -94,6 +94,11 @@ class Plant:
         return float(self._stepping.surroundings[SURROUNDINGS.index("voltage")])
 
     @property
+    def moved(self) -> Motion:
+        """The newest motion."""
+        return self._held
+
+    @property
     def environment(self) -> Environment:
         return self._around.environment
 

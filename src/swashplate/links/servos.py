@@ -95,11 +95,11 @@ class CoaxialMapping:
         servos = table.part("servos", missing={})
         self.motors = tuple(motors.servo(motors.number(name), servos) for name in ("lower", "upper"))
         self.servos = tuple(cyclic.servo(cyclic.number(name), servos) for name in ("roll", "pitch"))
-        self._travel = (cyclic.number("roll_travel", missing=1.0), cyclic.number("pitch_travel", missing=1.0))
+        self.travel = (cyclic.number("roll_travel", missing=1.0), cyclic.number("pitch_travel", missing=1.0))
         table.done()
         numbers = vehicle.card.values()
         stopped = [-numbers[f"o_drive_{name}"] / numbers[f"k_drive_{name}"] for name in ("lower", "upper")]
-        self._stopped = tuple(max(0.0, command) for command in stopped)
+        self.stopped = tuple(max(0.0, command) for command in stopped)
         self.channels = tuple(s.channel for s in (*self.motors, *self.servos))
         self.shares = tuple(s.channel for s in self.motors)
 
@@ -112,9 +112,9 @@ class CoaxialMapping:
         An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
         """
         motors = [
-            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self.motors, self._stopped, strict=True)
+            max(stopped, s.share(pulses[s.channel - 1])) for s, stopped in zip(self.motors, self.stopped, strict=True)
         ]
-        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self.servos, self._travel, strict=True)]
+        servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self.servos, self.travel, strict=True)]
         # Autopilots count nose up as positive pitch, the CoaX nose down.
         return np.array([*motors, servos[0], -servos[1]])
 

@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from swashplate.errors import CardError, SwashError
 from swashplate.models.card import Card, packaged_cards, read_card
@@ -49,7 +48,7 @@ def from_card(card: Card) -> Vehicle:
     return EQUATIONS[card.vehicle](card)
 
 
-def vehicle(name_or_file: str | Path, **options: Any) -> Vehicle:
+def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:
     """A vehicle by its name, or by the path of a file of any kind of model.
 
     Args:

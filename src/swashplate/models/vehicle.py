@@ -17,6 +17,7 @@ from swashplate.models.traits import Traits
 from swashplate.models.usual_axes import usual_axes
 from swashplate.physics.backend import Backend, FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.public import resolve
 
 _FLOATS = FloatBackend()
 Derivatives = Callable[[Any, Any, Any, Environment, Backend], Any]
@@ -119,6 +120,21 @@ class Vehicle:
         from swashplate.atomic import write_text
 
         write_text(path, self.card.to_toml())
+
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """The linear model as a `control.StateSpace` of python-control: of its structure, else about hover.
+
+        About another trim: `swashplate.linearize(vehicle, trim).to_control()`.
+
+        Args:
+            pade: order of the polynomials that stand for the delays; 0 leaves the delays out, None does so with a
+                warning where there are any.
+
+        Raises:
+            SwashError: an order outside 0 to 12, or a vehicle that has no hover.
+        """
+        model = resolve("linearize")(self) if self.structure is None else self.structure
+        return model.to_control(pade=pade)
 
     def __repr__(self) -> str:
         return (

@@ -15,6 +15,7 @@ from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import (
@@ -25,6 +26,7 @@ from swashplate.simulation.dynamics import (
     parameter_row,
     row_rates,
 )
+from swashplate.simulation.earth_flight import PLACES, from_earth, over_earth, to_earth
 from swashplate.simulation.late import Delays, acting_rows
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_steps
@@ -48,6 +50,7 @@ def simulate(
     delays: Delays = None,
     sensors: Sensors | None = None,
     seed: int | None = None,
+    earth: Earth | None = None,
 ) -> Flight:
     """Fly a vehicle through given inputs; classical Runge-Kutta of order 4, float64.
 
@@ -68,6 +71,9 @@ def simulate(
             that the vehicle's card knows (`sp.structure` models and identified ones). The flight has the commands.
         sensors: sensor models that turn the true flight into a log; they need a `seed`.
         seed: of the sensors' noise; the same call with the same seed gives the same bits on the same machine.
+        earth: that is round and turns; None for a flat one. Then p, q, r are rates against the stars, roll, pitch and
+            yaw against the vertical where the vehicle is, x, y, z in the axes of the origin, and the flight has
+            latitude, longitude and altitude too.
 
     Returns:
         The true flight, stream "uniform" (time, all states, inputs, voltage, wind), or what the sensors make of it.
@@ -95,13 +101,22 @@ def simulate(
             trajectory(equations_of(moved), begin, acting, numbers, 1.0 / rate, substeps=substeps, held=held)
         )
 
-    states = flown(vehicle, np.asarray(x0))
-    if not vehicle.traits.linear and steep(states):
+    places: Array | None = None
+    if earth is not None:
+        if vehicle.traits.linear:
+            raise SwashError("holds near one trim over a flat Earth only.", channel="earth", where=vehicle.name)
+        states, places = from_earth(flown(over_earth(vehicle, earth), to_earth(np.asarray(x0), earth)), earth)
+    else:
+        states = flown(vehicle, np.asarray(x0))
+    if earth is None and not vehicle.traits.linear and steep(states):
         states = euler_rows(flown(tumbling(vehicle), from_euler(np.asarray(x0))), np.asarray(x0))
     flight = simulated_flight(
         vehicle, time, states, rows, details={"rate": rate, "substeps": substeps, "interpolation": interpolation}
     )
     check_divergence(vehicle, time, states, flight)
+    if places is not None:
+        columns = {n: ("time", places[:, i], {"units": u}) for i, (n, u) in enumerate(PLACES.items())}
+        flight = flight.with_streams({"uniform": flight.streams["uniform"].assign(columns)})
     if sensors is None:
         return flight
     from swashplate.simulation.sensors import observe

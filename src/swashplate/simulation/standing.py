@@ -29,6 +29,8 @@ _SINK = 0.002
 _DAMPING = 0.4
 """Of the critical damping of the weight on its skids."""
 _FRICTION = 0.5
+_CONTACT = ("ground", "grip")
+"""Options of `Traits.standing` that say nothing in the air."""
 
 
 class Standing(NamedTuple):
@@ -63,6 +65,20 @@ def standing(vehicle: Vehicle) -> Vehicle:
         derivatives=partial(_derivatives, vehicle.derivatives, skids),
         specific_force=partial(_specific_force, vehicle.specific_force, skids),
     )
+
+
+def airborne(vehicle: Vehicle) -> Vehicle:
+    """The same equations as `standing`'s where no ground is: for the hover and the linear model of what is flown there.
+
+    Raises:
+        SwashError: where its equations can have no ground.
+    """
+    if not vehicle.traits.standing:
+        if not vehicle.traits.ground:
+            raise no_ground(vehicle.card.where)
+        return vehicle
+    flying = {name: value for name, value in vehicle.traits.standing.items() if name not in _CONTACT}
+    return from_card(replace(vehicle.card, options={**vehicle.card.options, **flying}))
 
 
 def no_ground(where: str) -> SwashError:

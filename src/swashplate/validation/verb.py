@@ -83,7 +83,7 @@ def validate(
         SwashError: for a calibration that is too short, or `published` beside a model that has no card to compare with.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
-    flown = as_flights(flights)
+    model, flown = fitted(model), as_flights(flights)
     held = model.solution if isinstance(model, Result) else model
     rigid = isinstance(held, Vehicle) and set(PREDICTED) <= set(held.state_names)
     # What flies nonlinear vehicles compiles; linear models need none of it, and it takes a second to import.
@@ -106,6 +106,11 @@ def validate(
     return along_inputs(model, flown, outputs=outputs)
 
 
+def fitted(model: Any) -> Any:
+    """The fit of what an identifying verb returned as one object (`sp.fit_tf`, `sp.fit_ss`); others as they are."""
+    return getattr(model, "fit", None) or model
+
+
 def along_inputs(
     model: Result[Any, Any] | Vehicle | StateSpaceModel,
     flights: Flight | Sequence[Flight],
@@ -120,6 +125,7 @@ def along_inputs(
     Raises:
         FlightError: an input that the flights lack, or no output that both have.
     """
+    model = fitted(model)
     held = model.solution if isinstance(model, Result) else model
     if isinstance(held, Vehicle) and held.structure is None:
         from swashplate.validation.vehicle_verification import verify_vehicle

@@ -104,10 +104,10 @@ def test_tuned_gains_are_told_and_are_no_fault() -> None:
 @pytest.mark.proof
 def test_a_helicopter() -> None:
     right = as_written(parameters(servo_mapping("raptor50", RAPTOR), RAPTOR, sp.trim(RAPTOR)))
-    with StandIn(right | {"ATC_RAT_RLL_P": 0.3}) as there:
+    with StandIn(right | {"ATC_HOVR_ROL_TRM": 300.0}) as there:
         found = sp.check_autopilot(RAPTOR, "ardupilot", name="raptor50", mavlink=there.address, listen=0.3)
     assert found.passed
-    assert [p.name for p in found.parameters if p.verdict == "yours"] == ["ATC_RAT_RLL_P"]
+    assert [p.name for p in found.parameters if p.verdict == "yours"] == ["ATC_HOVR_ROL_TRM"]
 
 
 def test_why_arming_is_refused(right: dict[str, float]) -> None:

@@ -24,6 +24,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "control check": ("check_controller",),
     "control decouple": ("decouple_axes",),
     "control design": ("design_controller",),
+    "control gains": ("autopilot_gains",),
     "control observability": ("observability",),
     "data fetch": ("fetch_dataset",),
     "data list": ("datasets",),

@@ -11,6 +11,7 @@ import pytest
 
 from conditioning_flights import hover, tracked
 from swashplate.errors import FlightError
+from swashplate.flights import consistency as consistency_module
 from swashplate.flights.conditioning.condition import condition, replay
 from swashplate.flights.consistency import consistency, refuse_inconsistent
 from swashplate.flights.flight import Flight, stream
@@ -159,3 +160,30 @@ def test_axes_that_move_together_are_not_exchanged(copied: bool, words: str) -> 
     told = [str(finding) for finding in consistency(flight)]
     assert bool(told) == bool(words), told
     assert all(text.startswith("p: ") and words in text for text in told)
+
+
+def fast_log(*, sign: float = 1.0) -> Flight:
+    """A minute at 1 kHz that turns round and round, shakes at 49 Hz, and pauses for half a second."""
+    time = np.arange(0.0, 60.0, 1e-3)
+    time = time[(time < 30.0) | (time > 30.5)]
+    turned = 2.0 * time + 0.5 * np.sin(1.7 * time)  # the heading passes its wrap many times
+    phi = 0.3 * np.sin(2.1 * time) + 0.1 * np.sin(5.0 * time)
+    shake = 3.0 * np.sin(2.0 * np.pi * 49.0 * time)
+    p = 0.63 * np.cos(2.1 * time) + 0.5 * np.cos(5.0 * time)
+    still = np.zeros_like(time)
+    psi = np.remainder(turned + np.pi, 2.0 * np.pi) - np.pi
+    turn = 2.0 + 0.85 * np.cos(1.7 * time)
+    rates = {"p": sign * p + shake, "q": turn * np.sin(phi), "r": turn * np.cos(phi) + shake}
+    return Flight({"imu": stream(time, {"phi": phi, "theta": still, "psi": psi, **rates})})
+
+
+def test_a_fast_log_is_averaged_down_and_judged_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows: list[int] = []
+    inner = consistency_module.quaternion_from_euler
+    monkeypatch.setattr(
+        consistency_module, "quaternion_from_euler", lambda table: rows.append(len(table)) or inner(table)
+    )
+    assert consistency(fast_log()) == ()
+    assert 60 * 50 < rows[0] + 60 < 60 * 100, "between 50 and 100 Hz of a minute"
+    (finding,) = consistency(fast_log(sign=-1.0))
+    assert (finding.channel, "other sign" in finding.text) == ("p", True)

@@ -11,7 +11,9 @@ import pytest
 import swashplate as sp
 from heli_autopilot import EKF_WAIT, Gains, HeliAutopilot
 from link_bench import QUICK, bench
-from swashplate.errors import LinkError
+from swashplate.api import link
+from swashplate.errors import ControllerError, LinkError
+from swashplate.links.ardupilot.gains import ardupilot_law, read_parameter_file
 from swashplate.links.ardupilot.parameters import parameter_file, parameters
 from swashplate.links.servos import servo_mapping
 
@@ -41,8 +43,11 @@ def changed(folder: Path, old: str, new: str) -> Path:
 
 
 @pytest.fixture(scope="module")
-def raptor() -> dict[str, float]:
-    return of("raptor50")
+def raptor(tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    """What `--write-parameters` writes, gains included."""
+    vehicle = sp.vehicle("raptor50")
+    file = tmp_path_factory.mktemp("parameters") / "raptor50.parm"
+    return read_parameter_file(sp.write_ardupilot_parameters(vehicle, file, trim=sp.trim(vehicle), name="raptor50"))
 
 
 def test_a_helicopter_takes_off_and_hovers_at_1200_frames_a_second(raptor: dict[str, float]) -> None:
@@ -97,14 +102,27 @@ def test_a_tail_that_would_turn_the_nose_left_is_reversed(raptor: dict[str, floa
     own = changed(tmp_path, "deg = [-10.0, 30.0]", "deg = [30.0, -10.0]")
     other = of("raptor50", own)
     assert (raptor["SERVO4_REVERSED"], other["SERVO4_REVERSED"]) == (0.0, 1.0)
-    assert other["ATC_RAT_YAW_P"] == raptor["ATC_RAT_YAW_P"]
+    vehicle = sp.vehicle("raptor50")
+    turned = ardupilot_law(servo_mapping(own, vehicle), vehicle, sp.trim(vehicle)).mixer
+    straight = ardupilot_law(servo_mapping("raptor50", vehicle), vehicle, sp.trim(vehicle)).mixer
+    assert turned == pytest.approx(straight), "behind the reversed output yaw turns the same way, by as much"
 
 
-def test_a_coaxial_has_flaps_and_motors_and_no_gains() -> None:
+def test_a_coaxial_has_flaps_and_motors() -> None:
     found = of("coax")
     assert found["FRAME_CLASS"] == 9, "CoaxCopter in ArduPilot's list (8: SingleCopter, 6: Heli, 9: CoaxCopter)"
     assert [found[f"SERVO{n}_FUNCTION"] for n in (1, 2, 5, 6)] == [33, 34, 37, 38]
-    assert not any(name.startswith("ATC_RAT") for name in found)
+
+
+def test_without_gains_that_hold_the_file_says_so_and_has_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_hold(*_: object, **__: object) -> None:
+        raise ControllerError("no gains of the roll and pitch loop hold: 0 of 1 sets keep their margins.")
+
+    monkeypatch.setattr(link, "cascade_gains", none_hold)
+    vehicle, said = sp.vehicle("coax"), list[str]()
+    file = link.write_ardupilot_parameters(vehicle, tmp_path / "x.parm", trim=sp.trim(vehicle), notice=said.append)
+    assert not any(name.startswith(("ATC_RAT", "PSC_")) for name in read_parameter_file(file))
+    assert "no gains" in said[0]
 
 
 def test_a_swashplate_that_ardupilot_has_no_number_for_is_refused(tmp_path: Path) -> None:

@@ -287,8 +287,8 @@ def test_wind_battery_and_noise_are_told() -> None:
         told = json.loads(windy.send(servo_packet(400, count, [*COAX_IDLE[:4], 1400, 1400])) or b"")
     assert told["battery"]["voltage"] == pytest.approx(11.5, abs=0.01)
     assert 0.05 < told["battery"]["current"] < 5.0
-    assert told["rpm_1"] > 1000.0
-    assert told["rpm_2"] > 1000.0
+    assert told["rpm"]["rpm_1"] > 1000.0
+    assert told["rpm"]["rpm_2"] > 1000.0
 
     def noisy(seed: int) -> np.ndarray:
         at = bench("raptor50", unit=InertialUnit(), seed=seed)

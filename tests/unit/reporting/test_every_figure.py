@@ -42,6 +42,10 @@ def _responses() -> Any:
     return sp.respond(_sweep(), inputs=["servo_roll", "servo_pitch"], outputs=["p", "q"])
 
 
+def _study() -> Any:
+    return sp.fit_tf(_responses(), input="servo_roll", outputs=["p"], form="0/1")
+
+
 def _linear() -> LinearModel:
     a, none = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.zeros((2, 1))
     trim = sp.trim(sp.vehicle("coax"))
@@ -65,11 +69,26 @@ MADE: dict[str, Callable[[], dict[str, Figure]]] = {
     "transfer function": lambda: figures_of(
         sp.fit_transfer_function(_responses(), "0/1", input="servo_roll", outputs=["p"])
     ),
+    "study of transfer functions": lambda: figures_of(_study()),
     "linear model": lambda: figures_of(_linear()),
     "trims": lambda: figures_of(trim_curve(sp.vehicle("coax"), (0.0,))),
     "fit and validation": lambda: {f.identifier: f for f in compose(fit(), validation(), modes=modes()).figures},
     "spectra": _spectra,
 }
+
+
+def test_what_an_identifying_verb_returns_stands_for_its_fit() -> None:
+    study, flown = _study(), _sweep()
+    assert "<img" in study._repr_html_()
+    assert study.model.to_control(pade=1).ninputs == 1
+    alone = sp.compare(study.fit, flown)
+    for found in (sp.compare(study, flown), sp.compare([study], flown)):
+        assert found.fits() == alone.fits()
+        assert list(found.fits()["p"]) == ["transfer functions"]
+    assert sp.residuals(study, flown).samples == sp.residuals(study.fit, flown).samples
+    assert sp.validate(study, flown).outputs == sp.validate(study.fit, flown).outputs
+    both = sp.compare({"one": study, "other": study.fit})
+    assert "one" in str(both)
 
 
 def nameless(drawn: Any) -> list[str]:

@@ -10,7 +10,8 @@ import pytest
 import swashplate as sp
 from heli_autopilot import EKF_WAIT, Gains, HeliAutopilot
 from link_bench import QUICK, bench
-from swashplate.links.ardupilot.parameters import parameters
+from swashplate.control.analysis.cascade_gains import cascade_gains
+from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law
 from swashplate.links.plant import Plant, Surroundings
 from swashplate.links.servos import servo_mapping
 from swashplate.models.card import packaged_cards
@@ -229,7 +230,11 @@ def test_a_helicopter_lives_on_the_ground_and_flies(name: str, rounds: int) -> N
 def written_gains(name: str) -> Gains:
     """Those of `--write-parameters`."""
     free = vehicle(name, rotor_speed="throttle")
-    found = parameters(servo_mapping(name, free), free, sp.trim(free))
+    hover = sp.trim(free)
+    late = dict.fromkeys(free.input_names, ASSUMED_DELAY)
+    found = cascade_gains(
+        free, hover, ardupilot_law(servo_mapping(name, free), free, hover), delays=late
+    ).law.parameters
     rows = {key: [found[f"ATC_RAT_{axis}_{key}"] for axis in ("RLL", "PIT", "YAW")] for key in ("FF", "P", "I")}
     angle = tuple(found[f"ATC_ANG_{axis}_P"] for axis in ("RLL", "PIT", "YAW"))
     kept = tuple(found[f"ATC_RAT_{axis}_ILMI"] for axis in ("RLL", "PIT"))

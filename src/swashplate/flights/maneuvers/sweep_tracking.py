@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from swashplate.arrays import Array, Complex
 
@@ -94,6 +93,8 @@ def course_of(time: Array, values: Array, ridge: Ridge) -> Course:
         time: uniform stamps [s], shape (n,). values: the signal without its mean, shape (n,).
         ridge: of the sweep in this signal.
     """
+    from scipy.ndimage import gaussian_filter1d  # slow to import, and looking for sweeps needs none of it
+
     inside = (time >= ridge.start) & (time <= ridge.stop)
     at, signal = time[inside], values[inside]
     octaves = gaussian_filter1d(np.log2(ridge.frequency), _SMOOTH, mode="nearest")
@@ -164,6 +165,8 @@ def _run_around(loud: NDArray[np.bool_], first: int, last: int) -> NDArray[np.in
 
 def _envelope(values: Array, phase: Array, cycles: float) -> Complex:
     """Half the complex amplitude of what follows a phase, smoothed over cycles, shape (n,)."""
+    from scipy.ndimage import gaussian_filter1d
+
     turns = (phase - phase[0]) / (2.0 * np.pi)
     width = np.maximum(np.gradient(turns), 1e-9)
     # Averages over bins of the cycle count, by differences of a running sum: nothing folds, however slow the sweep.

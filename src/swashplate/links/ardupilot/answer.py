@@ -2,7 +2,7 @@
 
 ArduPilot does not parse JSON but looks for each key from the front and reads what stands behind `":` (libraries/SITL/
 SIM_JSON.cpp). So there are no blanks, `velocity` stands before `velocity_wind`, the same keys come every time, and a
-line break stands before and behind.
+line break stands before and behind. Rotor speeds stand in a section `rpm`, as versions that read them want it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from swashplate.links.sensing import Readings
 _FORM = (
     '\n{"timestamp":%.9f,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},"position":[%.9g,%.9g,%.9g],'
     '"attitude":[%.9g,%.9g,%.9g],"velocity":[%.9g,%.9g,%.9g],"rng_1":%.6g,"airspeed":%.6g,'
-    '"velocity_wind":[%.6g,%.6g,%.6g],"windvane":{"direction":%.6g,"speed":%.6g},"rpm_1":%.6g,"rpm_2":%.6g'
+    '"velocity_wind":[%.6g,%.6g,%.6g],"windvane":{"direction":%.6g,"speed":%.6g},"rpm":{"rpm_1":%.6g,"rpm_2":%.6g}'
 )
 _BATTERY = ',"battery":{"voltage":%.6g,"current":%.6g}'
 

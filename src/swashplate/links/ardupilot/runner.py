@@ -5,18 +5,25 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 from swashplate.links.ardupilot.packets import LONGEST
-from swashplate.links.ardupilot.session import ArduPilotSession
 
 PORT = 9002
 _LOOK_UP = 0.2
 """s between looks at whether to go on."""
 
 
+class Answering(Protocol):
+    """What answers datagrams: a session."""
+
+    def handle(self, data: bytes, sender: tuple[str, int], now: float) -> bytes | None:
+        """The answer, or None where there is none."""
+
+
 def serve(
     bound: socket.socket,
-    session: ArduPilotSession,
+    session: Answering,
     *,
     idle_exit: float | None = None,
     go_on: Callable[[], bool] = lambda: True,

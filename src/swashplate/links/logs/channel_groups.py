@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, VELOCITY, channel, is_known
 
@@ -37,14 +38,18 @@ def shown_unit(flight: Flight, name: str) -> tuple[str, float]:
     return known.shown_unit or str(flight[name].attrs.get("units", "")), known.shown_factor
 
 
+def _rate(stamps: Array) -> float:
+    return 1.0 / float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
+
+
 def groups(flight: Flight) -> list[dict[str, Any]]:
     """Groups with their channels, as the page lists them; a group without a channel is left out."""
     made: dict[str, list[dict[str, Any]]] = {title: [] for title in (*(title for title, _ in _GROUPS), OTHER)}
+    rates = {home: round(_rate(data["time"].values), 1) for home, data in flight.streams.items()}
     for name in flight.channels:
         unit, _ = shown_unit(flight, name)
-        stamps = flight.time(name)
-        rate = 1.0 / float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
-        about = channel(name).description
-        entry = {"name": name, "unit": unit, "rate": round(rate, 1), "samples": int(stamps.size), "about": about}
+        about, samples = channel(name).description, int(flight.time(name).size)
+        rate = rates[flight.stream_of(name)]
+        entry = {"name": name, "unit": unit, "rate": rate, "samples": samples, "about": about}
         made[group_of(name)].append(entry)
     return [{"title": title, "channels": channels} for title, channels in made.items() if channels]

@@ -14,7 +14,7 @@ from swashplate.links.logs import code_lines
 from swashplate.links.logs.bins import trace
 from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.identify_sweep import Identified, Tell, identify_sweep
-from swashplate.links.logs.job import Study
+from swashplate.links.logs.job import PageJob
 from swashplate.links.logs.opened import READY, Opened
 from swashplate.links.logs.remedies import Remedy
 from swashplate.links.logs.sweep_channels import channels_of
@@ -37,7 +37,7 @@ class Desk:
         self._lock = threading.Lock()
         self._logs: dict[int, Opened] = {}
         self.uploads = Uploads()
-        self.job = Study()
+        self.job = PageJob()
         for path, read in given:
             self._put(path, read)
 
@@ -161,7 +161,9 @@ class Desk:
         """
         opened = self.log(number)
         flight, found = opened.ready, opened.inspection
-        if found is None or not sweep < len(found.sweeps):
+        if found is None:
+            raise SwashError("is still being checked.", where=opened.read.file, hint="Wait until its findings stand.")
+        if not sweep < len(found.sweeps):
             raise SwashError(f"has no sweep {sweep + 1}.", where=opened.read.file)
         chosen = channels_of(flight, found.sweeps[sweep], input=input, output=output)
         with self._lock:

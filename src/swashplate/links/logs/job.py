@@ -22,7 +22,7 @@ class _StoppedError(Exception):
     """The work was asked to end."""
 
 
-class Study:
+class PageJob:
     """The work of a page: one job at a time, the last one's result kept."""
 
     def __init__(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,11 @@ from swashplate.links.logs.code_lines import Read, inspected
 from swashplate.links.logs.remedies import remedy
 
 READING, READY, FAILED = "reading", "ready", "failed"
+CHECKING = "check of a log"
+"""Name of the thread that inspects."""
+_LOG = logging.getLogger("swashplate.open")
+_PATIENCE = 1.0
+"""Seconds: a log that is checked as quickly appears with its findings, a longer one is drawn before."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,8 @@ class Opened:
         path: where it lies here.
         read: how it is read, under the name that the user gave it.
         state: "reading", "ready" or "failed".
-        flight, inspection: where it is ready.
+        flight: where it is ready.
+        inspection: where it is checked too, which on a long log takes longer than reading.
         problem, hint: where it failed.
         version: counts readings, so that a page sees that it was read anew.
     """
@@ -56,11 +64,13 @@ class Opened:
     hint: str = ""
     version: int = 0
     _channels: dict[str, DrawnChannel] = field(default_factory=dict, repr=False)
+    _groups: list[dict[str, Any]] = field(default_factory=list, repr=False)
+    _gaps: dict[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
     def load(self, read: Read) -> None:
-        """Read the log; what cannot be read is said in `problem`, never raised."""
+        """Read the log, then check it in a thread; what cannot be read is said in `problem`, never raised."""
         self.read, self.state = read, READING
-        flight = inspection = None
+        flight = None
         problem = hint = ""
         try:
             flight = read_log(
@@ -72,16 +82,34 @@ class Opened:
             )
             if not flight.channels:
                 raise FlightError("holds no channel that is known.", where=read.file)
-            inspection = inspect(flight)
         except SwashError as error:
-            place = f"{error.channel}: " if error.channel else ""
-            problem, hint = f"{place}{error.problem}", error.hint or ""
+            problem, hint = _told(error)
         except (OSError, MemoryError) as error:
             problem = f"cannot be read: {error or 'it does not fit into memory'}."
-        self.flight, self.inspection, self.problem, self.hint = flight, inspection, problem, hint
-        self._channels = {}
+        self.flight, self.inspection, self.problem, self.hint = flight, None, problem, hint
+        self._channels, self._gaps = {}, {}
+        self._groups = [] if flight is None else groups(flight)
         self.version += 1
-        self.state = FAILED if problem else READY
+        self.state = FAILED if problem or flight is None else READY
+        if self.state == READY and flight is not None:
+            checking = threading.Thread(target=self._check, args=(flight,), name=CHECKING, daemon=True)
+            checking.start()
+            checking.join(_PATIENCE)
+
+    def _check(self, flight: Flight) -> None:
+        """Inspect what was read, unless it has been read anew meanwhile."""
+        inspection, problem, hint = None, "", ""
+        try:
+            inspection = inspect(flight)
+        except SwashError as error:
+            problem, hint = _told(error)
+        except Exception as error:  # a thread's end is heard by nobody else
+            _LOG.error("A check failed: %s: %s", type(error).__name__, error)
+            problem = f"could not be checked ({type(error).__name__}: {error})."
+        if self.flight is flight:
+            self.inspection, self.problem, self.hint = inspection, problem, hint
+            if problem:
+                self.state = FAILED
 
     @property
     def ready(self) -> Flight:
@@ -103,8 +131,11 @@ class Opened:
         if name not in self._channels:
             flight = self.ready
             unit, factor = shown_unit(flight, name)
-            time, values = flight.time(name), flight.values(name)
-            self._channels[name] = DrawnChannel(time, values if factor == 1.0 else values * factor, unit, gaps(time))
+            time, values, home = flight.time(name), flight.values(name), flight.stream_of(name)
+            if home not in self._gaps:
+                self._gaps[home] = gaps(time)
+            shown = values if factor == 1.0 else values * factor
+            self._channels[name] = DrawnChannel(time, shown, unit, self._gaps[home])
         return self._channels[name]
 
     def as_dict(self) -> dict[str, Any]:
@@ -115,14 +146,13 @@ class Opened:
             mend = remedy(self.hint)
             told = {"problem": self.problem, "hint": self.hint, "remedy": mend and mend.as_dict()}
             return {**head, **told, "code": code}
-        if self.flight is None or self.inspection is None or self.state == READING:
+        if self.flight is None or self.state == READING:
             return head
         return {**head, **self._content, "code": code}
 
     @property
     def _content(self) -> dict[str, Any]:
         flight, found = self.ready, self.inspection
-        assert found is not None
         origin = flight.provenance
         changes = [e for e in origin.events if e.kind == "parameter"]
         return {
@@ -133,10 +163,11 @@ class Opened:
             "reader": origin.reader,
             "simulated": origin.simulated,
             "options": self.read.options.words,
-            "groups": groups(flight),
-            "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(found.sweeps)],
-            "problems": [_with_remedy(text) for text in found.problems],
-            "notes": list(found.notes),
+            "groups": self._groups,
+            "checked": found is not None,
+            "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(found.sweeps if found else ())],
+            "problems": [_with_remedy(text) for text in (found.problems if found else ())],
+            "notes": list(found.notes if found else origin.notes),
             "modes": _modes(flight),
             "events": [
                 {"time": e.time, "kind": e.kind, "text": e.text} for e in origin.events if e.kind != "parameter"
@@ -144,6 +175,11 @@ class Opened:
             "changes": [{"time": e.time, **_change(flight, e.time, dict(e.details))} for e in changes],
             "parameters": [[name, value] for name, value in sorted(origin.parameters.items())],
         }
+
+
+def _told(error: SwashError) -> tuple[str, str]:
+    """What went wrong, and the hint."""
+    return f"{f'{error.channel}: ' if error.channel else ''}{error.problem}", error.hint or ""
 
 
 def _with_remedy(text: str) -> dict[str, Any]:

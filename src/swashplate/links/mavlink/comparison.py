@@ -10,7 +10,7 @@ from typing import Literal
 from swashplate.links.mavlink.parameter_reading import ParameterReading
 
 Verdict = Literal["right", "wrong", "yours", "absent", "not read"]
-_YOURS = ("ATC_", "H_RSC_SETPOINT", "H_RSC_RAMP_TIME", "H_RSC_RUNUP_TIME", "RC8_OPTION", "RNGFND1_TYPE")
+_YOURS = ("ATC_", "H_RSC_SETPOINT", "H_RSC_RAMP_TIME", "H_RSC_RUNUP_TIME", "RC8_OPTION", "RNGFND1_TYPE", "RPM1_TYPE")
 """Starts of names that a user tunes: another value is told, and is no fault."""
 _DIGITS = 1e-5
 """Relative distance of two numbers that were written with six digits."""

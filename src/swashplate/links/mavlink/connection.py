@@ -25,7 +25,7 @@ class Connection:
         timeout: of the connecting [s].
 
     Attributes:
-        dialect: pymavlink's module of messages.
+        dialect: pymavlink's module of messages: the common ones and ArduPilot's own.
         system: number of the autopilot that is spoken to; None until it is known.
 
     Raises:
@@ -34,7 +34,7 @@ class Connection:
     """
 
     def __init__(self, address: str, *, timeout: float) -> None:
-        self.dialect: Any = library("pymavlink.dialects.v20.common", what="a check over MAVLink")
+        self.dialect: Any = library("pymavlink.dialects.v20.ardupilotmega", what="a check over MAVLink")
         self.address = address
         self.system: int | None = None
         self._writer: Any = self.dialect.MAVLink(None, srcSystem=255, srcComponent=190)

@@ -20,6 +20,8 @@ _SYS_STATUS, _SYSTEM_TIME = 1, 2
 _INTERVAL = 200_000.0
 """us between the messages that are asked for."""
 _PREARM_CHECK = 1 << 28
+_PLACE, _ASSUMED = 1 << 4, 1 << 7
+"""EKF_POS_HORIZ_ABS and EKF_CONST_POS_MODE: a place is known; it is only assumed."""
 _SENSORS = {
     0: "gyro", 1: "accelerometer", 2: "magnetometer", 3: "barometer", 4: "airspeed sensor", 5: "GPS",
     15: "motor outputs", 16: "RC receiver", 17: "second gyro", 18: "second accelerometer", 19: "second magnetometer",
@@ -34,17 +36,21 @@ class Health:
     """What was heard of an autopilot's readiness.
 
     Attributes:
+        texts: everything that it said, in order.
         refusals: why it cannot be armed, in its own words, each once.
         sick: names of sensors that are enabled and not healthy.
         ready: whether its checks passed; None where it never said.
+        placed: whether its EKF has a place on earth (EKF_STATUS_REPORT); None where it never said.
         armed: whether it is armed.
         restarted: whether its clock fell back.
         clock: pairs of wall clock and time since boot [s].
     """
 
+    texts: list[str] = field(default_factory=list)
     refusals: list[str] = field(default_factory=list)
     sick: tuple[str, ...] = ()
     ready: bool | None = None
+    placed: bool | None = None
     armed: bool = False
     restarted: bool = False
     clock: list[tuple[float, float]] = field(default_factory=list)
@@ -59,6 +65,8 @@ class Health:
             self._status(message)
         elif kind == "HEARTBEAT":
             self.armed = bool(message.base_mode & 128)
+        elif kind == "EKF_STATUS_REPORT":
+            self.placed = message.flags & (_PLACE | _ASSUMED) == _PLACE
         elif kind == "SYSTEM_TIME":
             boot = 1e-3 * message.time_boot_ms
             if self.clock and boot < self.clock[-1][1]:
@@ -87,6 +95,7 @@ class Health:
             ) + text
             if len(message.text) == 50:
                 return
+        self.texts.append(text)
         if text.lower().startswith(REFUSALS) and text not in self.refusals:
             self.refusals.append(text)
 

@@ -115,6 +115,10 @@ class Mavlink:
         )
         return bytes(message.pack(self._writer))
 
+    def rotor(self, r: Readings) -> bytes:
+        """RAW_RPM of the main or lower rotor. PX4 takes it into its topic `rpm` whatever the index, so one is sent."""
+        return bytes(self._writer.raw_rpm_encode(0, r.rotors[0]).pack(self._writer))
+
 
 def pulses(controls: Sequence[float], shares: Sequence[int]) -> list[float]:
     """Controls as the pulses [us] that a servo mapping speaks of; what is no number drives nothing.

@@ -82,5 +82,5 @@ class Px4Session:
         if frame % _GPS_EVERY == 0:
             sent += self._mavlink.position(readings)
         if frame % _TRUTH_EVERY == 0:
-            sent += self._mavlink.truth(readings)
+            sent += self._mavlink.truth(readings) + self._mavlink.rotor(readings)
         return sent

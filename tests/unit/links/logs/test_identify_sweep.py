@@ -23,7 +23,7 @@ from swashplate.links.logs.code_lines import Read
 from swashplate.links.logs.desk import Desk
 from swashplate.links.logs.hold_out import hold_out
 from swashplate.links.logs.identify_sweep import Identified
-from swashplate.links.logs.job import Study
+from swashplate.links.logs.job import PageJob
 from swashplate.links.logs.sweep_channels import channels_of
 from swashplate.models.linear.transfer_function import Form
 
@@ -156,7 +156,7 @@ def test_channels_follow_from_the_axis(
         channels_of(flight, sweep, input="nosuch")
 
 
-def until(job: Study, state: str) -> dict[str, Any]:
+def until(job: PageJob, state: str) -> dict[str, Any]:
     for _ in range(400):
         told = job.as_dict()
         if told["state"] == state:
@@ -166,7 +166,7 @@ def until(job: Study, state: str) -> dict[str, Any]:
 
 
 def test_work_is_stopped_and_nothing_of_it_is_kept(tmp_path: Path) -> None:
-    job, ended = Study(), []
+    job, ended = PageJob(), []
 
     def endless(_: Path, tell: Any) -> Identified:
         try:
@@ -200,7 +200,7 @@ def test_work_is_stopped_and_nothing_of_it_is_kept(tmp_path: Path) -> None:
     ],
 )
 def test_what_fails_is_told_in_words(error: Exception, words: str) -> None:
-    job = Study()
+    job = PageJob()
 
     def broken(*_: Any) -> Identified:
         raise error

@@ -57,3 +57,13 @@ def test_a_linearised_vehicle_has_the_delays_of_its_card() -> None:
     assert found.delays == dict.fromkeys(coax.input_names, 0.05)
     late, plain = found.to_control(pade=3), found.to_control(pade=0)
     np.testing.assert_allclose(late(2j), plain(2j) * np.exp(-0.1j), rtol=1e-7, atol=1e-12)
+
+
+def test_a_vehicle_is_its_structure_or_its_hover() -> None:
+    linear = sp.vehicle("thirteen_state")
+    assert linear.structure is not None
+    made, own = linear.to_control(pade=2), linear.structure.to_control(pade=2)
+    np.testing.assert_array_equal(made.A, own.A)
+    assert made.input_labels == list(linear.input_names)
+    nonlinear = sp.vehicle("coax")
+    np.testing.assert_array_equal(nonlinear.to_control(pade=0).A, sp.linearize(nonlinear).A)

@@ -23,6 +23,7 @@ function about(log) {
   if (log.state === "reading") return [title, make("p", { class: "soft" }, "It is being read …")];
   if (log.state === "failed")
     return [title, make("ul", { class: "cards" }, make("li", { role: "alert" }, make("b", {}, "It cannot be read: "), log.problem, make("div", { class: "soft" }, log.hint), button(log, log.remedy)))];
+  if (!log.checked) return [title, make("p", { class: "soft" }, "It is being checked: gaps, jumps, signs, units and sweeps. Look at the plots meanwhile …")];
   const problems = log.problems.length
     ? log.problems.map((problem) => make("li", {}, problem.text, button(log, problem.remedy)))
     : [make("li", { class: "fine" }, "Nothing was found wrong: no gaps, no jumps, and the channels do not contradict each other.")];

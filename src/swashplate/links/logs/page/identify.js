@@ -8,6 +8,7 @@ import { channels, on, ready } from "./state.js";
 import { attempt } from "./trouble.js";
 import { view } from "./views.js";
 
+const NO_SWEEP = "No sweep was found. A sweep is a command whose frequency rises steadily; swash maneuver designs one.";
 let last = null, running = false, chosen = null;
 
 export const begin_with = attempt(async (log, sweep, input = "", output = "") => {
@@ -52,7 +53,9 @@ function list() {
   const rows = ready().flatMap((log) => log.sweeps.map((sweep) =>
     make("li", { class: "fine" }, make("b", {}, label(sweep)), make("div", { class: "soft" }, `${ready().length > 1 ? `${log.name}, ` : ""}${sweep.words.split(": ").slice(1).join(": ")}`),
       make("button", { class: "first", "data-identify": `${log.id} ${sweep.number}`, disabled: last?.state === "running", onclick: () => begin_with(log, sweep) }, "Identify this"))));
-  return rows.length ? make("ul", { class: "cards" }, ...rows) : make("p", { class: "soft" }, "No sweep was found. A sweep is a command whose frequency rises steadily; swash maneuver designs one.");
+  if (rows.length) return make("ul", { class: "cards" }, ...rows);
+  const waiting = ready().some((log) => !log.checked);
+  return make("p", { class: "soft" }, waiting ? "Sweeps are being looked for …" : NO_SWEEP);
 }
 
 // Other channels than those that the sweep's axis names.
@@ -95,4 +98,9 @@ export function begin() {
   on("logs", show);
   on("view", (name) => name === "identify" && show());
   on("theme", show);
+  let width = innerWidth; // a telephone that is turned; its height changes with every scroll
+  addEventListener("resize", () => {
+    if (width !== innerWidth) show();
+    width = innerWidth;
+  });
 }

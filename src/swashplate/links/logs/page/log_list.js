@@ -34,7 +34,7 @@ function clock(log) {
 function facts(log) {
   if (log.state === "reading") return make("small", {}, "reading …");
   if (log.state === "failed") return make("small", { class: "failed" }, log.problem);
-  const words = [`${(log.stop - log.start).toFixed(1)} s`, log.vehicle, log.reader, log.simulated ? "simulated" : "", log.options];
+  const words = [log.checked ? "" : "being checked …", `${(log.stop - log.start).toFixed(1)} s`, log.vehicle, log.reader, log.simulated ? "simulated" : "", log.options];
   return make("small", {}, words.filter(Boolean).join(" · "));
 }
 
@@ -67,13 +67,13 @@ function place(log) {
 export const refresh = attempt(async () => {
   clearTimeout(timer);
   const told = await get("/logs");
-  const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state]));
+  const before = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked]));
   logs.clear();
   for (const log of told.logs) logs.set(log.id, log);
   for (const log of ready()) place(log);
   $("largest").textContent = Math.floor(told.largest / 1e6);
-  if (told.logs.some((log) => log.state === "reading")) timer = setTimeout(refresh, 400);
-  const now = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state]));
+  if (told.logs.some((log) => log.state === "reading" || log.checked === false)) timer = setTimeout(refresh, 400);
+  const now = JSON.stringify([...logs.values()].map((log) => [log.id, log.version, log.state, log.checked]));
   show();
   if (now !== before) say("logs");
   if (ready().length > 1) {

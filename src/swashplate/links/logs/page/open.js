@@ -22,6 +22,7 @@ let known = "";
 
 // What is drawn of a log that has just come: rates, attitude and commands where it has them, else its first channels.
 function greet() {
+  views.count();
   const now = [...state.logs.values()].map((log) => `${log.id}:${log.version}:${log.state}`).join(" ");
   if (now === known) return;
   const grown = state.ready().length && (known === "" || !state.charts.length);
@@ -37,7 +38,6 @@ function greet() {
     }
     if (!state.charts.length) for (const name of [...there.keys()].slice(0, 3)) state.draw(name, true);
   }
-  views.count();
   [state.seen.low, state.seen.high] = state.whole();
   state.say("charts");
 }

@@ -9,9 +9,10 @@ from typing import ClassVar
 from swashplate import atomic
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 
 
-class Study:
+class ReportFolder(Shown):
     """A result with a report and files of its own.
 
     Attributes:

@@ -1,0 +1,307 @@
+"""The verb `accept_autopilot`: a SITL binary of ArduPilot started, flown and judged with a vehicle."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import socket
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.api.acceptance import Acceptance
+from swashplate.api.link import link_engine, mapping_of
+from swashplate.api.saying import Say, silent
+from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
+from swashplate.arrays import Array, Complex
+from swashplate.atomic import write_text
+from swashplate.errors import LinkError, SwashError
+from swashplate.extras import library
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
+from swashplate.flights.readers.read import read
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, hover_stick, mixed, mixer_response
+from swashplate.links.ardupilot.parameters import Parameters, as_written, parameter_file, parameters
+from swashplate.links.ardupilot.runner import serve
+from swashplate.links.ardupilot.session import ArduPilotSession
+from swashplate.links.ardupilot.sitl import Sitl
+from swashplate.links.ardupilot.trial import Background, Piloted, Trial, TrialEndedError, TrialLine, TrialPlan
+from swashplate.links.ardupilot.trial_parameters import trial_parameters
+from swashplate.links.ardupilot.trial_pilot import TrialPilot
+from swashplate.links.mavlink.commanding import Commanding
+from swashplate.links.mavlink.comparison import compared, rate_problems
+from swashplate.links.mavlink.connection import Connection
+from swashplate.links.mavlink.greeting import ARDUPILOT, greet
+from swashplate.links.mavlink.parameter_reading import ParameterReading, ask_by_name, read_parameters
+from swashplate.links.notices import Notices
+from swashplate.links.plant import Plant, Surroundings
+from swashplate.links.sensing import Sensing
+from swashplate.links.sockets import listen_udp
+from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.environment import Environment
+from swashplate.simulation.linearize import LinearModel, linearize
+from swashplate.simulation.standing import airborne, standing
+from swashplate.simulation.trim import trim
+
+OLDEST = (4, 5)
+"""ArduCopter whose parameters these are."""
+_RATE = 100.0
+"""Hz of the records: what the System ID mode logs by default."""
+_LOOP = 400.0
+"""Hz of ArduCopter's loops, where it does not say."""
+_GENTLE: Mapping[str, tuple[float, float]] = {"p": (0.4, 0.1), "q": (0.4, 0.1), "r": (0.6, 0.3), "az": (2.5, 0.7)}
+"""Most rate [rad/s] and angle [rad] that a sweep may make, or acceleration [m/s^2] and speed [m/s]."""
+_MOST = 0.2
+"""Of a mixer's command."""
+
+
+def accept_autopilot(
+    vehicle: Vehicle,
+    binary: str | Path,
+    *,
+    out: str | Path,
+    name: str | None = None,
+    servos: str | Path | None = None,
+    truth: Vehicle | None = None,
+    axes: Sequence[str] = tuple(MIXER_AXES),
+    band: tuple[float, float] = (0.4, 8.0),
+    seconds: float = 40.0,
+    hover: float = 10.0,
+    height: float = 5.0,
+    ekf: float = 120.0,
+    defaults: Sequence[str | Path] = (),
+    environment: Environment | None = None,
+    instance: int = 0,
+    speedup: float = 10.0,
+    timeout: float = 60.0,
+    say: Say = silent,
+) -> Acceptance:
+    """Start a SITL binary with a vehicle's files, fly it by itself, and put truth beside what its log says.
+
+    Cold start, wait for the EKF, arming, hover in STABILIZE, ALT_HOLD and LOITER, a sweep of each axis in System ID
+    mode, landing; then the log through `respond`, `fit_tf` and `fit_ss`. Whatever happens, the binary is ended.
+
+    Args:
+        vehicle: in free flight; what flies.
+        binary: of ArduCopter for SITL (`arducopter-heli`).
+        out: folder where it runs and where its log stays; its `sitl` must not be there yet.
+        name, servos: as of `link_ardupilot`.
+        truth: whose linearisation the estimates are held against; the vehicle's own where None.
+        axes: that are swept, of roll, pitch, yaw and heave.
+        band: of the sweeps [Hz]. seconds: of each. hover: in each mode [s].
+        height: of the hover [m].
+        ekf: simulated time that the autopilot has until it can be armed [s].
+        defaults: parameter files of yours, read last.
+        environment: wind and air.
+        instance: of SITL; each has ports of its own. speedup: most simulated seconds a second.
+        timeout: wall clock until the binary has opened its port and says who it is [s].
+        say: told what is being done.
+
+    Raises:
+        SwashError: a binary that is missing, cannot be run, ends at once or is no ArduCopter of version 4.5 or later;
+            a port that is taken; a vehicle whose frame is not known here; pymavlink missing. What goes wrong later is a
+            line of the result that fails.
+    """
+    if unknown := [axis for axis in axes if axis not in MIXER_AXES]:
+        raise SwashError(f"'{unknown[0]}' is none of {', '.join(MIXER_AXES)}.", channel="axes")
+    library("pymavlink.dialects.v20.ardupilotmega", what="a trial over MAVLink")
+    folder = Path(out) / "sitl"
+    if folder.exists():
+        raise SwashError("is there already.", where=folder, channel="--out", hint="Give another folder, or remove it.")
+    # What can be refused is refused before anything is compiled.
+    files = ["trial.parm", "vehicle.parm", *(f"yours-{k + 1}.parm" for k in range(len(defaults)))]
+    for file in defaults:
+        if not Path(file).is_file():
+            raise SwashError("there is no such file.", where=file, channel="--defaults")
+    sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup)
+    listen_udp("127.0.0.1", sitl.physics_port).close()
+    called, around = name or vehicle.card.called, environment_of(vehicle, environment)
+    aircraft, flying = standing(vehicle), airborne(vehicle)
+    mapping = mapping_of(aircraft, servos, name=name, suffix="")
+    say("trimming and linearising the vehicle")
+    level = trim(flying, environment=environment)
+    model = linearize(flying, level)
+    other = model if truth is None else _linear(airborne(truth), environment)
+    moves, expected = mixed(mapping, model), parameters(mapping, flying, level)
+    chirps = {axis: _chirp(model, moves[axis], axis, band, seconds, float(around.gravity)) for axis in axes}
+    first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
+    with listen_udp("127.0.0.1", sitl.physics_port) as bound:
+        say("compiling the vehicle")
+        plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
+        plant.prepare()
+        session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
+        _write_files(folder, files, expected, first, defaults, called)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
+            pilot = TrialPilot(
+                lambda pulses: radio.sendto(pulses, ("127.0.0.1", sitl.rc_port)),
+                heave=_heave(model, moves["heave"]),
+                hover_stick=hover_stick(mapping, model),
+                depth=plant.standing_depth,
+            )
+            run_up = float(expected.get("H_RSC_RUNUP_TIME", -1.0)) + 1.0
+            plan = TrialPlan(chirps, run_up, height=height, hover=hover, ekf=ekf)
+            piloted = Piloted(session, pilot)
+            with Background(lambda go_on: serve(bound, piloted, go_on=go_on)) as physics, sitl:
+                lines, version, flown, speed, loop = _flown(
+                    sitl, session, pilot, plan, expected, timeout=timeout, say=say, physics=physics
+                )
+    say("reading the log")
+    logs = sitl.logs()
+    found: TruthBeside | None = None
+    if flown:
+
+        def true(axis: str, output: str, omega: Array) -> Complex:
+            late, gravity = 0.5 / loop, float(around.gravity)
+            return mixer_response(other, mixed(mapping, other)[axis], output, omega, late=late, gravity=gravity)
+
+        found = _judged(logs, {axis: chirps[axis] for axis in flown}, true, pilot, lines)
+    log = logs[-1] if logs else None
+    return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), found, log, folder, speed)
+
+
+def _chirp(
+    model: LinearModel, moved: Array, axis: str, band: tuple[float, float], seconds: float, gravity: float
+) -> Chirp:
+    """The largest sweep that stays gentle, by the linear model."""
+    a = MIXER_AXES[axis]
+    omega = 2.0 * np.pi * np.geomspace(*band, 60)
+    answer = np.abs(mixer_response(model, moved, a.output, omega, late=0.0, gravity=gravity))
+    quick, far = _GENTLE[a.output]
+    most = min(_MOST, quick / float(answer.max()), far / float((answer / omega).max()))
+    return Chirp.planned(a.number, float(f"{most:.2g}"), band, record=seconds, fade=1.0)
+
+
+def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
+    return linearize(vehicle, trim(vehicle, environment=environment))
+
+
+def _heave(model: LinearModel, moved: Array) -> float:
+    return float((model.B @ moved)[model.states.index("w")])
+
+
+def _write_files(
+    folder: Path, files: Sequence[str], expected: Parameters, chirp: Chirp, yours: Sequence[str | Path], title: str
+) -> None:
+    folder.mkdir(parents=True)
+    trial = trial_parameters(expected, chirp)
+    lines = "".join(f"{key},{value:.6g}\n" for key, value in trial.items())
+    write_text(folder / files[0], f"# what swash link accept needs beside the vehicle's own\n{lines}")
+    write_text(folder / files[1], parameter_file(expected, title=title))
+    for place, file in zip(files[2:], yours, strict=True):
+        shutil.copyfile(file, folder / place)
+
+
+def _flown(
+    sitl: Sitl,
+    session: ArduPilotSession,
+    pilot: TrialPilot,
+    plan: TrialPlan,
+    expected: Parameters,
+    *,
+    timeout: float,
+    say: Say,
+    physics: Background,
+) -> tuple[list[TrialLine], str, list[str], float, float]:
+    """Lines, version, axes flown, simulated seconds a second, and the loop rate [Hz].
+
+    Raises:
+        LinkError: who answers is no ArduCopter that can be tried, or nobody does.
+    """
+    say("starting the binary")
+    sitl.wait_for_port(timeout)
+    with Connection(f"tcp:127.0.0.1:{sitl.mavlink_port}", timeout=timeout) as connection:
+        autopilot = Commanding(connection)
+        trial = Trial(session, pilot, autopilot, sitl, plan)
+        version, loop, begun = "version not known", _LOOP, time.monotonic()
+        try:
+            try:
+                kind = greet(connection, ARDUPILOT, timeout)
+                version = _version(autopilot, timeout, sitl)
+                say("reading the parameters back")
+                reading = read_parameters(connection, packed=False)
+                ask_by_name(connection, reading, expected, packed=False)
+            except LinkError as error:
+                if told := sitl.ended(patience=2.0):
+                    raise LinkError(told, where=sitl.binary, hint=f"All it printed is in {sitl.output}.") from None
+                raise error
+            said = f"{version}, MAVLink type {kind}"
+            trial.lines.append(TrialLine("binary", said, f"ArduCopter {_dotted(OLDEST)} or later", True))
+            loop = reading.values.get("SCHED_LOOP_RATE", _LOOP)
+            pilot.lean_max = _lean_max(reading)
+            if _parameters_right(reading, expected, trial.lines):
+                trial.fly(say)
+        except TrialEndedError as error:
+            trial.lines.append(TrialLine("flight", str(error), "to its end", False))
+        if physics.failed:
+            trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
+        wall = time.monotonic() - begun
+    return trial.lines, version, trial.flown, session.plant.time / max(wall, 1e-9), loop
+
+
+def _dotted(numbers: Sequence[int]) -> str:
+    return ".".join(map(str, numbers))
+
+
+def _version(autopilot: Commanding, timeout: float, sitl: Sitl) -> str:
+    until = asked = time.monotonic()
+    until += timeout
+    while autopilot.version is None and time.monotonic() < until and not sitl.ended():
+        if time.monotonic() >= asked:
+            autopilot.ask_version()
+            asked += 0.5
+        autopilot.hear(0.1)
+    if autopilot.version is None:
+        raise LinkError("does not say which version it is.", where=sitl.binary)
+    if autopilot.version[:2] < OLDEST:
+        raise LinkError(
+            f"is version {_dotted(autopilot.version)}, expected {_dotted(OLDEST)} or later.", where=sitl.binary
+        )
+    return f"version {_dotted(autopilot.version)}"
+
+
+def _lean_max(reading: ParameterReading) -> float:
+    """Lean at a full stick [rad]: ANGLE_MAX in hundredths of a degree, ATC_ANGLE_MAX of Copter 4.7 in degrees."""
+    values = reading.values
+    degrees = values["ANGLE_MAX"] / 100.0 if "ANGLE_MAX" in values else values.get("ATC_ANGLE_MAX", 30.0)
+    return math.radians(degrees)
+
+
+def _parameters_right(reading: ParameterReading, expected: Parameters, lines: list[TrialLine]) -> bool:
+    rows = compared(as_written(expected), reading)
+    bad = [row.problem for row in rows if row.problem] + rate_problems(reading.values)
+    if not reading.complete:
+        bad.append(f"{len(reading.missing)} of {reading.count} never came")
+    words = " ".join(bad) or f"{len(rows)} as the vehicle needs them"
+    lines.append(TrialLine("parameters read back", words, "as the vehicle needs them", not bad))
+    return not bad
+
+
+def _judged(
+    logs: Sequence[Path], flown: Mapping[str, Chirp], true: Truth, pilot: TrialPilot, lines: list[TrialLine]
+) -> TruthBeside | None:
+    """The estimates of the newest log; lines are added for the log and for each of them."""
+    if not logs:
+        lines.append(TrialLine("log", "none was written", "one in logs/", False))
+        return None
+    try:
+        flight = read(logs[-1])
+        damage = "; ".join(flight.provenance.damage)
+        lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
+        lines.append(_rotor_line(flight, pilot))
+        found = beside_truth(flight, flown, true, rate=_RATE)
+    except SwashError as error:
+        lines.append(TrialLine("log", str(error), "read", False))
+        return None
+    lines += found.lines
+    return found
+
+
+def _rotor_line(flight: Flight, pilot: TrialPilot) -> TrialLine:
+    """The rotor speed that the log has, beside the true one; told, not judged: not every version reads it."""
+    true = float(np.max([seen.rotor for seen in pilot.seen])) * 30.0 / math.pi
+    logged = float(np.max(flight.values("omega_rotor"))) * 30.0 / math.pi if "omega_rotor" in flight else 0.0
+    found = f"{logged:.0f} rpm" if logged else "none: this version reads no rpm, or RPM1_TYPE is not 10"
+    return TrialLine("rotor speed in the log, largest", found, f"{true:.0f} rpm")

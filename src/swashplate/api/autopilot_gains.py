@@ -1,0 +1,270 @@
+"""The verb `autopilot_gains`: gains of a whole autopilot from a vehicle's model, judged and flown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from swashplate.api.link import mapping_of
+from swashplate.atomic import write_text
+from swashplate.control.analysis.cascade_gains import CascadeGains, cascade_gains, judge_cascade
+from swashplate.control.controller_file import save_controller
+from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
+from swashplate.control.laws.ardupilot.parameters import RENAMED
+from swashplate.errors import ControllerError, DivergenceError, SwashError
+from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, read_parameter_file, written_gains
+from swashplate.links.ardupilot.parameters import parameter_file
+from swashplate.links.ardupilot.parameters import parameters as ardupilot_parameters
+from swashplate.links.px4.gains import RATE as PX4_RATE
+from swashplate.links.px4.gains import px4_file, px4_gains, px4_law
+from swashplate.links.px4.parameters import parameters as px4_parameters
+from swashplate.models.delays import complete_delays, input_delays
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.trim import Trim, trim
+from swashplate.text_table import text_table
+
+AutopilotName = Literal["ardupilot", "px4"]
+STRAYS = 0.5
+"""m: how far LOITER may stray in still air."""
+_SUFFIX: Mapping[AutopilotName, str] = {"ardupilot": ".parm", "px4": ".params"}
+_UPSET: Mapping[str, float] = {"phi": math.radians(2.0), "theta": math.radians(-2.0), "u": 0.1, "v": -0.1}
+_DURATION, _LAST = 60.0, 20.0
+
+
+@dataclass(frozen=True)
+class FlownMode:
+    """A mode flown nonlinearly in still air, integrals at zero at the start: how far it strays from what it holds.
+
+    Attributes:
+        mode: "stabilize", "alt_hold" or "loiter".
+        lean: from the hover's attitude [deg]. heading: [deg]. height, place: [m]; NaN where the mode holds none.
+        still: the same of the place in the last 20 s.
+        fell: why it did not get to the end; empty where it did.
+    """
+
+    mode: FlightMode
+    lean: float
+    heading: float
+    height: float
+    place: float
+    still: float
+    fell: str = ""
+
+
+@dataclass(frozen=True)
+class AutopilotGains:
+    """Gains of a whole autopilot for a vehicle.
+
+    Attributes:
+        autopilot: "ardupilot" or "px4".
+        title: of the vehicle's card.
+        found: the law with its gains, what each loop is worth.
+        parameters: all lines of the file by the firmware's names, outputs and frame included.
+        gains: those of them that are gains and filters.
+        flown: modes flown; empty where none was.
+        late: how late commands are taken to be, in words.
+    """
+
+    autopilot: AutopilotName
+    title: str
+    found: CascadeGains
+    parameters: Mapping[str, float]
+    gains: tuple[str, ...]
+    flown: tuple[FlownMode, ...]
+    late: str
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why these gains should not be flown; empty where margins hold and the flights stay where they should."""
+        found = list(self.found.problems)
+        for flight in self.flown:
+            if flight.fell:
+                found.append(f"{flight.mode} does not fly: {flight.fell}")
+            elif flight.mode == "loiter" and not flight.place <= STRAYS:
+                found.append(f"loiter strays by {flight.place:.2f} m, expected {STRAYS:g} m or less.")
+        return tuple(found)
+
+    def controller(self, mode: FlightMode = "loiter") -> ArduPilotLaw:
+        """The law as a controller, for `sp.simulate_closed_loop`, `sp.check_controller` and `sp.live`."""
+        return self.found.law.in_mode(mode)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the parameter file (.parm or .params), or the controller's (.toml).
+
+        Raises:
+            SwashError: for another ending.
+        """
+        file = Path(path)
+        if file.suffix == ".toml":
+            save_controller(self.controller(), file)
+            return file
+        expected = _SUFFIX[self.autopilot]
+        if file.suffix != expected:
+            raise SwashError(f"ends in '{file.suffix}', expected {expected} or .toml.", where=file)
+        if self.autopilot == "ardupilot":
+            return write_text(file, parameter_file(dict(self.parameters), title=self.title))
+        return write_text(file, px4_file(dict(self.parameters), title=self.title))
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        return {
+            "autopilot": self.autopilot,
+            "vehicle": self.found.law.vehicle,
+            "late": self.late,
+            "parameters": dict(self.parameters),
+            "loops": [asdict(loop) | {"holds": loop.holds} for loop in self.found.loops],
+            "slowest": {"real": self.found.slowest.real, "imaginary": abs(self.found.slowest.imag)},
+            "flown": [asdict(flight) for flight in self.flown],
+            "problems": list(self.problems),
+        }
+
+    def __repr__(self) -> str:
+        law = self.found.law
+        lines = [f"{self.title}: {'ArduPilot' if self.autopilot == 'ardupilot' else 'PX4'}, loops at {law.rate:g} Hz"]
+        lines.append(f"late: {self.late}")
+        head = ("loop", "gain [dB]", "phase [deg]", "delay [ms]", "crossover", "bandwidth", "rejects to", "max |S|")
+        rows = [
+            (
+                loop.name,
+                *(f"{value:.1f}" for value in (loop.gain, loop.phase, 1e3 * loop.delay)),
+                *(f"{value:.2f}" for value in (loop.crossover, loop.bandwidth, loop.rejection, loop.peak)),
+            )
+            for loop in self.found.loops
+        ]
+        lines += ["", text_table(head, rows), "each broken with the others closed; frequencies in rad/s", ""]
+        shown = [(name, f"{self.parameters[name]:.4g}") for name in self.gains if name not in RENAMED]
+        lines.append(text_table(("parameter", "value"), shown))
+        if self.flown:
+            above = ("flown in still air", "lean [deg]", "heading [deg]", "height [m]", "place [m]", "last 20 s [m]")
+            cells = [
+                (
+                    flight.mode,
+                    *(_cell(v) for v in (flight.lean, flight.heading, flight.height, flight.place, flight.still)),
+                )
+                for flight in self.flown
+            ]
+            lines += ["", text_table(above, cells)]
+            lines.append("from 2 degrees of lean and 0.14 m/s, integrals at zero: the farthest from what is held")
+        return "\n".join([*lines, *(["", *self.problems] if self.problems else [])])
+
+
+def autopilot_gains(
+    vehicle: Vehicle,
+    *,
+    autopilot: AutopilotName = "ardupilot",
+    name: str | None = None,
+    servos: str | Path | None = None,
+    delays: Mapping[str, float] | float | None = None,
+    notch: tuple[float, float] | None = None,
+    rate: float | None = None,
+    parameters: Mapping[str, float] | str | Path | None = None,
+    voltage: float | None = None,
+    fly: bool = True,
+) -> AutopilotGains:
+    """Gains of rate, attitude, height and place loops for a vehicle under ArduPilot or PX4, judged and flown.
+
+    Every loop keeps 6 dB, 45 degrees and a sensitivity below two with all others closed, with the vehicle's rotors,
+    bar and delays and the autopilot's filters in it. Of what keeps them, that which rejects disturbances best.
+
+    Args:
+        vehicle: in free flight; any model whose outputs an autopilot can be mapped to.
+        autopilot: "ardupilot" or "px4".
+        name, servos: as of `swashplate.link_ardupilot`.
+        delays: from command to actuator [s], one for all or by input; where not given those that the model knows, and
+            5 ms where it knows none.
+        notch: of the gyros, frequency and width [Hz]; ArduPilot only.
+        rate: of the loops [Hz]; 400 for ArduPilot, 250 for PX4.
+        parameters: judge these instead (by name, or a .parm file); ArduPilot only.
+        voltage: of the battery [V].
+        fly: also fly the three modes on the nonlinear model.
+
+    Raises:
+        ControllerError: naming the loop for which nothing holds the margins.
+        SwashError: where there is no servo mapping.
+    """
+    if autopilot not in _SUFFIX:
+        raise ControllerError(f"is '{autopilot}', expected {', '.join(_SUFFIX)}.", channel="autopilot")
+    if autopilot == "px4" and (notch is not None or parameters is not None):
+        raise ControllerError("is for ArduPilot's parameters only.", channel="notch" if notch else "parameters")
+    if notch is not None and not (0.0 < notch[1] < 2.0 * notch[0] and notch[0] < 400.0):
+        raise ControllerError(f"is {notch[0]:g} Hz, {notch[1]:g} Hz wide.", channel="notch")
+    nominal = vehicle.card.values().get("voltage_nominal")
+    hover = trim(vehicle, voltage=nominal if voltage is None else voltage)
+    mapping = mapping_of(vehicle, servos, name=name, suffix="" if autopilot == "ardupilot" else "_px4")
+    late, told = _late(vehicle, delays)
+    if autopilot == "px4":
+        start = px4_law(mapping, vehicle, hover, rate=rate or PX4_RATE)
+        found = cascade_gains(vehicle, hover, start, delays=late)
+        gains = px4_gains(found.law)
+        lines = {**px4_parameters(mapping), **gains}
+    else:
+        given = read_parameter_file(parameters) if isinstance(parameters, str | Path) else parameters
+        told_given = None if given is None else dict(given)
+        start = ardupilot_law(mapping, vehicle, hover, given=told_given, notch=notch, rate=rate or RATE_OF_LOOPS)
+        search = cascade_gains if given is None else judge_cascade
+        found = search(vehicle, hover, start, delays=late)
+        gains = written_gains(found.law)
+        lines = {**ardupilot_parameters(mapping, vehicle, hover), **gains}
+    flown = tuple(_flown(vehicle, hover, found, mode) for mode in FLIGHT_MODES) if fly else ()
+    return AutopilotGains(autopilot, vehicle.card.title, found, lines, tuple(gains), flown, told)
+
+
+def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[dict[str, float], str]:
+    known = input_delays(vehicle)
+    late = complete_delays(vehicle, given if given is not None else known or ASSUMED_DELAY)
+    if given is not None:
+        whose = "as given"
+    elif known:
+        whose = "identified"
+    else:
+        whose = "assumed: the model knows no delay and may know no servos; --delay says more"
+    return dict(late), f"{', '.join(f'{name} {1e3 * value:.3g} ms' for name, value in late.items())} ({whose})"
+
+
+def _flown(vehicle: Vehicle, hover: Trim, found: CascadeGains, mode: FlightMode) -> FlownMode:
+    rest = hover.states()
+    start = {**rest, **{name: rest.get(name, 0.0) + by for name, by in _UPSET.items()}}
+    reference = {name: rest.get(name, 0.0) for name in ("x", "y", "z", "psi")}
+    law = replace(found.law.in_mode(mode), settled=())
+    nothing = (math.nan,) * 5
+    try:
+        flight = simulate_closed_loop(
+            vehicle,
+            law,
+            duration=_DURATION,
+            start=start,
+            reference=reference,
+            rate=law.rate,
+            delays=dict(found.delays),
+            voltage=float(hover.environment.voltage),
+            environment=hover.environment,
+        )
+    except DivergenceError as error:
+        return FlownMode(mode, *nothing, fell=error.problem)
+    time = flight.time("x")
+
+    def away(state: str) -> np.ndarray[Any, Any]:
+        return np.asarray(flight.values(state)) - rest.get(state, 0.0)
+
+    lean = np.degrees(np.max(np.hypot(away("phi"), away("theta"))))
+    heading, height = np.degrees(np.max(np.abs(away("psi")))), float(np.max(np.abs(away("z"))))
+    place = np.hypot(away("x"), away("y"))
+    holds, keeps = mode == "loiter", mode != "stabilize"
+    return FlownMode(
+        mode,
+        float(lean),
+        float(heading),
+        height if keeps else math.nan,
+        float(np.max(place)) if holds else math.nan,
+        float(np.max(place[time > time[-1] - _LAST])) if holds else math.nan,
+    )
+
+
+def _cell(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else "-"

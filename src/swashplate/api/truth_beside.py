@@ -1,0 +1,176 @@
+"""What sweeps in an autopilot's log say of a vehicle, beside its own linearisation: `respond` and the fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.api.fit_ss import fit_ss
+from swashplate.api.fit_tf import fit_tf
+from swashplate.arrays import Array, Complex
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights.conditioning.uniform_records import uniform_records
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
+from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
+from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
+from swashplate.identification.responses.respond import respond
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
+from swashplate.links.ardupilot.trial import TrialLine
+
+GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0
+"""dB and degrees that an estimate may be off the truth, or so many random errors where those are more."""
+COHERENT = 0.8
+"""Coherence from which on a line is judged."""
+_LEAST_SHARE = 0.7
+"""Share of the band that must be coherent, else the sweep has told too little."""
+STRUCTURES: Mapping[tuple[str, ...], str] = {("roll", "pitch"): "rotor_body", ("yaw",): "yaw", ("heave",): "heave"}
+"""Ready structures by the axes that they describe."""
+FORMS: Mapping[str, str] = {"roll": "0/2", "pitch": "0/2", "yaw": "0/1", "heave": "1/1"}
+"""Zeros over poles of an axis in hover: a rotor that tilts, and a body that is damped; az of one that climbs."""
+
+Truth = Callable[[str, str, Array], Complex]
+"""Response of an axis' command to a channel ("p") over frequency [rad/s]."""
+
+
+@dataclass
+class TruthBeside:
+    """Estimates of the axes that were swept.
+
+    Attributes:
+        lines: verdicts.
+        curves: by (output, input), by name ("truth", "respond", ...): frequencies [rad/s] and the response.
+        models: what was fitted, in words.
+        remarks: what the estimates themselves warn of.
+    """
+
+    lines: list[TrialLine] = field(default_factory=list)
+    curves: dict[tuple[str, str], dict[str, tuple[Array, Complex]]] = field(default_factory=dict)
+    models: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+
+def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, *, rate: float) -> TruthBeside:
+    """Take a log through `respond`, `fit_tf` and `fit_ss`, and judge each against the truth.
+
+    Args:
+        flight: as logged, with a System ID sweep for each axis.
+        flown: the sweeps by axis.
+        truth: of the vehicle.
+        rate: of the records [Hz].
+    """
+    found = TruthBeside()
+    by_axis = _sweeps_by_axis(flight, flown, found)
+    axes = [axis for axis in MIXER_AXES if axis in by_axis]
+    for together in _grouped(axes):
+        try:
+            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, rate, found)
+        except SwashError as error:
+            found.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
+    return found
+
+
+def _grouped(axes: Sequence[str]) -> list[tuple[str, ...]]:
+    """Axes that one structure describes together; those whose partner was not swept alone."""
+    groups = [group for group in STRUCTURES if set(group) <= set(axes)]
+    taken = {axis for group in groups for axis in group}
+    return [*groups, *((axis,) for axis in axes if axis not in taken)]
+
+
+def _sweeps_by_axis(flight: Flight, flown: Mapping[str, Chirp], found: TruthBeside) -> dict[str, Sweep]:
+    told = [sweep for sweep in sweeps(flight) if sweep.source == "log"]
+    by_axis = {}
+    for axis, chirp in flown.items():
+        mine = [sweep for sweep in told if sweep.axis == chirp.axis_name]
+        complete = [sweep for sweep in mine if sweep.complete]
+        words = f"{len(complete)} complete of {len(mine)}"
+        found.lines.append(TrialLine(f"sweep of {axis} in the log", words, "1 complete", len(complete) == 1))
+        if complete:
+            by_axis[axis] = complete[-1]
+    return by_axis
+
+
+def _judge(
+    flight: Flight,
+    parts: Sequence[Sweep],
+    axes: Sequence[str],
+    flown: Mapping[str, Chirp],
+    truth: Truth,
+    rate: float,
+    found: TruthBeside,
+) -> None:
+    named = [MIXER_AXES[axis] for axis in axes]
+    inputs, outputs = [a.input for a in named], [a.output for a in named]
+    # Without another message that has the channel, System ID's own has the plain name.
+    logged = {a.output: a.logged if a.logged in flight else a.output for a in named}
+    if missing := [name for name in (*inputs, *logged.values()) if name not in flight]:
+        raise FlightError("is not in the log.", channel=", ".join(missing))
+    pieces = [flight.between(part.start, part.stop) for part in parts]
+    records = uniform_records(pieces, (*inputs, *outputs), rate=rate, names=logged)
+    low, high = max(flown[a].start_hz for a in axes), min(flown[a].stop_hz for a in axes)
+    responses = respond(records, inputs=inputs, outputs=outputs, band=(1.25 * low, 0.75 * high))
+    words = f"{' and '.join(axes)}: "
+    found.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
+    simple = []
+    for axis, a in zip(axes, named, strict=True):
+        fit = fit_tf(responses, input=a.input, outputs=[a.output], form=FORMS[axis])
+        simple.append(fit.material.transfer_functions[0].solution[0])
+        found.models.append(f"{axis}, fit-tf: {simple[-1]!r}")
+    name = STRUCTURES.get(tuple(axes))
+    fitted = None if name is None else fit_ss(name, responses).structure
+    if fitted is not None:
+        found.models.append(f"{' and '.join(axes)}, fit-ss: {fitted!r}")
+    for place, (axis, a) in enumerate(zip(axes, named, strict=True)):
+        h, coherence, error = responses.pair(a.output, a.input)
+        good = np.isfinite(h) & (coherence >= COHERENT)
+        true = truth(axis, a.output, responses.omega)
+        curves = {"truth": (responses.omega, true), "respond": (responses.omega, np.where(good, h, np.nan))}
+        share = float(np.mean(good))
+        told = f"{100 * share:.0f} % of the band"
+        found.lines.append(
+            TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
+        )
+        models = {"fit-tf": np.asarray(simple[place].response(responses.omega))}
+        if fitted is not None:
+            o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
+            models["fit-ss"] = fitted.response(responses.omega)[:, o, i]
+        curves |= {verb: (responses.omega, estimate) for verb, estimate in models.items()}
+        for verb, estimate in {"respond": h, **models}.items():
+            found.lines.append(_verdict(f"{axis}: {verb} beside truth", estimate, true, error, good))
+        found.curves[(a.output, a.input)] = curves
+        found.lines.append(_lateness(axis, h, true, responses, good))
+
+
+def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_]) -> TrialLine:
+    """The largest distance over the coherent lines; the random errors there widen what is allowed."""
+    if not good.any():
+        return TrialLine(what, "nothing coherent", f"within {GAIN:g} dB and {PHASE:g} deg", False)
+    ratio = estimate[good] / true[good]
+    gain, phase = 20.0 * np.abs(np.log10(np.abs(ratio))), np.degrees(np.abs(np.angle(ratio)))
+    sigma = np.nan_to_num(error[good])
+    allowed = np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma), np.maximum(PHASE, SIGMAS * np.degrees(sigma))
+    passed = bool(np.all(gain <= allowed[0]) and np.all(phase <= allowed[1]))
+    found = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
+    return TrialLine(what, found, f"within {GAIN:g} dB and {PHASE:g} deg", passed)
+
+
+def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: NDArray[np.bool_]) -> TrialLine:
+    """How much later than the truth the estimate is, as a pure delay [ms]; told, not judged: the phase is."""
+    omega = responses.omega[good]
+    late = -float(np.sum(omega * np.angle(h[good] / true[good])) / np.sum(omega**2)) if good.any() else float("nan")
+    return TrialLine(f"{axis}: log later than the truth", f"{1e3 * late:.1f} ms")
+
+
+def at_three(curves: Mapping[str, tuple[Array, Complex]]) -> list[tuple[float, dict[str, tuple[float, float]]]]:
+    """Gain [dB] and phase [deg] of each curve at three frequencies [Hz] spread over the band."""
+    omega = curves["truth"][0]
+    rows = []
+    for share in (0.15, 0.5, 0.85):
+        k = int(np.argmin(np.abs(np.log(omega / omega[0]) - share * np.log(omega[-1] / omega[0]))))
+        values = {name: h[k] for name, (_, h) in curves.items()}
+        polar = {n: (float(20.0 * np.log10(np.abs(v))), float(np.degrees(np.angle(v)))) for n, v in values.items()}
+        rows.append((float(omega[k] / TWO_PI), polar))
+    return rows

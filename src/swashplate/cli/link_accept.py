@@ -1,0 +1,102 @@
+"""`swash link accept`: a SITL binary of ArduPilot started, flown and judged with a vehicle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import conditions as given
+from swashplate.cli import flying, options
+
+Binary = Annotated[
+    Path, typer.Argument(metavar="BINARY", help="ArduCopter for SITL, e.g. build/sitl/bin/arducopter-heli.")
+]
+
+
+def accept(
+    binary: Binary,
+    vehicle: options.VehicleName,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="FOLDER", help="For report, log and what it printed; a new folder."),
+    ],
+    servos: Annotated[
+        str | None,
+        typer.Option("--servos", metavar="NAME|FILE", help="Servo mapping; by default the one of the vehicle's name."),
+    ] = None,
+    truth: Annotated[
+        str | None, typer.Option("--truth", metavar="MODEL", help="Hold the estimates against another vehicle or card.")
+    ] = None,
+    axes: Annotated[
+        str, typer.Option("--axes", metavar="NAME,NAME", help="Axes that are swept: roll, pitch, yaw, heave.")
+    ] = "roll,pitch,yaw,heave",
+    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Of the sweeps [Hz].")] = "0.4-8",
+    seconds: Annotated[float, typer.Option("--seconds", help="Of each sweep.", min=10.0, max=255.0)] = 40.0,
+    hover: Annotated[float, typer.Option("--hover", help="Seconds in each mode.", min=1.0, max=600.0)] = 10.0,
+    height: Annotated[float, typer.Option("--height", help="Of the hover [m].", min=1.0, max=50.0)] = 5.0,
+    ekf: Annotated[
+        float, typer.Option("--ekf", help="Simulated seconds until it must let itself be armed.", min=1.0, max=3600.0)
+    ] = 120.0,
+    defaults: Annotated[
+        list[Path] | None,
+        typer.Option("--defaults", metavar="FILE", help="A parameter file of yours, read last. May be repeated."),
+    ] = None,
+    instance: Annotated[
+        int, typer.Option("--instance", "-I", help="Of SITL: adds 10 times this to every port.", min=0, max=99)
+    ] = 0,
+    speedup: Annotated[
+        float, typer.Option("--speedup", help="Most simulated seconds a second.", min=0.1, max=100.0)
+    ] = 10.0,
+    timeout: Annotated[
+        float, typer.Option("--timeout", help="Seconds until the binary answers.", min=0.5, max=600.0)
+    ] = 60.0,
+    wind: given.Wind = "0,0,0",
+    altitude: given.Altitude = 0.0,
+    changed: given.Set = None,
+    switched: given.Switch = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Start a SITL binary with a vehicle's files, fly it from a cold start, and put truth beside what its log says.
+
+    It waits for the EKF, arms, hovers in STABILIZE, ALT_HOLD and LOITER, sweeps each axis in System ID mode, lands, and
+    takes the log through respond, fit-tf and fit-ss. Every line has a verdict; one that fails makes exit code 2. Needs
+    the extra `link`. The binary is ended whatever happens.
+    """
+    import swashplate as sp
+    from swashplate.cli.console import as_json, progress
+
+    where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
+    limits = flying.band(band)
+    assert limits is not None
+    with progress(quiet=quiet or json) as line:
+        found = sp.accept_autopilot(
+            where.vehicle,
+            binary,
+            out=out,
+            name=vehicle,
+            servos=servos,
+            truth=None if truth is None else sp.vehicle(truth),
+            axes=flying.names(axes),
+            band=limits,
+            seconds=seconds,
+            hover=hover,
+            height=height,
+            ekf=ekf,
+            defaults=defaults or (),
+            environment=where.environment,
+            instance=instance,
+            speedup=speedup,
+            timeout=timeout,
+            say=line.say,
+        )
+        line.say("writing the report")
+        found.save(out)
+    if json:
+        typer.echo(as_json(found.to_document()))
+    elif not quiet:
+        typer.echo(repr(found))
+        typer.echo(f"\nReport: {out / 'report.html'}")
+    flying.end_with(found.problems)

@@ -1,0 +1,312 @@
+"""ArduPilot's cascade as a controller of ours: place, speed, lean, rate; height, climb, acceleration, throttle.
+
+The law of Copter 4.6, written anew from its documentation and sources (AC_PosControl, AC_AttitudeControl and its _Heli
+and _Multi, AC_PID, AC_HELI_PID), at its rate of 400 Hz. What is not in it: its EKF (it is fed with true states), the
+slew limiter (SMAX), the jerk-limited path of a moved target, take-off and landing, 4.7's S-curve on attitude demands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from swashplate.arrays import Array
+from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole, reached_by
+from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer
+from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Scalar
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.closed_loop import Step
+from swashplate.simulation.trim import Trim
+
+FlightMode = Literal["stabilize", "alt_hold", "loiter"]
+FLIGHT_MODES: tuple[FlightMode, ...] = ("stabilize", "alt_hold", "loiter")
+RATE_OF_LOOPS = 400.0
+"""Hz: SCHED_LOOP_RATE of Copter."""
+GRAVITY = 9.80665
+_MEMORY: Mapping[str, int] = {
+    "begun": 1, "gyro": 6, "notch": 12, "climb": 1, "felt": 2, "target": 3, "turning": 3, "wanted": 3, "error": 3,
+    "slope": 3, "sum": 3, "cut": 3, "speed_error": 2, "speed_slope": 2, "speed_sum": 2, "climb_error": 1,
+    "climb_sum": 1, "lift_error": 1, "lift_sum": 1, "throttle": 1,
+}  # fmt: skip
+"""What the law carries, with sizes. Filters of gyros and of vertical acceleration keep two numbers for each stage."""
+_ENDS = np.cumsum(list(_MEMORY.values()))
+_PLACES = dict(zip(_MEMORY, np.split(np.arange(_ENDS[-1]), _ENDS[:-1]), strict=True))
+_NAMES = tuple(DEFAULTS)
+_THROTTLE = "POSCONTROL_THROTTLE_CUTOFF_FREQ_HZ"
+_HEAD = ("dt", "height", "place")
+_LEAK = 0.02
+"""Of the leaking integral, each step (AC_ATTITUDE_HELI_RATE_INTEGRATOR_LEAK_RATE)."""
+_CLIMB, _SINK, _LIFT = 2.5, 1.5, 2.5
+"""m/s up and down, m/s^2: limits of the height loop (PILOT_SPEED_UP, PILOT_SPEED_DN, PILOT_ACCEL_Z)."""
+_FASTEST, _SIDEWAYS = 12.5, 5.0
+"""m/s and m/s^2: LOIT_SPEED, LOIT_ACC_MAX."""
+_TURNING = tuple(np.radians([(40.0, 720.0), (40.0, 720.0), (10.0, 120.0)]).T)
+"""rad/s^2: bounds of what the angle controller takes for the largest acceleration."""
+
+
+@dataclass(frozen=True)
+class ArduPilotLaw:
+    """A controller for `simulate_closed_loop`.
+
+    Attributes:
+        vehicle: the name of the equations that it is for. model: the title of the card that its numbers are from.
+        mode: "stabilize" holds an attitude at the hover's throttle, "alt_hold" a height too, "loiter" a place too. A
+            pilot's roll and pitch lean it by up to ANGLE_MAX in every mode.
+        parameters: by ArduPilot's names (`known`).
+        mixer: from commands to inputs.
+        inputs: how many the vehicle has.
+        rate: how often it runs [Hz].
+        settled: commands (roll, pitch, yaw, throttle) and attitude of the hover that it holds already at the start;
+            none where it has yet to find them.
+    """
+
+    vehicle: str
+    model: str
+    mode: FlightMode
+    parameters: Mapping[str, float]
+    mixer: Mixer
+    inputs: int
+    rate: float = RATE_OF_LOOPS
+    settled: tuple[float, ...] = ()
+    type: ClassVar[str] = "ardupilot"
+
+    @property
+    def frame(self) -> str:
+        """What is mixed: a key of `FRAMES`."""
+        return next(name for name, kind in FRAMES.items() if isinstance(self.mixer, kind))
+
+    @property
+    def memory(self) -> Array:
+        start = np.zeros(sum(_MEMORY.values()))
+        if self.settled:
+            start[_PLACES["sum"]] = self.settled[:3]
+            start[_PLACES["lift_sum"]] = start[_PLACES["throttle"]] = self.settled[3] - self.hover
+            start[_PLACES["target"]], start[_PLACES["begun"]] = self.settled[4:], 1.0
+        return start
+
+    @property
+    def hover(self) -> float:
+        """The throttle that it takes for the hover's."""
+        return self.parameters["H_COL_HOVER" if self.frame == "swashplate" else "MOT_THST_HOVER"]
+
+    @property
+    def gains(self) -> Array:
+        """Its numbers as one row."""
+        height, place = float(self.mode != "stabilize"), float(self.mode == "loiter")
+        numbers = [1.0 / self.rate, height, place, *(self.parameters[name] for name in _NAMES), *self.mixer]
+        return np.array(numbers, dtype=np.float64)
+
+    @property
+    def step(self) -> Step:
+        key = (self.frame, self.inputs)
+        return _STEPS.setdefault(key, partial(ardupilot_step, frame=self.frame, inputs=self.inputs))
+
+    def in_mode(self, mode: FlightMode) -> ArduPilotLaw:
+        """The same in another mode."""
+        return replace(self, mode=mode)
+
+    def at(self, vehicle: Vehicle, trim: Trim) -> ArduPilotLaw:
+        """The same with integrals that hold that trim already."""
+        commands, states = self.mixer.unmixed(trim.inputs, self.parameters), trim.states()
+        settled = (*commands, *(states[name] for name in ("phi", "theta", "psi")))
+        return replace(self, settled=tuple(map(float, settled)), inputs=len(vehicle.input_names))
+
+
+_STEPS: dict[tuple[str, int], Step] = {}
+
+
+def ardupilot_step(
+    memory: Float[jax.Array, " memory"],
+    time: Float[jax.Array, ""],
+    measured: Float[jax.Array, " measured"],
+    reference: Float[jax.Array, " references"],
+    gains: Float[jax.Array, " gains"],
+    *,
+    frame: str,
+    inputs: int,
+) -> tuple[Any, Any]:
+    """One step, traced by JAX, as `simulate_closed_loop` calls it."""
+    head, rest = len(_HEAD), len(_HEAD) + len(_NAMES)
+    dt, height, place = (gains[i] for i in range(head))
+    k = {name: gains[head + i] for i, name in enumerate(_NAMES)}
+    numbers: Any = [gains[rest + i] for i in range(len(FRAMES[frame]._fields))]
+    mixer = FRAMES[frame](*numbers)
+    m = {name: memory[where] for name, where in _PLACES.items()}
+    body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
+    heli = frame == "swashplate"
+    after: dict[str, Any] = {"begun": jnp.ones(1)}
+    velocity = _to_north_east_down(body)
+
+    lean = _horizontal(body, velocity, reference, k, m, after, dt) * place
+    most = jnp.radians(0.01 * k["ANGLE_MAX"])
+    trimmed = jnp.radians(0.01 * k["ATC_HOVR_ROL_TRM"]) if heli else 0.0
+    wanted = jnp.stack([lean[0] + most * reference[6] + trimmed, lean[1] - most * reference[7], reference[3]])
+    throttle = _vertical(body, velocity, reference, k, m, after, dt, height, heli=heli)
+    rates = _attitude(body, wanted, k, m, after, dt)
+    commands = _rates(body, rates, k, m, after, dt, heli=heli)
+    mixed = mixer.mix(jnp.concatenate([commands, throttle]), k)
+    after["cut"] = mixed.cut
+    carried = jnp.concatenate([jnp.atleast_1d(after[name]) for name in _PLACES])
+    return carried, mixed.inputs[:inputs]
+
+
+def square_root(error: Scalar, p: Scalar, most: Scalar) -> Any:
+    """ArduPilot's `sqrt_controller`: proportional near zero, and from there no faster than `most` can brake."""
+    near = most / jnp.maximum(p * p, 1e-12)
+    beyond = jnp.sqrt(2.0 * most * jnp.maximum(jnp.abs(error) - 0.5 * near, 0.5 * near))
+    return jnp.where(jnp.abs(error) > near, jnp.sign(error) * beyond, p * error)
+
+
+def _to_north_east_down(body: RigidBody) -> Any:
+    cf, sf, ct, st, cp, sp = (f(a) for a in (body.phi, body.theta, body.psi) for f in (jnp.cos, jnp.sin))
+    u, v, w = body.u, body.v, body.w
+    level, side, down = ct * u + sf * st * v + cf * st * w, cf * v - sf * w, -st * u + sf * ct * v + cf * ct * w
+    return jnp.stack([cp * level - sp * side, sp * level + cp * side, down])
+
+
+def _horizontal(
+    body: RigidBody,
+    velocity: jax.Array,
+    reference: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+) -> Any:
+    """Roll and pitch [rad] that the place asks for."""
+    off = jnp.stack([reference[0] - body.x, reference[1] - body.y])
+    far = jnp.sqrt(off @ off + 1e-12)
+    speed = off / far * jnp.minimum(square_root(far, k["PSC_POSXY_P"], _SIDEWAYS), _FASTEST)
+    c, s = jnp.cos(body.psi), jnp.sin(body.psi)
+    speed += jnp.stack([c * reference[4] - s * reference[5], s * reference[4] + c * reference[5]])
+    error = speed - velocity[:2]
+    filtered = one_pole(m["speed_error"], error, k["PSC_VELXY_FLTE"], dt, m["begun"])
+    slope = reached_by(m["speed_slope"], (filtered - m["speed_error"]) / dt, k["PSC_VELXY_FLTD"], dt) * m["begun"]
+    asked = k["PSC_VELXY_P"] * filtered + m["speed_sum"] + k["PSC_VELXY_D"] * slope
+    size, most = jnp.sqrt(asked @ asked + 1e-12), GRAVITY * jnp.tan(jnp.radians(0.01 * k["ANGLE_MAX"]))
+    asked *= jnp.minimum(1.0, most / size)
+    growing = (size > most) & (filtered @ asked > 0.0)
+    total = m["speed_sum"] + jnp.where(growing, 0.0, k["PSC_VELXY_I"] * dt) * filtered
+    bound = 0.01 * k["PSC_VELXY_IMAX"]
+    after |= {"speed_error": filtered, "speed_slope": slope, "speed_sum": jnp.clip(total, -bound, bound)}
+    ahead, right = c * asked[0] + s * asked[1], -s * asked[0] + c * asked[1]
+    pitch = -jnp.arctan(ahead / GRAVITY)
+    return jnp.stack([jnp.arctan(right * jnp.cos(pitch) / GRAVITY), pitch])
+
+
+def _vertical(
+    body: RigidBody,
+    velocity: jax.Array,
+    reference: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+    height: Scalar,
+    *,
+    heli: bool,
+) -> Any:
+    """The throttle, shape (1,): the hover's and what the height asks for."""
+    climb, hover = -velocity[2:], k["H_COL_HOVER" if heli else "MOT_THST_HOVER"]
+    felt = m["begun"] * (climb - m["climb"]) / dt  # what accelerometers feel, less gravity, since the last step
+    felt, stages = low_pass(m["felt"][None], felt, k["INS_ACCEL_FILTER"], dt)
+    asked = jnp.clip(square_root(body.z - reference[2], k["PSC_POSZ_P"], _LIFT), -_SINK, _CLIMB)
+    error = one_pole(m["climb_error"], asked - climb, k["PSC_VELZ_FLTE"], dt, m["begun"])
+    bound = 0.01 * k["PSC_VELZ_IMAX"]
+    total = jnp.clip(m["climb_sum"] + k["PSC_VELZ_I"] * dt * error, -bound, bound)
+    lift = one_pole(m["lift_error"], k["PSC_VELZ_P"] * error + total - felt, k["PSC_ACCZ_FLTE"], dt, m["begun"])
+    most = jnp.maximum(1e-3 * k["PSC_ACCZ_IMAX"], hover)
+    upper = hover + m["throttle"] >= 1.0
+    lower = hover + m["throttle"] <= 0.0
+    stuck = (upper & (lift > 0.0)) | (lower & (lift < 0.0))
+    lifted = jnp.clip(m["lift_sum"] + jnp.where(stuck, 0.0, 0.1 * k["PSC_ACCZ_I"] * dt) * lift, -most, most)
+    thrust = hover + 0.1 * k["PSC_ACCZ_P"] * lift + lifted
+    tilt = 1.0 if heli else 1.0 / jnp.clip(jnp.cos(body.phi) * jnp.cos(body.theta), 0.5, 1.0)
+    throttle = reached_by(m["throttle"], jnp.clip(thrust * tilt, 0.0, 1.0) - hover, k[_THROTTLE], dt)
+    holds = height > 0.5
+    after |= {
+        "climb": climb,
+        "felt": stages[0],
+        "climb_error": error,
+        "climb_sum": jnp.where(holds, total, m["climb_sum"]),
+        "lift_error": lift,
+        "lift_sum": jnp.where(holds, lifted, m["lift_sum"]),
+        "throttle": jnp.where(holds, throttle, m["throttle"]),
+    }
+    return hover + after["throttle"]
+
+
+def _attitude(
+    body: RigidBody, wanted: jax.Array, k: Mapping[str, Any], m: Mapping[str, Any], after: dict[str, Any], dt: Scalar
+) -> Any:
+    """Rates [rad/s] asked of the rate controllers, shape (3,)."""
+    now = jnp.stack([body.phi, body.theta, body.psi])
+    target = jnp.where(m["begun"] > 0.5, m["target"], now)
+    largest = jnp.radians(0.01 * jnp.stack([k[f"ATC_ACCEL_{n}_MAX"] for n in "RPY"]))
+    off = wanted - target
+    off = off.at[2].set(jnp.arctan2(jnp.sin(off[2]), jnp.cos(off[2])))
+    turning = square_root(off, 1.0 / jnp.maximum(k["ATC_INPUT_TC"], 0.01), largest)
+    turning = m["turning"] + jnp.clip(turning - m["turning"], -largest * dt, largest * dt)
+    shaped = k["ATC_RATE_FF_ENAB"] > 0.5  # otherwise the demand itself, and no rate of it is fed forward
+    target, turning = jnp.where(shaped, target + turning * dt, target + off), jnp.where(shaped, turning, 0.0)
+    after |= {"target": target, "turning": turning}
+    error = _rotation(now, target)
+    gain = jnp.stack([k[f"ATC_ANG_{axis}_P"] for axis in AXES])
+    rates = square_root(error, gain, jnp.clip(0.5 * largest, _TURNING[0], _TURNING[1]))
+    sf, cf, st, ct = jnp.sin(target[0]), jnp.cos(target[0]), jnp.sin(target[1]), jnp.cos(target[1])
+    p, q, r = turning[0], turning[1], turning[2]
+    return rates + jnp.stack([p - r * st, q * cf + r * sf * ct, r * cf * ct - q * sf])
+
+
+def _rotation(now: jax.Array, target: jax.Array) -> Any:
+    """The rotation in body axes from one attitude to another [rad], from their quaternions."""
+
+    def quaternion(angles: jax.Array) -> Any:
+        (cf, ct, cp), (sf, st, sp) = jnp.cos(0.5 * angles), jnp.sin(0.5 * angles)
+        return (
+            cf * ct * cp + sf * st * sp,
+            jnp.stack([sf * ct * cp - cf * st * sp, cf * st * cp + sf * ct * sp, cf * ct * sp - sf * st * cp]),
+        )
+
+    (a, u), (b, v) = quaternion(now), quaternion(target)
+    real, parts = a * b + u @ v, a * v - b * u - jnp.cross(u, v)
+    size = jnp.sqrt(parts @ parts + 1e-18)
+    return parts / size * 2.0 * jnp.arctan2(size, jnp.abs(real)) * jnp.where(real < 0.0, -1.0, 1.0)
+
+
+def _rates(
+    body: RigidBody,
+    asked: jax.Array,
+    k: Mapping[str, Any],
+    m: Mapping[str, Any],
+    after: dict[str, Any],
+    dt: Scalar,
+    *,
+    heli: bool,
+) -> Any:
+    """Roll, pitch and yaw commands, shape (3,)."""
+    at = {name: jnp.stack([k[f"ATC_RAT_{axis}_{name}"] for axis in AXES]) for name in RATE}
+    gyro = jnp.stack([body.p, body.q, body.r])
+    gyro, after["notch"] = notch(m["notch"], gyro, k, dt)
+    gyro, stages = low_pass(m["gyro"].reshape(3, 2), gyro, k["INS_GYRO_FILTER"], dt)
+    after["gyro"] = stages.ravel()
+    wanted = one_pole(m["wanted"], asked, at["FLTT"], dt, m["begun"])
+    error = one_pole(m["error"], wanted - gyro, at["FLTE"], dt, m["begun"])
+    slope = reached_by(m["slope"], m["begun"] * (error - m["error"]) / dt, at["FLTD"], dt)
+    total = m["sum"]
+    if heli:  # roll and pitch near hover: down to ILMI
+        kept = jnp.clip(total, -at["ILMI"], at["ILMI"])
+        total = total - _LEAK * (total - kept) * jnp.array([1.0, 1.0, 0.0])
+    stuck = (m["cut"] > 0.5) & (total * error > 0.0)
+    total = jnp.clip(total + jnp.where(stuck, 0.0, at["I"] * dt) * error, -at["IMAX"], at["IMAX"])
+    after |= {"wanted": wanted, "error": error, "slope": slope, "sum": total}
+    return jnp.clip(at["FF"] * wanted + at["P"] * error + total + at["D"] * slope, -1.0, 1.0)

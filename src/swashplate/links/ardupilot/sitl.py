@@ -1,0 +1,180 @@
+"""A SITL binary of ArduPilot as a process of ours: its command line, its ports, how it ended, and its end.
+
+Command line and ports: ArduPilot, libraries/AP_HAL_SITL/SITL_cmdline.cpp (`--model`, `--defaults` with files separated
+by commas, `-I` which adds 10 to every port, `--home`, `--speedup`). SERIAL0 is a TCP server on 5760 that waits for
+its client; RC comes by UDP on 5501; servo packets go to UDP 9002. Logs and parameters lie in the folder where it runs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from swashplate.errors import LinkError
+
+MAVLINK_PORT, RC_PORT, PHYSICS_PORT = 5760, 5501, 9002
+"""Of instance 0."""
+_PER_INSTANCE = 10
+_OTHERS = (2, 3)
+"""SERIAL1 and SERIAL2, from SERIAL0's port."""
+_HOME = "-35.363261,149.165230,584,0"
+"""Where ArduPilot's own tests fly."""
+_PATIENCE = 3.0
+"""s that it has to end by itself."""
+
+
+class Sitl:
+    """A binary in a folder of its own; used as a context, it is ended whatever happens.
+
+    Args:
+        binary: of ArduCopter for SITL.
+        folder: where it runs: its output, parameters and logs; made where it is missing.
+        defaults: parameter files in that folder, the last one counts.
+        instance: which of several on this machine.
+        speedup: most simulated seconds a second.
+
+    Raises:
+        LinkError: where the binary is missing or cannot be run, or one of its ports is taken.
+    """
+
+    def __init__(
+        self, binary: str | Path, folder: Path, defaults: Sequence[str], *, instance: int = 0, speedup: float = 10.0
+    ) -> None:
+        self.binary, self.folder = _runnable(Path(binary)), folder
+        shift = _PER_INSTANCE * instance
+        self.mavlink_port, self.rc_port = MAVLINK_PORT + shift, RC_PORT + shift
+        self.physics_port = PHYSICS_PORT + shift
+        self.command = [
+            str(self.binary), "--model", "JSON:127.0.0.1", "--defaults", ",".join(defaults), "-I", str(instance),
+            "--home", _HOME, "--speedup", f"{speedup:g}",
+        ]  # fmt: skip
+        for port in (self.mavlink_port, *(self.mavlink_port + k for k in _OTHERS)):
+            _check_free(socket.SOCK_STREAM, port)
+        _check_free(socket.SOCK_DGRAM, self.rc_port)
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def output(self) -> Path:
+        """What it prints."""
+        return self.folder / "sitl.txt"
+
+    def __enter__(self) -> Sitl:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with self.output.open("wb") as told:
+                self._process = subprocess.Popen(
+                    self.command,
+                    cwd=self.folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=told,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,  # whatever it starts itself is ended with it
+                )
+        except OSError as error:
+            raise LinkError(
+                f"cannot be run: {error.strerror or error}.",
+                where=self.binary,
+                hint="Is it a SITL build for this machine (./waf configure --board sitl)?",
+            ) from None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End it and everything that it started."""
+        if self._process is None:
+            return
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, number)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_PATIENCE if number is signal.SIGTERM else None)
+
+    def ended(self, *, patience: float = 0.0) -> str:
+        """How it ended, with its last words; empty where it still runs after `patience` [s]."""
+        if self._process is None:
+            return ""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(patience)
+        code = self._process.poll()
+        if code is None:
+            return ""
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        words = self.last_words()
+        return f"the binary ended {how}{f'; its last words: {words}' if words else '; it said nothing'}."
+
+    def last_words(self, lines: int = 4) -> str:
+        """The end of what it printed, in one line."""
+        try:
+            text = self.output.read_bytes()[-4000:].decode("utf-8", "replace")
+        except OSError:
+            return ""
+        printable = "".join(letter if letter.isprintable() else "\n" for letter in text)
+        return " / ".join([line.strip() for line in printable.splitlines() if line.strip()][-lines:])[-400:]
+
+    def wait_for_port(self, timeout: float) -> None:
+        """Until SERIAL0 is opened.
+
+        Raises:
+            LinkError: where it ends before, or does not open it in time.
+        """
+        until = time.monotonic() + timeout
+        while time.monotonic() < until:
+            if told := self.ended():
+                raise LinkError(told, where=self.binary, hint=f"All it printed is in {self.output}.")
+            if _listens(self.mavlink_port):
+                return
+            time.sleep(0.05)
+        raise LinkError(
+            f"opened no MAVLink port (TCP {self.mavlink_port}) within {timeout:g} s.",
+            where=self.binary,
+            hint=f"Is it ArduCopter's SITL binary? What it printed: {self.last_words() or 'nothing'}",
+        )
+
+    def logs(self) -> list[Path]:
+        """DataFlash logs that it wrote, in order."""
+        return sorted((self.folder / "logs").glob("*.BIN"))
+
+
+def _listens(port: int) -> bool:
+    """Whether somebody listens on a TCP port, seen without connecting: SITL serves its first client only."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("0.0.0.0", port))
+        except OSError:
+            return True
+    return False
+
+
+def _check_free(kind: socket.SocketKind, port: int) -> None:
+    name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind is socket.SOCK_STREAM:  # a connection that was just closed does not hold it
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("0.0.0.0", port))
+        except OSError:
+            raise LinkError(
+                f"{name} port {port} is in use by another program.",
+                channel="--instance",
+                hint="Another SITL runs? Stop it, or give another --instance: it moves all ports by 10.",
+            ) from None
+
+
+def _runnable(binary: Path) -> Path:
+    found = binary.expanduser().absolute()
+    if not found.exists():
+        raise LinkError("there is no such file.", where=binary, channel="BINARY")
+    if not found.is_file():
+        raise LinkError("is no file, expected ArduCopter's SITL binary.", where=binary, channel="BINARY")
+    if not os.access(found, os.X_OK):
+        raise LinkError("is not executable.", where=binary, channel="BINARY", hint=f"chmod +x {binary}")
+    return found

@@ -1,0 +1,219 @@
+"""Life on the ground on the paths beside the links: exported C, FMU, the gym environment, the live page's loop.
+
+Each is given the same rows of inputs: 120 s parked with the servos stirred at random (less in the short form), rotors
+spooled up, a hop where the vehicle can without an autopilot (the coaxial), down, stopped, and all of it again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from exported import compiled
+from swashplate.errors import TrimError
+from swashplate.export.compiler import compiler
+from swashplate.export.model_c import model_code
+from swashplate.export.traced import Traced, trace_vehicle
+from swashplate.links.live import world
+from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
+from swashplate.simulation.standing import at_rest, standing
+from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
+
+DT = 0.01
+Flown = Callable[[Vehicle, np.ndarray, Path], np.ndarray]
+"""State rows at every row of inputs, from rest."""
+
+
+def schedule(made: Vehicle, parked: float) -> tuple[np.ndarray, dict[str, slice]]:
+    """Rows of inputs, and where of two rounds the vehicle is parked, hops and has come to rest again."""
+    low, high = np.array(made.input_limits).T
+    names, random = made.input_names, np.random.default_rng(3)
+    motors = [k for k, name in enumerate(names) if name.startswith(("motor", "throttle"))]
+    still = np.where([name.startswith("servo") for name in names], 0.0, np.clip(0.0, low, high))
+    rows, places = [], {}
+
+    def hold(power: float, seconds: float) -> None:
+        row = still.copy()
+        row[motors] = power
+        rows.extend([row] * round(seconds / DT))
+
+    powers = ((0.3, 2.0), (0.6, 1.2), (0.45, 2.0)) if "motor_lower" in names else ((1.0, 12.0),)
+    for round_ in (1, 2):
+        begun = len(rows)
+        for _ in range(round(2.0 * parked)):
+            row = random.uniform(low, high)
+            row[motors] = 0.0
+            rows.extend([row] * round(0.5 / DT))
+        places[f"parked {round_}"] = slice(begun + (len(rows) - begun) // 2, len(rows))
+        begun = len(rows)
+        for power, seconds in powers:
+            hold(power, seconds)
+        places[f"turning {round_}"] = slice(begun, len(rows))
+        hold(0.0, 3.0 if len(powers) > 1 else 60.0)
+        places[f"down {round_}"] = slice(len(rows) - 50, len(rows))
+    return np.array(rows), places
+
+
+def lives(name: str, path: Flown, folder: Path, *, parked: float) -> None:
+    made = standing(sp.vehicle(name))
+    inputs, places = schedule(made, parked)
+    rows = path(made, inputs, folder)
+    assert np.isfinite(rows).all()
+    body, rotors = rows[:, :12], [k for k, each in enumerate(made.state_names) if each.startswith("omega")]
+    for where, part in places.items():
+        seen = body[part]
+        if where.startswith("parked"):
+            # A rotor runs down for minutes; so long, stirred blades rock the body by a part of a millimetre.
+            still = np.ptp(rows[part][:, rotors], axis=0).max() < 1e-3 * np.abs(rows[:, rotors]).max()
+            assert np.ptp(seen[:, :3], axis=0).max() < (1e-4 if still else 1e-3), f"it creeps, {where}"
+            assert np.ptp(seen[:, 6:9], axis=0).max() < (1e-3 if still else 1e-2), f"it turns, {where}"
+            assert still or where != "parked 1"
+        if where.startswith("turning") and name == "coax":
+            assert seen[0, 2] - seen[:, 2].min() > 0.05, f"it does not lift off, {where}"
+        if not where.startswith("turning"):
+            assert seen[:, 2] == pytest.approx(body[0, 2], abs=0.005), where
+            assert np.abs(seen[:, 6:8]).max() < math.radians(2.0), where
+    tilts = [k for k, each in enumerate(made.state_names) if each in ("a1", "b1", "alpha_lower", "beta_lower")]
+    assert np.abs(rows[:, tilts]).max() < math.radians(12.0)
+
+
+def traced(made: Vehicle) -> Traced:
+    """Starts where it stands; no trim has rotors at rest, so one is made."""
+    flying = sp.vehicle(made.card.vehicle) if made.name == "coax" else made
+    hover = sp.trim(flying, **({} if made.name == "coax" else {"height": 5.0}))
+    parked = replace(hover, state=at_rest(made, hover.environment), inputs=np.zeros(len(made.input_names)))
+    return trace_vehicle(made, parked, name="parked")
+
+
+def exported_c(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
+    """Steps of 0.5 ms, as `stepping_c` takes them."""
+    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    if compiler() is None:
+        pytest.skip("no C compiler")
+    model = traced(made)
+    code = compiled(model_code(model), folder)
+    start, s, p = (np.array([v.start for v in kind]) for kind in (model.states, model.surroundings, model.parameters))
+    finer = np.repeat(inputs, 20, axis=0)
+    return code.fly(start, np.vstack([finer, finer[-1:]]), DT / 20, s, p)[:-1:20]
+
+
+def fmu(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
+    """As a simulator steps it, with the unit's own inner step."""
+    pytest.importorskip("casadi", reason="the extra 'export' is not installed")
+    fmpy = pytest.importorskip("fmpy")
+    from swashplate.export.fmu import fmu as unit
+    from swashplate.export.fmu import fmu_platform
+
+    if compiler() is None or fmu_platform() is None:
+        pytest.skip("no C compiler for FMI")
+    (folder / "parked.fmu").write_bytes(unit(traced(made), version="0.1")[0])
+    result: Any = fmpy.simulate_fmu(
+        str(folder / "parked.fmu"),
+        stop_time=(len(inputs) - 1) * DT,
+        step_size=DT,
+        output_interval=DT,
+        output=list(made.state_names),
+        input=_signals(made, inputs),
+    )
+    return np.stack([result[name] for name in made.state_names], axis=1)[: len(inputs)]
+
+
+def _signals(made: Vehicle, inputs: np.ndarray) -> np.ndarray:
+    table = np.zeros(len(inputs), dtype=[("time", float), *((name, float) for name in made.input_names)])
+    table["time"] = np.arange(len(inputs)) * DT
+    for k, name in enumerate(made.input_names):
+        table[name] = inputs[:, k]
+    return table
+
+
+def live_loop(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
+    """What the page's clock calls: a law, here one that gives the row, and five steps of 2 ms."""
+    around = environment_of(made)
+    row, limits = np.array([getattr(around, name) for name in SURROUNDINGS]), np.array(made.input_limits).T
+    n, per_step = len(made.input_names), round(world.PHYSICS_RATE * DT)
+    x, past, memory = at_rest(made, around), np.zeros((1, n)), np.zeros(1)
+    equations, numbers = equations_of(tumbling(made)), parameter_row(made, around)
+    back, rows = np.zeros((per_step, n), dtype=int), []
+    for given in inputs:
+        y, past, memory, _ = world.advance(
+            equations, _given, per_step, x, from_euler(x), past, back,
+            memory, np.zeros(4), row, np.zeros(n), given, numbers, limits, 1.0 / world.PHYSICS_RATE,
+        )  # fmt: skip
+        x = to_euler(np.asarray(y), x)
+        rows.append(x)
+    return np.array(rows)
+
+
+def _given(memory: Any, time: Any, measured: Any, wanted: Any, gains: Any) -> tuple[Any, Any]:
+    return memory, gains
+
+
+def gym_environment(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
+    """Actions that ask for the row's inputs, with an action's whole reach about the middle of each."""
+    pytest.importorskip("gymnasium")
+    from swashplate.links.gym.flying import flying
+    from swashplate.links.gym.tasks import task_of
+
+    low, high = np.array(made.input_limits).T
+    made_ready = flying(made, task_of("hover", {}), rate=1.0 / DT, authority=1.0)
+    middle = replace(made_ready.trim, inputs=0.5 * (low + high))
+    env = replace(made_ready, trim=middle, free=tuple(range(len(low))), reach=0.5 * (high - low))
+    x, rows = at_rest(made, middle.environment)[None], []
+    for k, given in enumerate(inputs):
+        action = (given - middle.inputs) / env.reach
+        x, _, _, _ = env.advance(x, np.array([k]), action[None], env.parameters)
+        rows.append(x[0])
+    return np.array(rows)
+
+
+PATHS: dict[str, Flown] = {"C": exported_c, "FMU": fmu, "live": live_loop, "gym": gym_environment}
+
+
+@pytest.mark.parametrize("which", ["C", "live"])
+def test_a_coaxial_lives_on_the_ground(which: str, tmp_path: Path) -> None:
+    """The short form: what is quick to compile."""
+    lives("coax", PATHS[which], tmp_path, parked=4.0)
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("which", ["C", "FMU", "live"])
+def test_a_coaxial_lives_two_minutes_on_the_ground(which: str, tmp_path: Path) -> None:
+    lives("coax", PATHS[which], tmp_path, parked=120.0)
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("which", PATHS)
+@pytest.mark.parametrize("name", ["raptor50", "helion", "xcell60"])
+def test_a_helicopter_lives_two_minutes_on_the_ground(name: str, which: str, tmp_path: Path) -> None:
+    lives(name, PATHS[which], tmp_path, parked=120.0)
+
+
+def test_the_gym_has_no_ground_for_a_coaxial() -> None:
+    """Its environments start from a trim, and on added skids there is none: they fly without ground."""
+    pytest.importorskip("gymnasium")
+    from swashplate.links.gym.flying import flying
+    from swashplate.links.gym.tasks import task_of
+
+    with pytest.raises(TrimError, match="no equilibrium"):
+        flying(standing(sp.vehicle("coax")), task_of("hover", {}))
+
+
+def test_a_vehicle_that_sinks_into_the_ground_is_seen(tmp_path: Path) -> None:
+    """What this contract is for: the same rows for the vehicle without ground."""
+
+    def without(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
+        rows = np.zeros((len(inputs), len(made.state_names)))
+        rows[:, 2] = np.cumsum(np.cumsum(np.full(len(inputs), 9.81 * DT**2)))
+        return rows
+
+    with pytest.raises(AssertionError, match="it creeps"):
+        lives("coax", without, tmp_path, parked=1.0)
