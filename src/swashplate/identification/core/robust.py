@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swashplate.arrays import Array
+
+if TYPE_CHECKING:
+    from jax.typing import ArrayLike
 
 KNEE = 4.0
 """Whitened residuals beyond this many standard deviations count linearly (Huber 1964)."""
@@ -18,7 +21,7 @@ def huber(whitened: Array) -> float:
     return float(losses(whitened, np).sum())
 
 
-def losses(whitened: Array, xp: ModuleType) -> Any:
+def losses(whitened: ArrayLike, xp: ModuleType) -> Any:
     """The loss of each whitened residual, in NumPy or JAX."""
     size = xp.abs(whitened)
     return xp.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2)
