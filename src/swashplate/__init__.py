@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from swashplate.api.decouple_axes import decouple_axes
     from swashplate.api.demo import demo
     from swashplate.api.design_controller import design_controller
+    from swashplate.api.design_maneuver import design_maneuver
     from swashplate.api.excitation import excitation
     from swashplate.api.export import export_controller, export_flight, export_model
     from swashplate.api.fit_ss import fit_ss
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from swashplate.identification.frequency.state_space_fit import fit_state_space
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
     from swashplate.identification.identify import identify
+    from swashplate.identification.posterior import posterior
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
@@ -143,6 +145,7 @@ __all__ = [
     "demo",
     "derivatives",
     "design_controller",
+    "design_maneuver",
     "dynamic_decoupling",
     "equation_error",
     "evaluate_bench",
@@ -190,6 +193,7 @@ __all__ = [
     "plan_bench",
     "plan_maneuver",
     "plot_logs",
+    "posterior",
     "rate_loop_steps",
     "read",
     "read_control",

@@ -18,6 +18,7 @@ EXTRA_OF: Mapping[str, str] = {
     "control": "model",
     "matplotlib": "plot",
     "casadi": "export",
+    "blackjax": "posterior",
     "pymavlink": "link",
     "imageio_ffmpeg": "live",
     "pyulog": "logs",

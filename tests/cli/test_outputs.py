@@ -19,7 +19,7 @@ from swashplate.api import identification
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
 from swashplate.cli.outputs import folder_when_complete, place_of
-from swashplate.errors import SwashError
+from swashplate.errors import IdentificationError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Estimate, Result
@@ -106,7 +106,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Iterator[Work]:
     for verb in ("identify", "validate"):
         monkeypatch.setattr(identification, verb, getattr(done, verb))
     monkeypatch.setattr(identification, "structure_of", lambda *results, title: results)
-    monkeypatch.setattr(identification, "write_page", lambda path, results: done.report(*results, path=path))
+    monkeypatch.setattr(
+        "swashplate.api.report_folder.write_page", lambda path, results: done.report(*results, path=path)
+    )
     return done
 
 
@@ -116,6 +118,49 @@ def _identify(simulated: Path, *extra: str | Path) -> Any:
 
 def _names(folder: Path) -> list[str]:
     return sorted(entry.name for entry in folder.iterdir())
+
+
+def test_identify_writes_the_posterior_that_was_asked_for(work: Work, simulated: Path, tmp_path: Path) -> None:
+    del work
+    outcome = _identify(simulated, "--posterior", "laplace", "--out", tmp_path / "fit")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert _names(tmp_path / "fit") == ["fit.json", "model.toml", "posterior.nc", "report.html"]
+    assert "posterior by laplace" in outcome.out
+    fit = sp.load(tmp_path / "fit" / "fit.json")
+    assert fit.posterior is not None
+    assert fit.posterior.draws.shape == (4, 1000, 1)
+
+
+def test_a_posterior_that_did_not_converge_ends_with_code_two_and_keeps_the_fit(
+    work: Work, simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del work
+
+    def refused(*_: Any, **__: Any) -> Any:
+        raise IdentificationError("the posterior did not converge: split-R-hat 1.2.")
+
+    monkeypatch.setattr(identification, "draw_posterior", refused)
+    outcome = _identify(simulated, "--posterior", "nuts", "--out", tmp_path / "fit")
+    assert outcome.code == 2
+    assert "its posterior is not: the posterior did not converge: split-R-hat 1.2" in outcome.err
+    assert _names(tmp_path / "fit") == ["fit.json", "model.toml", "report.html"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (("--posterior", "metropolis"), "'metropolis' is no posterior; there are laplace, nuts"),
+        (("--posterior", "nuts", "--horizon", "0.5,1"), "errors ahead are no likelihood"),
+        (("--posterior", "nuts", "--nested"), "does not go with --nested"),
+    ],
+)
+def test_a_posterior_that_cannot_be_is_refused_before_the_fit(
+    work: Work, simulated: Path, asked: tuple[str, ...], words: str
+) -> None:
+    outcome = _identify(simulated, *asked)
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert not work.asked
 
 
 def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simulated: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from swashplate.api.report_folder import ReportFolder
 from swashplate.api.saying import Say, silent
+from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core import stopping
@@ -17,6 +18,8 @@ from swashplate.identification.core.records import POSE, records
 from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
+from swashplate.identification.posterior import check_posterior
+from swashplate.identification.posterior import posterior as draw_posterior
 from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.models.card import Card
 from swashplate.models.choices import Free
@@ -38,12 +41,14 @@ class Identification(ReportFolder):
     Attributes:
         fit: what the identification found.
         validation: on what the fit has not seen; None without such flights, or for a fit that has failed.
+        refused: why a posterior that was asked for may not be used, in words; "" where none was, or it may.
     """
 
-    files: ClassVar[tuple[str, ...]] = ("report.html", "model.toml", "fit.json", "validation.json")
+    files: ClassVar[tuple[str, ...]] = ("report.html", "model.toml", "fit.json", "validation.json", "posterior.nc")
 
     fit: Result[Vehicle, FlightDetails]
     validation: Validation | None
+    refused: str = ""
 
     @property
     def model(self) -> Vehicle:
@@ -66,6 +71,8 @@ class Identification(ReportFolder):
             self.validation.save(folder / "validation.json")
         if not self.fit.failed:
             self.fit.model.save(folder / "model.toml")
+        if self.fit.posterior is not None:
+            self.fit.posterior.save(folder / "posterior.nc")
 
     def lines(self) -> list[str]:
         """The report's own warnings and five lines, in words."""
@@ -75,7 +82,8 @@ class Identification(ReportFolder):
         return told + [f"{label + ':':11} {words}" for label, words, _ in summary(self.fit, self.validation)]
 
     def __repr__(self) -> str:
-        return "\n".join([repr(self.fit), "", *self.lines()])
+        told = [] if self.fit.posterior is None else ["", repr(self.fit.posterior)]
+        return "\n".join([repr(self.fit), *told, "", *self.lines()])
 
 
 def identify_and_validate(
@@ -94,6 +102,7 @@ def identify_and_validate(
     keep_unexcited: bool = False,
     wind: bool = False,
     horizon: Sequence[float] | None = None,
+    posterior: str | None = None,
     names: Sequence[str] | None = None,
     say: Say = silent,
 ) -> Identification:
@@ -105,6 +114,8 @@ def identify_and_validate(
         hold_out: conditioned flights that the fit never sees.
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
         iterations, keep_unexcited, wind, horizon: as of `identify`.
+        posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`). One that did
+            not converge is left out, and `refused` says why.
         names: what the user calls the flights and the hold-outs, for messages.
         say: told what is being done.
 
@@ -117,6 +128,14 @@ def identify_and_validate(
     check_disjoint([*seen, *unseen], names)
     # What can be said without computing is said at once, before the seconds that loading and compiling take.
     check_method(method)
+    if posterior is not None:
+        check_posterior(posterior)
+        if posterior == "nuts" and horizon is not None:
+            raise IdentificationError(
+                "errors ahead are no likelihood, and NUTS draws from one.",
+                channel="posterior",
+                hint="Leave --horizon away, or take 'laplace'.",
+            )
     if vehicle.structure is None or method in TRACKED:
         parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
     if method in TRACKED:
@@ -139,10 +158,17 @@ def identify_and_validate(
             horizon=horizon,
             progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
         )
-    fit = stopping.told(fit)
+    fit, refused = stopping.told(fit), ""
+    if posterior is not None and not fit.failed:
+        drawing = f"drawing the posterior by {posterior}"
+        say(drawing)
+        try:
+            fit = draw_posterior(fit, method=posterior, progress=lambda i, n: say(drawing, done=i, total=n))
+        except IdentificationError as error:  # the fit is worth its minutes
+            refused = str(error)
     validation = None
     if unseen and not fit.failed:
         validating = "validating on what the fit has not seen"
         say(validating)
         validation = validate(fit, unseen, progress=lambda i, n: say(validating, done=i, total=n))
-    return Identification(fit, validation)
+    return Identification(fit, validation, refused)

@@ -92,7 +92,6 @@ app.command("rotor-speed", short_help="Measure rotor speed from vibration in a l
 app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and take them out.")(
     reconstruct.reconstruct
 )
-app.command("maneuver", short_help="Design an excitation to fly and check its rules.")(maneuver.maneuver)
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
@@ -100,6 +99,7 @@ app.command("compare", short_help="Responses, models or fits side by side.")(com
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")
+app.add_typer(maneuver.app, name="maneuver")
 app.add_typer(link.app, name="link")
 app.add_typer(control.app, name="control")
 app.add_typer(vehicles.app, name="vehicles")

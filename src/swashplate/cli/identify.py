@@ -69,6 +69,15 @@ def identify(
         ),
     ] = False,
     horizon: options.HorizonAhead = None,
+    posterior: Annotated[
+        str | None,
+        typer.Option(
+            "--posterior",
+            metavar="laplace|nuts",
+            help="Draws of what the fit does not know, in posterior.nc (ArviZ reads it) and for Monte Carlo: laplace "
+            "(normal, free) or nuts (of the likelihood itself, minutes; extra 'posterior').",
+        ),
+    ] = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
     mapping: options.Mapping = None,
@@ -80,7 +89,8 @@ def identify(
     """Identify a vehicle from flights, validate it on others, and write a report.
 
     Writes report.html, model.toml, fit.json and (with --hold-out) validation.json to --out. A fit that ends at values
-    which physics forbids has failed: exit code 2, a report that says so, and no model.
+    which physics forbids has failed: exit code 2, a report that says so, and no model. A posterior that did not
+    converge is not written: exit code 2, its diagnostics, and the fit.
     """
     import swashplate as sp
     from swashplate.api.nested import NestedComparison
@@ -99,6 +109,7 @@ def identify(
             for name, given in (
                 ("--prior CARD", prior_card is not None),
                 ("--horizon", horizon is not None),
+                ("--posterior", posterior is not None),
                 ("--wind", wind),
                 ("--keep-unexcited", keep_unexcited),
             )
@@ -131,6 +142,7 @@ def identify(
             keep_unexcited=keep_unexcited,
             wind=wind,
             horizon=options.seconds_ahead(horizon),
+            posterior=posterior,
             **asked_for,
         )
 
@@ -144,6 +156,8 @@ def identify(
     if made.fit.failed:
         typer.echo(f"The fit failed: {' '.join(made.fit.problems) or 'see the report.'}", err=True)
         raise typer.Exit(Exit.INPUT)
+    if made.refused:
+        flying.end_with([f"The fit is written, its posterior is not: {made.refused}"], code=Exit.INPUT)
 
 
 def carried_out(make: Callable[[Callable[..., None]], Made], *, out: Path | None, quiet: bool) -> Made:
@@ -175,5 +189,7 @@ def show(made: Identification | NestedComparison, *, out: Path | None, json: boo
 
         fit = made.fits.fit if isinstance(made, NestedComparison) else made.fit
         console().print(fit_table(fit) if hasattr(fit.solution, "card") else repr(fit))
+        if fit.posterior is not None:
+            typer.echo(f"\n{fit.posterior!r}")
         place = place_of(out, "report.html", made.files) if out else "not written (give --out DIR)"
         typer.echo("\n" + "\n".join([*made.lines(), f"Report:     {place}"]))

@@ -1,16 +1,37 @@
-"""`swash maneuver`: an excitation to fly, as a table and as ArduPilot's parameters, with its design rules checked."""
+"""`swash maneuver`: an excitation to fly, its rules checked, or designed for what is unknown of a model."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from swashplate.cli import options
 from swashplate.errors import SwashError
 
+_CHECK = "check"
 
+
+class SpecFirst(TyperGroup):
+    """A group that takes `swash maneuver SPEC` as `swash maneuver check SPEC`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        known = {*self.commands, "--help", "-h"}
+        return super().parse_args(ctx, [_CHECK, *args] if args and args[0] not in known else args)
+
+
+app = typer.Typer(
+    cls=SpecFirst,
+    help='Design an excitation to fly: check one that you describe (`swash maneuver "sweep:pitch,0.5-8Hz,60s"`), or '
+    "let one be designed for what is unknown of a model.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
+)
+
+
+@app.command(_CHECK, short_help="Check an excitation against the design rules, and write it.")
 def maneuver(
     spec: Annotated[
         str,
@@ -75,3 +96,99 @@ def maneuver(
             typer.echo("\n" + planned.chirp.parameter_file().rstrip())
         if written:
             typer.echo(f"\nWritten: {', '.join(map(str, written))}")
+
+
+@app.command("design", short_help="The excitation that tells most of what is unknown, within limits.")
+def design(
+    for_: Annotated[str, typer.Option("--for", metavar="MODEL", help="A vehicle's name, or a card or model file.")],
+    unknown: Annotated[
+        str, typer.Option("--unknown", metavar="NAMES", help="Parameters that the flight is to tell, by commas.")
+    ],
+    limits: Annotated[
+        str,
+        typer.Option(
+            "--limits",
+            metavar="NAME=VALUE,...",
+            help="Some of amplitude [1], attitude [deg], rate [deg/s], place [m], battery [s], seconds; by default "
+            "attitude=20,rate=120,place=3,seconds=30.",
+        ),
+    ] = "",
+    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Frequencies [Hz].")] = "0.3-8",
+    axes: Annotated[
+        str | None, typer.Option("--axes", help="Of roll, pitch, yaw, heave, by commas; all that the vehicle has.")
+    ] = None,
+    criterion: Annotated[
+        str, typer.Option("--criterion", help="D (least volume of the errors) or A (least sum of squares).")
+    ] = "D",
+    robust: Annotated[
+        str, typer.Option("--robust", help="average over draws of the prior, or for the worst of them.")
+    ] = "average",
+    spread: Annotated[
+        float, typer.Option("--spread", help="Share by which the unknowns may be off.", min=0.0, max=0.9)
+    ] = 0.3,
+    draws: Annotated[int, typer.Option("--draws", help="Draws of the prior.", min=1, max=100)] = 5,
+    rate: Annotated[float, typer.Option("--rate", help="Of the series and of the log [Hz].", min=20.0)] = 100.0,
+    seed: Annotated[int, typer.Option("--seed", help="Of the draws.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE", help="The series as .csv, the flight card beside it as .txt."),
+    ] = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Design a multisine for what is unknown, in the closed loop, and say what it buys beside a sweep and a 3-2-1-1.
+
+    Prints the bounds that each would reach, what each second buys, and a flight card. Where nothing within the limits
+    tells all that is unknown: exit code 2, and what stands in the way.
+    """
+    import swashplate as sp
+    from swashplate.cli.console import as_json, console, progress
+    from swashplate.cli.tables import table
+
+    if out is not None and out.suffix.lower() != ".csv":
+        raise SwashError(f"ends in '{out.suffix}', expected .csv.", where=out, channel="--out")
+    asked = dict(_limit(item) for item in limits.split(",") if item.strip())
+    with progress(quiet=quiet or json) as line:
+        made = sp.design_maneuver(
+            sp.vehicle(for_),
+            [name.strip() for name in unknown.split(",") if name.strip()],
+            limits=asked,
+            band=_band(band),
+            axes=None if axes is None else [axis.strip() for axis in axes.split(",") if axis.strip()],
+            criterion=criterion,
+            robust=robust,
+            spread=spread,
+            draws=draws,
+            rate=rate,
+            seed=seed,
+            say=line.say,
+        )
+    written = () if out is None else made.save(out)
+    if json:
+        typer.echo(as_json(made.to_document() | {"written": [str(path) for path in written]}))
+    elif not quiet:
+        console().print(table(*made.rows(), left=1))
+        typer.echo("\nWhat each second buys")
+        console().print(table(*made.seconds_rows()))
+        typer.echo("\n" + made.card())
+        if written:
+            typer.echo(f"\nWritten: {', '.join(map(str, written))}")
+
+
+def _limit(item: str) -> tuple[str, float]:
+    name, equals, value = item.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise SwashError(
+            f"is '{item.strip()}', expected NAME=VALUE" + ("" if equals else ", e.g. attitude=15") + ".",
+            channel="--limits",
+        ) from None
+
+
+def _band(text: str) -> tuple[float, float]:
+    low, _, high = text.strip().lower().removesuffix("hz").partition("-")
+    try:
+        return float(low), float(high)
+    except ValueError:
+        raise SwashError(f"is '{text}', expected LOW-HIGH, e.g. 0.3-8.", channel="--band") from None

@@ -41,29 +41,38 @@ def relative_peak_factor(signal: Array) -> float:
     return float(np.ptp(signal)) / (2.0 * np.sqrt(2.0) * spread) if spread > 0.0 else float("inf")
 
 
-def _sum(harmonics: NDArray[np.int64], phases: Array, turns: Array) -> Array:
+def least_peak(numbers: tuple[int, ...], amplitudes: tuple[float, ...]) -> tuple[tuple[float, ...], float]:
+    """Phases of least peak of lines with amplitudes of their own, begun at zero, and that peak."""
+    return _optimised(numbers, amplitudes)
+
+
+def _sum(harmonics: NDArray[np.int64], phases: Array, turns: Array, amplitudes: Array | None = None) -> Array:
     """Sum of cosines at times counted in records; whole records are taken off first, which keeps the angles exact."""
     part = np.mod(turns, 1.0)
     total = np.zeros(part.shape)
     for i in range(0, harmonics.size, _BLOCK):
         own = harmonics[i : i + _BLOCK]
-        total += np.cos(2.0 * np.pi * np.multiply.outer(part, own) + phases[i : i + _BLOCK]).sum(axis=-1)
+        waves = np.cos(2.0 * np.pi * np.multiply.outer(part, own) + phases[i : i + _BLOCK])
+        total += (waves if amplitudes is None else waves * amplitudes[i : i + _BLOCK]).sum(axis=-1)
     return total
 
 
 @lru_cache(maxsize=64)
-def _optimised(numbers: tuple[int, ...]) -> tuple[tuple[float, ...], float]:
+def _optimised(
+    numbers: tuple[int, ...], amplitudes: tuple[float, ...] | None = None
+) -> tuple[tuple[float, ...], float]:
     """Phases of least peak, turned so that the signal begins at zero, and that peak."""
     from scipy.optimize import minimize
 
     harmonics = np.asarray(numbers, dtype=np.int64)
     size = int(2 ** np.ceil(np.log2(8 * harmonics[-1])))
     number = np.arange(1.0, harmonics.size + 1.0)
+    weights = None if amplitudes is None else np.asarray(amplitudes)
     phases = -np.pi * number * (number - 1.0) / harmonics.size
 
     def signal(angles: Array, n: int = size) -> Array:
         spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
-        spectrum[harmonics] = 0.5 * n * np.exp(1j * angles)
+        spectrum[harmonics] = 0.5 * n * np.exp(1j * angles) * (1.0 if weights is None else weights)
         return np.asarray(np.fft.irfft(spectrum, n))
 
     def norm(angles: Array, order: int) -> tuple[float, Array]:
@@ -76,7 +85,7 @@ def _optimised(numbers: tuple[int, ...]) -> tuple[tuple[float, ...], float]:
             raised = raised * raised * part
         total = float(np.sum(raised * part))
         moments = np.fft.rfft(raised)[harmonics]
-        slope = np.imag(moments * np.exp(-1j * angles)) / (top * total)
+        slope = np.imag(moments * np.exp(-1j * angles)) / (top * total) * (1.0 if weights is None else weights)
         return np.log(top) + np.log(total / size) / (2 * order), slope
 
     best = phases
@@ -85,17 +94,27 @@ def _optimised(numbers: tuple[int, ...]) -> tuple[tuple[float, ...], float]:
         found = minimize(norm, best, args=(order,), jac=True, method="CG", options={"maxiter": steps})
         if np.max(np.abs(signal(found.x))) < np.max(np.abs(signal(best))):
             best = np.asarray(found.x, dtype=np.float64)
-    return _from_zero(harmonics, best, signal(best, 8 * size))
+    return _from_zero(harmonics, best, signal(best, 8 * size), weights)
 
 
-def _from_zero(harmonics: NDArray[np.int64], phases: Array, x: Array) -> tuple[tuple[float, ...], float]:
+def _from_zero(
+    harmonics: NDArray[np.int64], phases: Array, x: Array, amplitudes: Array | None
+) -> tuple[tuple[float, ...], float]:
     """The same signal begun at its gentlest upward passage through zero."""
     from scipy.optimize import brentq
 
     up = np.flatnonzero((x <= 0.0) & (np.roll(x, -1) > 0.0))
     first = int(up[np.argmin(np.roll(x, -1)[up] - x[up])])
-    at = brentq(
-        lambda t: float(_sum(harmonics, phases, np.asarray([t]))[0]), first / x.size, (first + 1) / x.size, xtol=1e-14
+
+    def value(turn: float) -> float:
+        return float(_sum(harmonics, phases, np.asarray([turn]), amplitudes)[0])
+
+    ends = first / x.size, (first + 1) / x.size
+    # Few lines may touch zero at a sample, where rounding gives the sign.
+    at = (
+        brentq(value, *ends, xtol=1e-14)
+        if value(ends[0]) <= 0.0 < value(ends[1])
+        else min(ends, key=lambda t: abs(value(t)))
     )
     turned = np.mod(phases + 2.0 * np.pi * harmonics * at, 2.0 * np.pi)
     return tuple(turned.tolist()), float(np.max(np.abs(x)))

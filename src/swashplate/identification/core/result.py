@@ -17,6 +17,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
+from swashplate.identification.core.posterior_draws import Posterior, adjusted
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
@@ -123,6 +124,14 @@ class Drawable(Protocol):
     def with_values(self, values: Mapping[str, float]) -> Any: ...
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """What was minimised and where the search ended: likelihood and scaled row, as long as the program runs."""
+
+    likelihood: Any
+    row: Array
+
+
 @dataclass(frozen=True, repr=False)
 class Result(Shown, Generic[Model, Details]):
     """What an identification found.
@@ -149,7 +158,9 @@ class Result(Shown, Generic[Model, Details]):
         data: what it was fitted to: names, SHA-256 and what was done to it.
         settings: what was asked.
         details: what only this method has.
+        posterior: draws of what the fit does not know (`swashplate.posterior`); None: normal ones, when asked for.
         seconds: wall time; it is no part of the document.
+        fitted: the likelihood and its optimum, for a posterior; None where the method has none, or for a file's result.
     """
 
     method: str
@@ -173,7 +184,9 @@ class Result(Shown, Generic[Model, Details]):
     comparisons: tuple[Compared, ...] = ()
     data: tuple[DataSource, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
+    posterior: Posterior | None = None
     seconds: float = 0.0
+    fitted: Fitted | None = field(default=None, repr=False, compare=False)
 
     @cached_property
     def _by_name(self) -> dict[str, Estimate]:
@@ -233,8 +246,8 @@ class Result(Shown, Generic[Model, Details]):
     def draw_values(self, count: int, *, seed: int, corrected: bool = True, within: Any = None) -> dict[str, Array]:
         """Parameters of models that the data cannot tell from the identified one, shape (count,) each.
 
-        Normal about the estimates, from their covariance; a draw outside a bound of physics is drawn again. Ties are
-        kept where they equate two parameters.
+        From the posterior where there is one by NUTS; otherwise normal about the estimates, from their covariance. A
+        draw outside a bound of physics is drawn again. Ties are kept where they equate two parameters.
 
         Args:
             count: how many. seed: of the draws.
@@ -243,7 +256,7 @@ class Result(Shown, Generic[Model, Details]):
 
         Raises:
             IdentificationError: for a fit that has failed, that knows no spread, or whose spread lies mostly outside
-                the bounds of physics.
+                the bounds of physics; or for a posterior that did not converge.
         """
         where = f"the fit of {self.name}"
         if self.failed:
@@ -256,10 +269,31 @@ class Result(Shown, Generic[Model, Details]):
             told = "has no standard deviation." if vague else "knows no spread: nothing was free."
             raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
         low, high = bounds_of(self.solution if within is None else within, self.names)
+        if self.posterior is not None and self.posterior.method != "laplace":
+            found = self._of_posterior(low, high, count, seed=seed, corrected=corrected)
+            drawn = {name: found[:, i] for i, name in enumerate(self.names)}
+            return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
         mean = np.array([self[name].value for name in self.names])
         found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
         drawn = {name: found[:, i] for i, name in enumerate(self.names)}
         return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
+
+    def _of_posterior(self, low: Array, high: Array, count: int, *, seed: int, corrected: bool) -> Array:
+        """Some of the posterior's draws, each once as long as there are enough, (count, p)."""
+        assert self.posterior is not None
+        where = f"the posterior of {self.name}"
+        self.posterior.check(where=where)
+        values = self.posterior.values
+        if corrected and np.all(np.isfinite(self.covariance_corrected)):
+            values = adjusted(values, self.covariance, self.covariance_corrected)
+        kept = values[np.all((values >= low) & (values <= high), axis=1)]
+        if 2 * len(kept) < len(values):
+            raise IdentificationError(
+                f"only {len(kept)} of {len(values)} draws lie within the bounds of physics.",
+                where=where,
+                hint="The fit knows too little; fix parameters or add data.",
+            )
+        return kept[np.random.default_rng(seed).choice(len(kept), count, replace=count > len(kept))]
 
     def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:
         """Vehicles that the data cannot tell from the identified one (see `draw_values`, which it takes).

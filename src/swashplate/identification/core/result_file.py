@@ -28,7 +28,9 @@ from swashplate.models.vehicle import Vehicle
 
 KIND, SCHEMA = "result", 1
 _HINT = "`swash identify --out DIR` (or fit-ss, fit-tf, fit-time) writes DIR/fit.json."
-_SPECIAL = ("solution", "model", "start", "details", "seconds")
+_SPECIAL = ("solution", "model", "start", "details", "seconds", "fitted")
+_RARE = {"comparisons", "posterior"}
+"""Entries that a document may lack."""
 _TOLD = {"kind", "schema", "costs"}
 """Entries that are no field: what it is, and J of each response for readers who leave the comparisons out."""
 
@@ -41,6 +43,7 @@ def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[s
         comparisons: False leaves the time histories and responses out, which are most of it.
     """
     left_out = {*_SPECIAL, *(() if comparisons else ("comparisons",))}
+    left_out |= {"posterior"} if result.posterior is None else set()
     return {
         "kind": KIND,
         "schema": SCHEMA,
@@ -75,8 +78,8 @@ def from_document(
         )
     hints = typing.get_type_hints(Result)
     table: dict[str, Any] = {}
-    names = {f.name for f in fields(Result)} - {"seconds", "solution"} | {"model"}
-    for name in names - {"comparisons"} | (set(document) - _TOLD):
+    names = {f.name for f in fields(Result)} - {"seconds", "solution", "fitted"} | {"model"}
+    for name in names - _RARE | (set(document) - _TOLD):
         if name not in names:
             raise DocumentError("is not known here.", where=where, channel=name[:60])
         if name not in document:

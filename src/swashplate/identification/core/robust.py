@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from swashplate.arrays import Array
+
+if TYPE_CHECKING:
+    from jax.typing import ArrayLike
 
 KNEE = 4.0
 """Whitened residuals beyond this many standard deviations count linearly (Huber 1964)."""
@@ -12,8 +18,13 @@ KNEE = 4.0
 
 def huber(whitened: Array) -> float:
     """Sum of the loss."""
-    size = np.abs(whitened)
-    return float(np.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2).sum())
+    return float(losses(whitened, np).sum())
+
+
+def losses(whitened: ArrayLike, xp: ModuleType) -> Any:
+    """The loss of each whitened residual, in NumPy or JAX."""
+    size = xp.abs(whitened)
+    return xp.where(size < KNEE, 0.5 * size**2, KNEE * size - 0.5 * KNEE**2)
 
 
 def weights(whitened: Array) -> Array:

@@ -15,7 +15,7 @@ from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
-from swashplate.identification.core.result import Constant, Estimate, Result, correlation_of
+from swashplate.identification.core.result import Constant, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Likelihood, Optimum, Progress, minimise
 from swashplate.identification.core.sources import DataSource
 from swashplate.identification.core.time_likelihood import TimeErrors
@@ -204,6 +204,7 @@ def result_of(
         data=tuple(data),
         settings=dict(settings) | told_horizon(solved.horizon),
         seconds=seconds,
+        fitted=Fitted(likelihood, solved.whole) if solved.horizon is None else None,
     )
 
 

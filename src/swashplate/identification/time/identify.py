@@ -17,7 +17,7 @@ from swashplate.identification.core.low_passed import noise_too_small, refuse_lo
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import POSE, Record, records
-from swashplate.identification.core.result import APART, Estimate, Result, correlation_of
+from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Optimum, Progress, minimise
 from swashplate.identification.core.sources import sources_of
 from swashplate.identification.estimators import Data, Question
@@ -133,6 +133,7 @@ def identify_flight(
         failed=bool(problems),
         comparisons=likelihood.comparisons(row),
         data=sources_of(flights),
+        fitted=Fitted(likelihood, optimum.row) if horizon is None else None,
         seconds=time.perf_counter() - started,
         settings={
             "method": method,

@@ -9,7 +9,7 @@ derivative through the equations sample by sample).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial, wraps
 from typing import Any
@@ -21,6 +21,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel, commands
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
+from swashplate.identification.core.robust import losses
 from swashplate.identification.time.start_states import start_state, steady_flight
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
@@ -151,6 +152,20 @@ def _beginning(
         voltage=voltage[0],
     )
     return reaching, gain, FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
+
+
+def traced_cost(plan: FilterPlan, data: Mapping[str, Any], row: jax.Array) -> Any:
+    """Negative log-likelihood of the counted innovations (traceable), as `PredictionError.cost` has it.
+
+    Args:
+        plan, row: as `innovations` takes them.
+        data: its data, and "counted" (records, n).
+    """
+    found, covariances, _ = innovations(plan, data, row)
+    roots = jnp.linalg.cholesky(covariances)
+    white = jax.vmap(lambda L, nu: jax.scipy.linalg.solve_triangular(L, nu.T, lower=True).T)(roots, found)
+    logarithms = jnp.log(jnp.diagonal(roots, axis1=1, axis2=2)).sum(axis=-1)
+    return jnp.where(data["counted"], losses(white, jnp).sum(axis=-1) + logarithms[:, None], 0.0).sum()
 
 
 # ---- derivatives ---------------------------------------------------------------------------------------------------

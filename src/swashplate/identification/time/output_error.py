@@ -7,7 +7,7 @@ residuals (Jategaonkar 2015, ch. 4; Bock 1983 for the shooting).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,6 +25,7 @@ from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Layout, Parameterization
 from swashplate.identification.core.records import Record, logs
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import parameter_entries, stack_records
 from swashplate.identification.time.start_states import slopes, start_state
@@ -167,6 +168,10 @@ class OutputError:
             return np.inf
         white = np.linalg.solve(self._L, flat.T)
         return robust.huber(np.asarray(white, dtype=np.float64)) + flat.shape[0] * float(np.log(np.diag(self._L)).sum())
+
+    def traced(self) -> TracedCost:
+        """The cost as a function that JAX differentiates, with the covariance of the last accepted row."""
+        return TracedCost(_traced_cost, self._plan, self._data | {"root": jnp.asarray(self._L)})
 
     def refresh(self, row: Array) -> None:
         """Covariance of the residuals at an accepted row, outliers weighed down."""
@@ -312,6 +317,13 @@ def _residuals(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
     places = jnp.arange(initial.shape[0])
     outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
     return data["outputs"] - outputs, states
+
+
+def _traced_cost(plan: _Plan, data: Mapping[str, Any], row: jax.Array) -> Any:
+    """Negative log-likelihood of the residuals at a given root of their covariance (traceable)."""
+    flat = _residuals(plan, data, row)[0].reshape(-1, data["root"].shape[0])
+    white = jax.scipy.linalg.solve_triangular(data["root"], flat.T, lower=True)
+    return robust.losses(white, jnp).sum() + flat.shape[0] * jnp.log(jnp.diag(data["root"])).sum()
 
 
 @partial(jax.jit, static_argnums=0)

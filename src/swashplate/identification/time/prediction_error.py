@@ -24,8 +24,9 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time import innovations_ahead
-from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, unpack
+from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, traced_cost, unpack
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.start_states import mean_velocity, slopes
 
@@ -221,6 +222,10 @@ class PredictionError:
         """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
         gradient, information, values, _ = self._accumulate(row)
         return self._cost(*values), gradient, information
+
+    def traced(self) -> TracedCost:
+        """The cost as a function that JAX differentiates."""
+        return TracedCost(traced_cost, self._plan, self._data | {"counted": jnp.asarray(self.counted)})
 
     def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
         given = (self._plan, self._data, jnp.asarray(row))

@@ -25,6 +25,7 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.parameters import Layout, Parameterization
 from swashplate.identification.core.records import Record
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries, gust_entries
 from swashplate.identification.time.prediction_error import parameter_entries
 from swashplate.models.nesting import leaves
@@ -154,6 +155,16 @@ class VehicleErrors(TimeErrors):
             errors, slopes = _slopes(plan, given, data, numbers, scale)
             yield every, np.asarray(errors), np.asarray(slopes)
 
+    def traced(self) -> TracedCost:
+        """The cost as a function that JAX differentiates; a Kalman gain keeps the sensors' noise of the last row."""
+        data = {
+            "given": self._given | {"sensors": jnp.asarray(self.covariance)},
+            "records": self._data,
+            "scale": jnp.asarray(self.row.scale),
+            "floor": jnp.asarray(self.floor),
+        }
+        return TracedCost(_traced_cost, tuple(self._plans), data)
+
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
         numbers, given = jnp.asarray(row * self.row.scale), self._given | {"sensors": jnp.asarray(self.covariance)}
@@ -255,6 +266,17 @@ def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
     """Errors of one record (n, n_outputs): measured less predicted from earlier samples (output error: from none)."""
     f = _filter(plan, given, data, numbers)
     return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[0]
+
+
+def _traced_cost(plans: tuple[_Plan, ...], data: Mapping[str, Any], row: jax.Array) -> Any:
+    """Negative log-likelihood at its own covariance, without constants (traceable), as `TimeErrors.cost` has it."""
+    numbers = row * data["scale"]
+    parts = [_traced_errors(p, data["given"], d, numbers) for p, d in zip(plans, data["records"], strict=True)]
+    errors = jnp.concatenate(parts)
+    covariance = errors.T @ errors / len(errors) + jnp.diag(data["floor"])
+    if plans[0].method == "filter-error":
+        return 0.5 * len(errors) * jnp.log(jnp.diag(covariance)).sum()
+    return 0.5 * len(errors) * jnp.linalg.slogdet(covariance)[1]
 
 
 def _traced_ahead(

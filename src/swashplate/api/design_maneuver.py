@@ -1,0 +1,553 @@
+"""The verb `design_maneuver`: what to fly so that a flight tells some parameters best, and what each second buys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.api.saying import Say, silent
+from swashplate.arrays import Array, Complex
+from swashplate.atomic import write_text
+from swashplate.control.laws.hold import hover_hold
+from swashplate.control.laws.state_hold import state_hold
+from swashplate.errors import ManeuverError, SwashError
+from swashplate.filtering.disturbances import Noise
+from swashplate.flights.csv_export import as_csv
+from swashplate.flights.maneuvers.ardupilot_chirp import MIXER, Chirp
+from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
+from swashplate.flights.maneuvers.maneuver_design import sampled
+from swashplate.flights.maneuvers.multisine import dealt
+from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, FADE, Maneuver, parse
+from swashplate.identification.design.information import (
+    DELAY_SIGMA,
+    Sensed,
+    bounds_from,
+    line_information,
+    sensed,
+)
+from swashplate.identification.design.powers import best_powers
+from swashplate.models.vehicle import Vehicle
+from swashplate.registry import listed
+from swashplate.simulation.closed_loop import Controller, simulate_maneuver
+from swashplate.simulation.trim import Trim
+from swashplate.text_table import text_table
+
+LIMITS = ("amplitude", "attitude", "rate", "place", "battery", "seconds")
+"""What may be limited: deflection [1], attitude from trim [deg], body rates [deg/s], distance [m], a battery's flight
+and the maneuver [s]."""
+_USUAL: Mapping[str, float] = {"attitude": 20.0, "rate": 120.0, "place": 3.0, "seconds": 30.0}
+_LEAD = 3.0
+_PROBE = 0.2
+"""Share of the largest deflection at which the closed loop is probed: where it is still linear."""
+_PEAK = 1.7
+"""Peak over root mean square that phases of least peak are counted on to reach; what they reach is flown."""
+_VAGUE = 50.0
+"""Percent of a value that a bound may have where a maneuver is called feasible."""
+_TRIES = 6
+_SMALLEST = 0.02
+_STEPS = (0.25, 0.5, 1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """One way to fly, and what it would tell.
+
+    Attributes:
+        kind: "multisine" (designed), "sweep" or "3211".
+        pieces: maneuvers, flown one after the other.
+        seconds: of excitation.
+        bounds: standard deviation of each unknown, in its unit, the worst of the prior's draws.
+        peaks: largest attitude [deg], rate [deg/s] and distance [m] in the draws.
+    """
+
+    kind: str
+    pieces: tuple[Maneuver, ...]
+    seconds: float
+    bounds: Mapping[str, float]
+    peaks: Mapping[str, float]
+
+
+@dataclass(frozen=True, repr=False)
+class DesignedManeuver:
+    """What to fly for some parameters.
+
+    Attributes:
+        vehicle: whose. unknown: the parameters.
+        offers: the designed multisine first, then the usual maneuvers of the same length and limits.
+        buys: seconds of the designed one, and the bounds then.
+        limits: that were kept. criterion, robust, draws, spread: see `design_maneuver`.
+        rate: of the series [Hz].
+    """
+
+    vehicle: Vehicle
+    unknown: tuple[str, ...]
+    offers: tuple[Offer, ...]
+    buys: tuple[tuple[float, Mapping[str, float]], ...]
+    limits: Mapping[str, float]
+    criterion: str
+    robust: str
+    draws: int
+    spread: float
+    rate: float
+
+    @property
+    def best(self) -> Offer:
+        """The offer whose bounds multiply (D) or add up, in squares, (A) to least."""
+        values = [abs(self.vehicle.card.parameters[n].value) or 1.0 for n in self.unknown]
+
+        def size(offer: Offer) -> float:
+            relative = np.array([offer.bounds[n] for n in self.unknown]) / values
+            return float(np.sum(np.log(relative)) if self.criterion == "D" else np.sum(relative**2))
+
+        return min(self.offers, key=size)
+
+    def percent(self, bounds: Mapping[str, float]) -> list[str]:
+        """Bounds in percent of the values."""
+        return [
+            f"{100.0 * bounds[n] / (abs(self.vehicle.card.parameters[n].value) or np.nan):.3g}" for n in self.unknown
+        ]
+
+    def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Heading and cells: what each way to fly would tell, bounds in percent."""
+        head = ("fly", "seconds", *(f"{n} %" for n in self.unknown), "attitude deg", "rate deg/s", "place m")
+        rows = [
+            (
+                o.kind,
+                f"{o.seconds:g}",
+                *self.percent(o.bounds),
+                *(f"{o.peaks[k]:.3g}" for k in ("attitude", "rate", "place")),
+            )
+            for o in self.offers
+        ]
+        return head, rows
+
+    def seconds_rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Heading and cells: what each length of the designed maneuver buys."""
+        head = ("seconds", *(f"{n} %" for n in self.unknown))
+        return head, [(f"{t:g}", *self.percent(bounds)) for t, bounds in self.buys]
+
+    def card(self) -> str:
+        """The flight card, to print: what to fly, in which order, when to stop."""
+        best, limits = self.best, self.limits
+        bounds = [f"{n} {p} %" for n, p in zip(self.unknown, self.percent(best.bounds), strict=True)]
+        lines = [
+            f"FLIGHT CARD   {self.vehicle.name}: {', '.join(self.unknown)}",
+            "",
+            "Before",
+            f"  [ ] log at {self.rate:g} Hz or faster: commands, pose, battery voltage"
+            + (", both rotor speeds" if self.vehicle.traits.coaxial else ""),
+            f"  [ ] room of {2.0 * limits['place']:.3g} m, nobody inside; battery for at least "
+            f"{best.seconds + 2.0 * _LEAD * len(best.pieces):.0f} s",
+            "Fly",
+        ]
+        for number, piece in enumerate(best.pieces, 1):
+            band = "" if piece.band is None else f", {piece.band[0]:.2g}-{piece.band[1]:.2g} Hz"
+            peaks = f"at most {piece.amplitude:.3g}"
+            if isinstance(piece, ComposedMultisine):
+                tops = {axis: float(np.max(np.abs(s))) for axis, s in piece.signals(_times(piece, self.rate)).items()}
+                peaks = ", ".join(f"{axis} at most {top:.3g}" for axis, top in tops.items())
+            lines.append(
+                f"  [ ] {number}. hover {_LEAD:g} s, {piece.kind} of {'+'.join(piece.axes)}{band}, "
+                f"{piece.duration:.4g} s, {peaks}, hover {_LEAD:g} s"
+            )
+        lines += [
+            "Expect",
+            f"  attitude within {best.peaks['attitude']:.3g} deg, rates within {best.peaks['rate']:.3g} deg/s, "
+            f"{best.peaks['place']:.2g} m from the start",
+            "Stop",
+            f"  [ ] beyond {limits['attitude']:g} deg, {limits['rate']:g} deg/s or {limits['place']:g} m; "
+            "an input at its limit for a second; a sound that is new; battery low",
+            "After",
+            f"  [ ] the bounds should be {', '.join(bounds)}",
+        ]
+        return "\n".join(lines)
+
+    def save(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the best offer's series as .csv (numbered where there are several), the card as .txt, and ArduPilot's
+        parameters as .param where all of it is sweeps of sticks.
+
+        Raises:
+            ManeuverError: for another suffix than .csv.
+        """
+        file = Path(path)
+        if file.suffix.lower() != ".csv":
+            raise ManeuverError(f"ends in '{file.suffix}', expected .csv.", where=path)
+        written, pieces = [], self.best.pieces
+        for number, piece in enumerate(pieces, 1):
+            own = file if len(pieces) == 1 else file.with_stem(f"{file.stem}-{number}")
+            written.append(write_text(own, as_csv(sampled(piece, rate=self.rate))))
+            if piece.kind == "sweep" and piece.axes[0] in MIXER and piece.amplitude <= 1.0 and piece.band is not None:
+                fade = FADE * piece.duration
+                chirp = Chirp.planned(
+                    MIXER[piece.axes[0]], piece.amplitude, piece.band, record=piece.duration, fade=fade
+                )
+                written.append(write_text(own.with_suffix(".param"), chirp.parameter_file()))
+        written.append(write_text(file.with_suffix(".txt"), self.card() + "\n"))
+        return tuple(written)
+
+    def to_document(self) -> dict[str, Any]:
+        """All of it as what becomes JSON."""
+        return {
+            "vehicle": self.vehicle.name,
+            "unknown": list(self.unknown),
+            "best": self.best.kind,
+            "offers": [
+                {"kind": o.kind, "seconds": o.seconds, "bounds": dict(o.bounds), "peaks": dict(o.peaks),
+                 "pieces": [vars(p) for p in o.pieces]}
+                for o in self.offers
+            ],
+            "buys": [{"seconds": t, "bounds": dict(bounds)} for t, bounds in self.buys],
+            "limits": dict(self.limits),
+            "criterion": self.criterion,
+            "robust": self.robust,
+            "draws": self.draws,
+            "spread": self.spread,
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        told = (
+            f"bounds are the worst of {self.draws} draws of the prior" if self.draws > 1 else "at the model's numbers"
+        )
+        return "\n".join(
+            [
+                f"For {', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
+                text_table(*self.rows()),
+                "",
+                "What each second buys",
+                text_table(*self.seconds_rows()),
+                "",
+                self.card(),
+            ]
+        )
+
+
+def design_maneuver(
+    vehicle: Vehicle,
+    unknown: Sequence[str],
+    *,
+    limits: Mapping[str, float] | None = None,
+    band: tuple[float, float] = (0.3, 8.0),
+    axes: Sequence[str] | None = None,
+    criterion: str = "D",
+    robust: str = "average",
+    spread: float = 0.3,
+    draws: int = 5,
+    noise: Noise | None = None,
+    controller: Callable[[Vehicle, Trim], Controller] | None = None,
+    rate: float = 100.0,
+    seed: int = 0,
+    say: Say = silent,
+) -> DesignedManeuver:
+    """Design a maneuver from hover for what is unknown, beside a sweep and a 3-2-1-1 of the same length and limits.
+
+    The powers of a multisine's lines are chosen for the information that they give in the closed loop, by the model's
+    exact slopes and the noise that the likelihoods of flights have; its phases for a low peak. Each way to fly is then
+    simulated with all nonlinearity and made smaller until it keeps the limits, for every draw of the prior.
+
+    Args:
+        vehicle: whose numbers are the prior's middle.
+        unknown: the parameters.
+        limits: some of `LIMITS`; by default 20 deg, 120 deg/s, 3 m, 30 s, and the usual deflections of each axis.
+        band: lowest and highest frequency [Hz].
+        axes: that may be moved; all that the vehicle has where None.
+        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors).
+        robust: "average" over draws of the prior, or for the "worst" of them.
+        spread: the unknowns are drawn within this share about the model's; 0 trusts the model.
+        draws: how many, the model itself among them.
+        noise: of air and sensors; what fits begin with where None.
+        controller: of the closed loop; the hold of the vehicle's kind where None.
+        rate: of the series and of the log [Hz].
+        seed: of the draws.
+        say: told what is being done.
+
+    Raises:
+        ManeuverError: where nothing feasible tells all that is unknown, with what stands in the way.
+        IdentificationError: an unknown parameter, or a vehicle whose pose is not tracked.
+    """
+    unknown = tuple(dict.fromkeys(unknown))
+    kept = _checked_limits(limits or {})
+    _checked(criterion, robust, spread, draws, band, rate)
+    moved = _axes_of(vehicle, axes)
+    seconds, noise = kept["seconds"], noise or Noise()
+    if "battery" in kept and seconds + 2.0 * _LEAD > kept["battery"]:
+        raise ManeuverError(
+            f"{seconds:g} s and {2.0 * _LEAD:g} s of hover are more than the battery's {kept['battery']:g} s.",
+            channel="battery",
+            hint=f"Fly at most {max(kept['battery'] - 2.0 * _LEAD, 0.0):g} s at a time.",
+        )
+    lines = dealt(band[0], band[1], seconds, axes=len(moved))
+    if min(own.size for own in lines) < 2 or seconds * band[0] < 2.0:
+        raise ManeuverError(
+            f"{seconds:g} s hold {seconds * band[0]:.1f} periods of {band[0]:g} Hz and "
+            f"{min(own.size for own in lines)} lines an axis, expected at least 2 of each.",
+            channel="seconds",
+            hint=f"Fly at least {max(2.0, 2.0 * len(moved)) / band[0]:.3g} s, or begin at a higher frequency.",
+        )
+    peak = {axis: kept.get("amplitude", DEFAULT_AMPLITUDE.get(axis, 0.1)) for axis in moved}
+    say("linearising the draws of the prior")
+    models = _draws(vehicle, unknown, spread, draws, seed)
+    told = _Told(models, [sensed(one, unknown) for one in models], unknown, noise, rate, controller or _hold)
+    say("probing the closed loop")
+    numbers = np.concatenate(lines)
+    owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
+    responses = told.probe(moved, lines, seconds, peak)
+    values = np.array([abs(vehicle.card.parameters[n].value) or 1.0 for n in unknown])
+    scale = np.outer(*[np.append(values, DELAY_SIGMA)] * 2)
+    frequency = numbers / seconds
+    per_power = np.stack(
+        [2.0 * seconds * scale * told.lines(d, frequency, response) for d, response in enumerate(responses)]
+    )
+    known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
+    allowed = np.array([(peak[axis] / _PEAK) ** 2 for axis in moved])
+    say("choosing powers")
+    power = best_powers(per_power, owner, allowed, known, criterion=criterion, worst=robust == "worst")
+    powers = {a: dict(zip(lines[i].tolist(), power[owner == i], strict=True)) for i, a in enumerate(moved)}
+    design = composed(powers, duration=seconds, peak=peak)
+    table = {axis: (lines[i] / seconds, [r[owner == i] for r in responses]) for i, axis in enumerate(moved)}
+    low = max(band[0], 4.001 * len(moved) / seconds)  # a sweep needs four periods
+    block = seconds / len(moved) / 7.0
+    rivals: list[tuple[str, list[Maneuver]]] = [("multisine", [design])]
+    if low < band[1]:
+        sweeps = [parse(f"sweep:{a},{low:.6g}-{band[1]:g}Hz,{seconds / len(moved):.6g}s,{peak[a]:g}") for a in moved]
+        rivals.append(("sweep", sweeps))
+    rivals.append(("3211", [parse(f"3211:{a},{block:.6g}s,{peak[a]:g}") for a in moved]))
+    offers, why = [], []
+    for kind, pieces in rivals:
+        say(f"flying the {kind} in simulation")
+        try:
+            offers.append(_offer(kind, pieces, told, table, kept))
+        except ManeuverError as trouble:
+            why.append(f"{kind}: {trouble.args[0] if trouble.args else trouble}")
+    if not offers:
+        raise ManeuverError(f"no maneuver is feasible: {'; '.join(why)}", where=vehicle.name, channel="limits")
+    first = offers[0]
+    buys = []
+    for share in _STEPS:
+        total = [share * told.information(d, first.pieces, table) for d in range(len(models))]
+        buys.append((share * first.seconds, _worst(total, unknown)))
+    made = DesignedManeuver(
+        vehicle, unknown, tuple(offers), tuple(buys), kept, criterion, robust, len(models), spread, rate
+    )
+    _refuse_vague(made, values)
+    return made
+
+
+def _refuse_vague(made: DesignedManeuver, values: Array) -> None:
+    percent = {n: 100.0 * made.best.bounds[n] / v for n, v in zip(made.unknown, values, strict=True)}
+    vague = {n: p for n, p in percent.items() if not p <= _VAGUE}
+    if not vague:
+        return
+    named = ", ".join(f"{n} {p:.3g} %" if np.isfinite(p) else f"{n} not at all" for n, p in vague.items())
+    longest = max(vague.values())
+    hint = "Ask for fewer unknowns: some of these move together, or nothing measured shows them."
+    if np.isfinite(longest):
+        hint = f"It would take {made.best.seconds * (longest / _VAGUE) ** 2:.3g} s, wider limits, or fewer unknowns."
+    raise ManeuverError(
+        f"no maneuver within the limits tells it: the best leaves {named}, expected at most {_VAGUE:g} %.",
+        where=made.vehicle.name,
+        channel=", ".join(vague),
+        hint=hint,
+    )
+
+
+# ---- checks ----------------------------------------------------------------------------------------------------------
+def _checked_limits(limits: Mapping[str, float]) -> dict[str, float]:
+    for name, value in limits.items():
+        if name not in LIMITS:
+            raise ManeuverError("is no limit.", channel=name, hint=f"There are {', '.join(LIMITS)}.")
+        if not 0.0 < value < np.inf:
+            raise ManeuverError(f"is {value:g}, expected a number above zero: nothing could be flown.", channel=name)
+    return {**_USUAL, **limits}
+
+
+def _checked(criterion: str, robust: str, spread: float, draws: int, band: tuple[float, float], rate: float) -> None:
+    for channel, value, expected in (("criterion", criterion, ("D", "A")), ("robust", robust, ("average", "worst"))):
+        if value not in expected:
+            raise ManeuverError(f"is '{value}', expected {' or '.join(expected)}.", channel=channel)
+    if not 0.0 <= spread < 1.0 or draws < 1:
+        raise ManeuverError(f"a spread of {spread:g} with {draws} draws makes no sense.", channel="spread")
+    if not 0.0 < band[0] < band[1] <= 0.4 * rate:
+        raise ManeuverError(
+            f"is {band[0]:g} to {band[1]:g} Hz, expected it to rise to at most {0.4 * rate:g} Hz.", channel="band"
+        )
+
+
+def _axes_of(vehicle: Vehicle, axes: Sequence[str] | None) -> tuple[str, ...]:
+    has = tuple(axis for axis in AXES if axis in vehicle.stick_axes)
+    moved = has if axes is None else tuple(dict.fromkeys(axes))
+    strange = [axis for axis in moved if axis not in has]
+    if strange or not moved:
+        raise ManeuverError(
+            f"is no axis of '{vehicle.name}'." if strange else f"'{vehicle.name}' has no axes to move.",
+            channel=", ".join(strange) or "axes",
+            hint=f"It has {listed(has)}.",
+        )
+    return moved
+
+
+def _draws(vehicle: Vehicle, unknown: Sequence[str], spread: float, draws: int, seed: int) -> list[Vehicle]:
+    """The vehicle, and others with the unknowns anywhere within the spread and the bounds of physics."""
+    random, made, card = np.random.default_rng(seed), [vehicle], vehicle.card.parameters
+    absent = [name for name in unknown if name not in card]
+    if absent:
+        sensed(vehicle, absent)  # says what it has
+    for _ in range(draws - 1 if spread > 0.0 else 0):
+        told = {}
+        for name in unknown:
+            low, high = (-np.inf if card[name].lower is None else card[name].lower), card[name].upper
+            value = card[name].value * (1.0 + spread * random.uniform(-1.0, 1.0))
+            told[name] = float(np.clip(value, low, np.inf if high is None else high))
+        made.append(vehicle.with_values(told))
+    return made
+
+
+def _hold(vehicle: Vehicle, about: Trim) -> Controller:
+    return hover_hold(vehicle, about) if vehicle.traits.coaxial else state_hold(vehicle, about)
+
+
+# ---- what is told ----------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class _Told:
+    """The draws of the prior, and what lines of a maneuver tell in each."""
+
+    models: Sequence[Vehicle]
+    sensed: Sequence[Sensed]
+    unknown: tuple[str, ...]
+    noise: Noise
+    rate: float
+    controller: Callable[[Vehicle, Trim], Controller]
+
+    def lines(self, draw: int, frequency: Array, inputs: Complex) -> Array:
+        return line_information(self.sensed[draw], frequency, inputs, self.noise, rate=self.rate)
+
+    def fly(self, draw: int, maneuver: Maneuver) -> tuple[Array, Array, Array]:
+        """Time from the maneuver's start, states and inputs; a flight that is lost is none."""
+        vehicle = self.models[draw]
+        flown = simulate_maneuver(vehicle, maneuver, controller=self.controller, lead=_LEAD, tail=_LEAD, rate=self.rate)
+        time = flown.time(vehicle.state_names[0]) - _LEAD
+        return time, flown.array(vehicle.state_names), flown.array(vehicle.input_names)
+
+    def probe(
+        self, axes: Sequence[str], lines: Sequence[NDArray[np.int64]], seconds: float, peak: Mapping[str, float]
+    ) -> list[Complex]:
+        """What every input does in the closed loop at each line per unit of its axis' own, (lines, m), of each draw.
+
+        Two periods are flown and the second is taken: what begins the first has died away.
+        """
+        small = {axis: _PROBE * peak[axis] for axis in axes}
+        twice = {a: {2 * int(n): 1.0 for n in own} for a, own in zip(axes, lines, strict=True)}
+        maneuver = composed(twice, duration=2.0 * seconds, peak=small)
+        found: list[Complex] = []
+        for draw in range(len(self.models)):
+            time, _, inputs = self.fly(draw, maneuver)
+            inside = (time >= seconds - 1e-9) & (time < 2.0 * seconds - 0.5 / self.rate)
+            rows = []
+            for axis, own in zip(axes, lines, strict=True):
+                asked = maneuver.signals(time[inside])[axis]
+                turning = np.exp(-2j * np.pi * np.multiply.outer(own / seconds, time[inside]))
+                rows.append((turning @ inputs[inside]) / (turning @ asked)[:, None])
+            found.append(np.asarray(np.concatenate(rows), dtype=np.complex128))
+        return found
+
+    def information(
+        self, draw: int, pieces: Sequence[Maneuver], table: Mapping[str, tuple[Array, list[Complex]]]
+    ) -> Array:
+        """Information (p + 1, p + 1) of maneuvers that are flown one after the other."""
+        total = np.zeros((len(self.unknown) + 1,) * 2)
+        for piece in pieces:
+            time = _times(piece, self.rate)
+            length = time.size / self.rate
+            for axis, signal in piece.signals(time).items():
+                amplitude = 2.0 * np.abs(np.fft.rfft(signal)) / time.size
+                frequency = np.fft.rfftfreq(time.size, 1.0 / self.rate)
+                known, responses = table[axis]
+                # Beyond the probed band nothing is counted.
+                seen = (frequency >= known[0] - 1e-9) & (frequency <= known[-1] + 1e-9) & (amplitude > 1e-9)
+                if not seen.any():
+                    continue
+                response = _between(frequency[seen], known, responses[draw])
+                own = self.lines(draw, frequency[seen], response)
+                total += length * np.einsum("f,fpq->pq", amplitude[seen] ** 2, own)
+        return total
+
+
+def _times(piece: Maneuver, rate: float) -> Array:
+    return np.arange(round(piece.duration * rate)) / rate
+
+
+def _between(frequency: Array, known: Array, response: Complex) -> Complex:
+    """Responses (f, m) at other frequencies, straight between the known ones."""
+    columns = [np.interp(frequency, known, c.real) + 1j * np.interp(frequency, known, c.imag) for c in response.T]
+    return np.stack(columns, axis=1)
+
+
+def _worst(information: Sequence[Array], unknown: Sequence[str]) -> dict[str, float]:
+    worst = np.max([bounds_from(one) for one in information], axis=0)
+    return dict(zip(unknown, map(float, worst), strict=True))
+
+
+def _offer(
+    kind: str,
+    pieces: Sequence[Maneuver],
+    told: _Told,
+    table: Mapping[str, tuple[Array, list[Complex]]],
+    limits: Mapping[str, float],
+) -> Offer:
+    """A way to fly, made smaller until it keeps the limits in every draw."""
+    fitted, peaks = [], dict.fromkeys(("attitude", "rate", "place"), 0.0)
+    for piece in pieces:
+        small, reached = _fitted(piece, told, limits)
+        fitted.append(small)
+        peaks = {name: max(peaks[name], reached[name]) for name in peaks}
+    total = [told.information(draw, fitted, table) for draw in range(len(told.models))]
+    return Offer(kind, tuple(fitted), sum(p.duration for p in fitted), _worst(total, told.unknown), peaks)
+
+
+def _fitted(piece: Maneuver, told: _Told, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
+    share = 1.0
+    for _ in range(_TRIES):
+        tried = _smaller(piece, share)
+        try:
+            every = [_peaks(told, draw, tried) for draw in range(len(told.models))]
+        except SwashError:  # lost in flight
+            share *= 0.4
+            continue
+        reached = {name: max(one[name] for one in every) for name in every[0]}
+        over = max(reached[name] / limits[name] for name in reached)
+        if over <= 1.0:
+            return tried, reached
+        share *= 0.95 / over
+        if share < _SMALLEST:
+            break
+    raise ManeuverError(
+        f"not even {100.0 * share:.2g} % of the usual deflection keeps "
+        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m.",
+        hint="Widen the limits, or fly a controller that holds better.",
+    )
+
+
+def _smaller(piece: Maneuver, share: float) -> Maneuver:
+    if isinstance(piece, ComposedMultisine):
+        return piece.scaled(share)
+    return replace(piece, amplitude=share * piece.amplitude)
+
+
+def _peaks(told: _Told, draw: int, piece: Maneuver) -> dict[str, float]:
+    """Largest attitude from trim [deg], rate [deg/s] and distance from the start [m]."""
+    vehicle = told.models[draw]
+    time, states, _ = told.fly(draw, piece)
+    start = states[np.searchsorted(time, -1e-9)]
+
+    def away(*names: str) -> Array:
+        return np.array([states[:, vehicle.index(name)] - start[vehicle.index(name)] for name in names])
+
+    return {
+        "attitude": float(np.degrees(np.max(np.abs(away("phi", "theta"))))),
+        "rate": float(np.degrees(np.max(np.abs(away("p", "q", "r"))))),
+        "place": float(np.max(np.linalg.norm(away("x", "y", "z"), axis=0))),
+    }

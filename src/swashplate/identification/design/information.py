@@ -1,0 +1,166 @@
+"""What a maneuver would tell of some parameters before it is flown: Fisher information line by line.
+
+About steady flight the motion at a frequency is `X = (jw - A)^-1 B U`, and a parameter moves it by
+`(jw - A)^-1 (A' X + B' U)`, with exact slopes A', B'. The innovations of a filter see that through the inverse of what
+disturbed air and sensors add to the outputs, so a line of amplitude c flown for T seconds adds
+`T / 2 c^2 Re(S^H Phi^-1 S)` (Goodwin and Payne 1977, ch. 6; Ljung 1999, sec. 13.4). U is what the inputs do in the
+closed loop. A delay of all inputs together is taken for unknown, as the fits take it. What gusts add to the inputs is
+left out, which widens the bounds; trims, lever arms and the noise's own numbers are taken for known, which narrows
+them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from swashplate.arrays import Array, Complex
+from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
+from swashplate.identification.core.records import POSE
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.dynamics import (
+    SURROUNDINGS,
+    Equations,
+    enable_double_precision,
+    equations_of,
+    parameter_row,
+    row_rates,
+)
+from swashplate.simulation.trim import Trim, trim
+
+DELAY_SIGMA = 0.05
+"""Prior standard deviation [s] of the delay that is unknown, as in the fits."""
+
+
+_TOLD, _PART = 1e-12, 1e-18
+"""Share of the information below which a direction is not told, and the part in one from which a parameter is not."""
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """A linear model with slopes by the parameters in question.
+
+    Attributes:
+        A, B: about steady flight (n, n), (n, m).
+        dA, dB: slopes by the parameters (n, n, p), (n, m, p).
+        outputs, disturbed: places of the measured and of the disturbed states.
+        trim: steady flight.
+    """
+
+    A: Array
+    B: Array
+    dA: Array
+    dB: Array
+    outputs: Array
+    disturbed: Array
+    trim: Trim
+
+
+def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
+    """The linear model of a vehicle in hover with exact slopes by some parameters.
+
+    Raises:
+        IdentificationError: an unknown parameter, or a vehicle without tracked pose or body rates.
+    """
+    strange = [name for name in unknown if name not in vehicle.parameter_names]
+    if strange or not unknown:
+        raise IdentificationError(
+            f"is no parameter of '{vehicle.name}'." if strange else "names nothing.",
+            channel=", ".join(strange) or "unknown",
+            hint=f"It has {', '.join(vehicle.parameter_names)}.",
+        )
+    lacking = [name for name in (*POSE, *DISTURBED) if name not in vehicle.state_names]
+    if lacking:
+        raise IdentificationError(
+            f"'{vehicle.name}' has no such states, and the noise of flights is known for a tracked pose only.",
+            channel=", ".join(lacking),
+        )
+    enable_double_precision()
+    about = trim(vehicle)
+    around = [getattr(about.environment, name) for name in SURROUNDINGS]
+    w = np.array([*about.inputs, *around], dtype=np.float64)
+    p = parameter_row(vehicle, about.environment)
+    places = np.array([vehicle.parameter_names.index(name) for name in unknown])
+    (A, W), (dA, dW) = _with_slopes(equations_of(vehicle), about.state, w, p, np.eye(p.size)[places])
+    m = len(vehicle.input_names)
+    return Sensed(
+        np.asarray(A),
+        np.asarray(W)[:, :m],
+        np.moveaxis(np.asarray(dA), 0, -1),
+        np.moveaxis(np.asarray(dW)[:, :, :m], 0, -1),
+        np.array([vehicle.index(name) for name in POSE]),
+        np.array([vehicle.index(name) for name in DISTURBED]),
+        about,
+    )
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _with_slopes(equations: Equations, x: Array, w: Array, p: Array, directions: Array) -> Any:
+    """Slopes of the rates by states and inputs, and their slopes along directions of the parameters."""
+    slopes = jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))
+    moved = jax.vmap(lambda d: jax.jvp(lambda row: slopes(x, w, row), (p,), (d,))[1])(directions)
+    return slopes(x, w, p), moved
+
+
+def output_noise(model: Sensed, frequency: Array, noise: Noise, *, rate: float) -> Complex:
+    """Two-sided power density of what air and sensors add to the outputs, (f, outputs, outputs).
+
+    Args:
+        model: of the vehicle. frequency: [Hz], above zero.
+        noise: of air and sensors, as the likelihoods have it.
+        rate: of the log [Hz].
+    """
+    w = 2.0 * np.pi * frequency
+    white = on_axes(noise.white_horizontal, noise.white_vertical, noise.white_tilt, noise.white_yaw)
+    gust = on_axes(noise.gust_horizontal, noise.gust_vertical, noise.gust_tilt, noise.gust_yaw)
+    tau = on_axes(noise.tau_gust_force, noise.tau_gust_force, noise.tau_gust_moment, noise.tau_gust_moment)
+    drift = on_axes(noise.drift_force, noise.drift_force, noise.drift_moment, noise.drift_moment)
+    power = [a**2 + b**2 / (w**2 + t**-2.0) + c**2 / w**2 for a, b, t, c in zip(white, gust, tau, drift, strict=True)]
+    way = _resolvent(model, w)[:, model.outputs][:, :, model.disturbed]
+    spread = np.einsum("fij,jf,fkj->fik", way, np.array(power), way.conj())
+    sensors = np.array([noise.sensor_position] * 3 + [noise.sensor_angle] * 3) ** 2 / rate
+    return np.asarray(spread + np.diag(sensors))
+
+
+def line_information(model: Sensed, frequency: Array, inputs: Complex, noise: Noise, *, rate: float) -> Array:
+    """Information per second of what the inputs do at each line, (f, p + 1, p + 1); the last is the common delay.
+
+    Args:
+        model: with its slopes.
+        frequency: of the lines [Hz].
+        inputs: their amplitudes there, (f, m), complex.
+        noise: of air and sensors. rate: of the log [Hz].
+    """
+    w = 2.0 * np.pi * frequency
+    resolvent = _resolvent(model, w)
+    states = np.einsum("fij,jk,fk->fi", resolvent, model.B, inputs)
+    pushed = np.einsum("ijp,fj->fip", model.dA, states) + np.einsum("imp,fm->fip", model.dB, inputs)
+    seen = np.einsum("fij,fjp->fip", resolvent, pushed)
+    late = (-1j * w[:, None] * states)[:, :, None]
+    slopes = np.concatenate([seen, late], axis=2)[:, model.outputs]
+    weighed = np.linalg.solve(output_noise(model, frequency, noise, rate=rate), slopes)
+    return np.asarray(0.5 * np.einsum("fip,fiq->fpq", slopes.conj(), weighed).real)
+
+
+def _resolvent(model: Sensed, w: Array) -> Complex:
+    return np.asarray(np.linalg.inv(1j * w[:, None, None] * np.eye(len(model.A)) - model.A))
+
+
+def bounds_from(information: Array) -> Array:
+    """Standard deviations of the parameters, (p,), with the delay unknown; infinite where nothing is told."""
+    total = np.array(information)
+    total[-1, -1] += DELAY_SIGMA**-2.0
+    scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    scaled = total / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    told = values > _TOLD
+    variance = np.sum(vectors[:, told] ** 2 / values[told], axis=1)
+    variance[np.any(vectors[:, ~told] ** 2 > _PART, axis=1)] = np.inf
+    return np.asarray((np.sqrt(variance) / scale)[:-1])

@@ -1,0 +1,174 @@
+"""`posterior`: what a fit does not know, as draws: normal ones, or those of the likelihood itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
+from swashplate.extras import library
+from swashplate.identification.core import accuracy
+from swashplate.identification.core.draws import normal_within
+from swashplate.identification.core.parameter_row import Row
+from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior
+from swashplate.identification.core.result import Fitted, Result, bounds_of
+
+METHODS = ("laplace", "nuts")
+WARMUP = 150
+"""Draws of each chain in which its step is found."""
+BLOCK = 50
+"""Draws of each chain between two looks at whether they are enough."""
+_LEAST = 100
+
+
+def posterior(
+    result: Result[Any, Any],
+    *,
+    method: Literal["laplace", "nuts"] | str = "laplace",
+    draws: int = 1000,
+    chains: int = 4,
+    warmup: int = WARMUP,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result[Any, Any]:
+    """A fit with draws of what it does not know, which `draw`, Monte Carlo and the control check then take.
+
+    "laplace" is free: normal about the estimates from the covariance of the likelihood. "nuts" draws from the
+    likelihood and the priors themselves, with every start state, delay, bias and noise that the fit moved (No-U-Turn
+    sampler, Hoffman and Gelman 2014): from the fit, on exact gradients, in the metric of the Fisher information. It
+    sees skewed and bounded parameters as they are, and ends when every number has a split-R-hat below 1.01 and every
+    parameter 400 effective draws. Residuals count as the likelihood has them (white): where the fit corrects its bounds
+    for coloured ones, `draw` widens the draws by the same matrices.
+
+    Args:
+        result: of a fit in this program (NUTS), or any with a covariance ("laplace").
+        method: "laplace" or "nuts".
+        draws: of each chain at most.
+        chains: how many.
+        warmup: draws of each chain in which its step is found.
+        seed: of all that is random.
+        progress: told draws of a chain so far, and at most.
+
+    Raises:
+        IdentificationError: for a fit that failed, a result from a file or of a method without a likelihood in time
+            (NUTS), and draws that did not converge, with their diagnostics.
+        MissingLibraryError: where NUTS is asked for and blackjax is not installed.
+    """
+    where = f"the fit of {result.name}"
+    check_posterior(method)
+    for name, value, least in (("draws", draws, _LEAST), ("chains", chains, 2), ("warmup", warmup, 0)):
+        if value < least:
+            raise IdentificationError(f"is {value}, expected at least {least}.", channel=name)
+    if result.failed:
+        raise IdentificationError("has failed: it has no posterior.", where=where, hint="Fit it again.")
+    if method == "laplace":
+        return replace(result, posterior=_laplace(result, draws=draws, chains=chains, seed=seed, where=where))
+    fitted = result.fitted
+    if fitted is None or not hasattr(fitted.likelihood, "traced"):
+        told = "comes from a file" if fitted is None else f"is by {result.method}"
+        raise IdentificationError(
+            f"{told}, and NUTS needs the likelihood of records in time itself.",
+            where=where,
+            channel="posterior",
+            hint="Fit the flights again with --posterior nuts (without a horizon), or take 'laplace'.",
+        )
+    if not result.converged:
+        raise IdentificationError(
+            "did not converge: chains would start from nowhere.", where=where, hint="Allow more iterations."
+        )
+    made = _nuts(result, fitted, draws=draws, chains=chains, warmup=warmup, seed=seed, progress=progress)
+    made.check(where=where)
+    return replace(result, posterior=made)
+
+
+def check_posterior(method: str) -> None:
+    """That there is such a posterior, and the library that it needs.
+
+    Raises:
+        IdentificationError, MissingLibraryError: where not.
+    """
+    if method not in METHODS:
+        raise IdentificationError(f"'{method}' is no posterior; there are {', '.join(METHODS)}.", channel="posterior")
+    if method == "nuts":
+        library("blackjax", what="A posterior by NUTS")
+
+
+def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, where: str) -> Posterior:
+    covariance = result.covariance
+    vague = [n for n, v in zip(result.names, np.diag(covariance), strict=True) if not 0.0 < v < np.inf]
+    if vague or not result.names or not np.all(np.isfinite(covariance)):
+        told = "has no standard deviation." if vague else "knows no spread: nothing was free."
+        raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
+    low, high = bounds_of(result.solution, result.names)
+    mean = np.array([result[name].value for name in result.names])
+    found = normal_within(mean, covariance, low, high, count=draws * chains, seed=seed, where=where)
+    return Posterior(
+        "laplace",
+        result.names,
+        len(result.names),
+        tuple(result[name].unit for name in result.names),
+        found.reshape(chains, draws, -1),
+        seed=seed,
+    )
+
+
+def _nuts(
+    result: Result[Any, Any],
+    fitted: Fitted,
+    *,
+    draws: int,
+    chains: int,
+    warmup: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+) -> Posterior:
+    from swashplate.identification.core import nuts
+
+    likelihood, row = fitted.likelihood, fitted.likelihood.row
+    likelihood.refresh(fitted.row)
+    information = likelihood.scores(fitted.row)[2]
+    covariance = accuracy.covariance(row, information, row.prior(fitted.row)[2])
+    k = len(result.names)
+
+    def enough(found: nuts.Chains) -> bool:
+        if found.rows.shape[1] < min(draws, _LEAST):
+            return False
+        good = np.all(nuts.effective(found.rows[:, :, :k]) >= LEAST_ESS)
+        return bool(good and np.all(nuts.split_rhat(found.rows) < SPLIT_RHAT))
+
+    found = nuts.sample(
+        likelihood.traced(),
+        row,
+        fitted.row,
+        covariance,
+        chains=chains,
+        warmup=warmup,
+        block=BLOCK,
+        most=draws,
+        enough=enough,
+        seed=seed,
+        progress=progress,
+    )
+    return Posterior(
+        "nuts",
+        row.names,
+        k,
+        tuple(result[name].unit for name in result.names),
+        _plain_numbers(row, found.rows),
+        nuts.split_rhat(found.rows),
+        nuts.effective(found.rows),
+        found.stats,
+        found.step,
+        seed,
+    )
+
+
+def _plain_numbers(row: Row, scaled: Array) -> Array:
+    """Scaled rows (..., p) in units, logarithms undone."""
+    numbers = scaled * row.scale
+    logarithmic = row.column("logarithmic") > 0.0
+    return np.where(logarithmic, np.exp(np.where(logarithmic, numbers, 0.0)), numbers)

@@ -1,0 +1,89 @@
+"""The No-U-Turn sampler on densities whose answer is known, bounds among them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from swashplate.identification.core import nuts
+from swashplate.identification.core.parameter_row import Entry, Row
+from swashplate.identification.core.scoring import TracedCost
+
+WALL = 1.5
+"""Sigmas from the mean to the lower bound of the second number."""
+TIED = np.array([[1.0, 0.9], [0.9, 1.0]])
+
+
+def half_squares(plan: tuple[float, ...], data: Any, row: Any) -> Any:
+    """A correlated pair, and a third that is exponential above zero."""
+    away = row[:2] / jnp.array(plan)
+    return 0.5 * away @ jnp.linalg.solve(data["tied"], away) + row[2]
+
+
+PLAN = (1.0, 2.0)
+ROW = Row(
+    (
+        Entry("free", "parameter", 0.0, 1.0),
+        Entry("walled", "parameter", 0.0, 1.0, lower=-2.0 * WALL),
+        Entry("exponential", "parameter", 0.0, 1.0, lower=0.0),
+    )
+)
+
+
+@lru_cache(maxsize=1)
+def chains() -> nuts.Chains:
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = TIED * np.outer(PLAN, PLAN)
+    covariance[2, 2] = 1.0
+    traced = TracedCost(half_squares, PLAN, {"tied": TIED})
+    asked: dict[str, Any] = {"chains": 3, "warmup": 100, "block": 400, "most": 800, "seed": 4}
+    return nuts.sample(traced, ROW, np.zeros(3), covariance, enough=lambda _: False, **asked)
+
+
+def test_the_draws_are_of_the_density_and_keep_its_bounds() -> None:
+    found = chains()
+    assert found.rows.shape == (3, 800, 3)
+    random = np.random.default_rng(0)
+    exact = random.standard_normal((400_000, 2)) @ np.linalg.cholesky(TIED * np.outer(PLAN, PLAN)).T
+    exact = exact[exact[:, 1] > -2.0 * WALL]
+    flat = found.rows.reshape(-1, 3)
+    error = 4.0 / np.sqrt(nuts.effective(found.rows))  # four standard errors of a mean
+    assert np.all(np.abs(flat[:, :2].mean(axis=0) - exact.mean(axis=0)) < error[:2] * exact.std(axis=0))
+    assert abs(flat[:, 2].mean() - 1.0) < error[2]
+    np.testing.assert_allclose(flat.std(axis=0), [*exact.std(axis=0), 1.0], rtol=0.15)
+    assert flat[:, 1].min() > -2.0 * WALL
+    assert flat[:, 2].min() > 0.0
+    assert found.stats["diverging"].mean() < 0.01
+    assert np.all(nuts.split_rhat(found.rows) < 1.02)
+
+
+def test_equal_seeds_give_equal_draws_whatever_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = chains().rows
+    chains.cache_clear()
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    np.testing.assert_array_equal(chains().rows, first)
+
+
+def test_chains_that_never_meet_are_told() -> None:
+    apart = chains().rows + np.array([0.0, 0.5, 5.0])[:, None, None]
+    assert np.all(nuts.split_rhat(apart) > 1.05)
+    assert np.all(nuts.effective(apart) < nuts.effective(chains().rows))
+    drifting = chains().rows + np.linspace(0.0, 5.0, 800)[None, :, None]
+    assert np.all(nuts.split_rhat(drifting) > 1.05)  # only halves against halves can tell
+
+
+@pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (-1.0, np.inf), (-np.inf, 2.0), (-1.0, 2.0), (-0.1, 0.2)])
+def test_the_stretch_of_a_bent_scale_is_its_slope(bounds: tuple[float, float]) -> None:
+    row = Row((Entry("one", "parameter", 0.0, 1.0, lower=bounds[0], upper=bounds[1]),))
+    data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.eye(1))
+    for place in (-2.0, 0.0, 1.3):
+        z = jnp.array([place])
+        (value,), stretch = nuts._unbent(data, z)
+        (slope,) = jax.jacfwd(lambda z: nuts._unbent(data, z)[0][0])(z)
+        assert bounds[0] < value < bounds[1]
+        np.testing.assert_allclose(stretch, np.log(slope), atol=1e-6)  # near one, 1 - sigmoid has few digits left
