@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.api.acceptance import Acceptance
-from swashplate.api.link import link_engine, mapping_of
+from swashplate.api.link import gains_to_write, link_engine, mapping_of
 from swashplate.api.saying import Say, silent
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
@@ -22,6 +22,7 @@ from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.readers.read import read
+from swashplate.links.ardupilot.gains import read_parameter_file
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, hover_stick, mixed, mixer_response
 from swashplate.links.ardupilot.parameters import Parameters, as_written, parameter_file, parameters
 from swashplate.links.ardupilot.runner import serve
@@ -94,7 +95,7 @@ def accept_autopilot(
         band: of the sweeps [Hz]. seconds: of each. hover: in each mode [s].
         height: of the hover [m].
         ekf: simulated time that the autopilot has until it can be armed [s].
-        defaults: parameter files of yours, read last.
+        defaults: parameter files of yours, read last. Without an ATC_RAT_ gain in them the gains are searched.
         environment: wind and air.
         instance: of SITL; each has ports of its own. speedup: most simulated seconds a second.
         timeout: wall clock until the binary has opened its port and says who it is [s].
@@ -128,12 +129,16 @@ def accept_autopilot(
     moves, expected = mixed(mapping, model), parameters(mapping, flying, level)
     chirps = {axis: _chirp(model, moves[axis], axis, band, seconds, float(around.gravity)) for axis in axes}
     first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
+    gains: Parameters = {}
     with listen_udp("127.0.0.1", sitl.physics_port) as bound:
         say("compiling the vehicle")
         plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
         plant.prepare()
         session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
-        _write_files(folder, files, expected, first, defaults, called)
+        if not any(name.startswith("ATC_RAT_") for file in defaults for name in read_parameter_file(file)):
+            say("searching gains with margins")
+            gains = gains_to_write(mapping, flying, level, notice=lambda text: say(text))
+        _write_files(folder, files, expected | gains, first, defaults, called)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
             pilot = TrialPilot(
                 lambda pulses: radio.sendto(pulses, ("127.0.0.1", sitl.rc_port)),

@@ -15,7 +15,7 @@ from swashplate.atomic import write_text
 from swashplate.control.analysis.cascade_gains import cascade_gains
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
-from swashplate.links.ardupilot.parameters import parameter_file, parameters
+from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
 from swashplate.links.recorder import Recorder, recover
@@ -224,13 +224,18 @@ def write_ardupilot_parameters(
     if not file.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
     mapping = mapping_of(vehicle, servos, name=name, suffix="")
-    found = parameters(mapping, vehicle, trim)
+    found = parameters(mapping, vehicle, trim) | gains_to_write(mapping, vehicle, trim, notice=notice)
+    return write_text(file, parameter_file(found, title=vehicle.card.title))
+
+
+def gains_to_write(mapping: ServoMapping, vehicle: Vehicle, trim: Trim, *, notice: Say) -> Parameters:
+    """ArduPilot's gains of all loops by `autopilot_gains`; none, and `notice` is told, where none hold margins."""
     late = complete_delays(vehicle, input_delays(vehicle) or ASSUMED_DELAY)
     try:
-        found |= written_gains(cascade_gains(vehicle, trim, ardupilot_law(mapping, vehicle, trim), delays=late).law)
+        return written_gains(cascade_gains(vehicle, trim, ardupilot_law(mapping, vehicle, trim), delays=late).law)
     except ControllerError as error:
         notice(f"The file has no gains, ArduPilot's own would fly: {error.problem}")
-    return write_text(file, parameter_file(found, title=vehicle.card.title))
+        return {}
 
 
 def _plant(
