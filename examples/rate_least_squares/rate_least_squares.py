@@ -50,7 +50,7 @@ class RateLeastSquares:
         )
         identified = table.vehicle.with_values(dict(zip(names, map(float, found.x), strict=True)), status="identified")
         return Result(
-            method="rate-least-squares", model=identified, start=model, estimates=estimates, names=names,
+            method="rate-least-squares", solution=identified, start=model, estimates=estimates, names=names,
             covariance=covariance, covariance_corrected=np.full_like(covariance, np.nan), details=None,
             correlation=correlation_of(covariance), converged=bool(found.success), data=sources_of(data),
         )  # fmt: skip

@@ -139,7 +139,7 @@ def test_bad_files_are_named_with_their_entry(tmp_path: Path) -> None:
         (("linkage", "leverage"), r"law.leverage: is not known here"),
         (('kind = "controller"', 'kind = "vehicle"'), "kind is 'vehicle', expected 'controller'"),
         (("schema = 1", "schema = 9"), "schema: invalid enum value 9"),
-        (('type = "autopilot"', 'type = "autopiolt"'), "type: is 'autopiolt', expected autopilot, lqg, observed"),
+        (('type = "autopilot"', 'type = "autopiolt"'), "is 'autopiolt', expected ardupilot, autopilot, lqg, observed"),
         (('mode = "place"', 'mode = "acro"'), "mode: is 'acro'"),
         (("rate = 100.0", "rate = 0.0"), "rate: is 0 Hz"),
         (("climb = 3.0", "climb = nan"), r"motors\.climb: is nan, expected a finite number"),

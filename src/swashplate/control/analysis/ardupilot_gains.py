@@ -339,9 +339,14 @@ def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
         change = scale * (after - before)
         if not abs(change) >= (least * abs(scale * before) if relative else least):
             continue  # NaN is no change either
-        words = f"{what} {scale * before:.3g} -> {scale * after:.3g} {unit}".rstrip()
+        words = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
         found.append((words, (change > 0.0) == larger, change))
     return found
+
+
+def _plain(value: float) -> str:
+    """Three digits, without a power of ten where it is long."""
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 def _with_words(s: Suggestion) -> Suggestion:

@@ -24,7 +24,7 @@ from swashplate.models.linear.trimmed_matrices import (
     own_gradients,
     without_kinematics,
 )
-from swashplate.physics.environment import Environment
+from swashplate.physics.atmosphere import SEA_LEVEL_DENSITY
 from swashplate.physics.rigid_body import BODY_UNITS, RigidBody
 
 Gradients = Literal["derivatives", "trims"]
@@ -95,7 +95,7 @@ def stitch_points(
     options |= {"inputs": list(points[0].inputs)}
     options |= {"input_units": [points[0].units.get(name, "1") or "1" for name in points[0].inputs]}
     options |= _limits([model for _, model, _ in every], made, told)
-    options |= {"air_density": densities.pop() if densities else Environment().air_density}
+    options |= {"air_density": densities.pop() if densities else SEA_LEVEL_DENSITY}
     delays = _delays([model for _, model, _ in every], made, told)
     speeds = ", ".join(f"{one.speed:.3g}" for one in made)
     return Card(
