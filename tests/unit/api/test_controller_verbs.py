@@ -113,5 +113,5 @@ def test_a_controller_that_says_nothing_of_itself_is_plain(tmp_path: Path) -> No
     with pytest.raises(ControllerError, match="Hold: has no file"):
         save_controller(hold, tmp_path / "hold.toml")
     (tmp_path / "other.toml").write_text('kind = "controller"\ntype = "pid"\n')
-    with pytest.raises(ControllerError, match="type: is 'pid', expected autopilot, lqg, observed-autopilot"):
+    with pytest.raises(ControllerError, match="type: is 'pid', expected ardupilot, autopilot, lqg, observed-autopilot"):
         read_controller(tmp_path / "other.toml")
