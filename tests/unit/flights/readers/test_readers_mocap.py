@@ -96,7 +96,7 @@ BAD_VICON = {
     "no data": (vicon([]), "seen in 0 of 0 samples"),
     "backwards": (vicon(["2,0,0,0,0,1,1,1", "1,0,0,0,0,1,1,1"]), "time goes backwards at sample 1"),
     "text": (vicon(["1,0,a,0,0,1,1,1"]), "RX: 'a' in line 6 is not a number"),
-    "frame missing": (vicon(["1,0,0,0,0,1,1,1", ",0,0,0,0,1,1,1"]), "time: 1 of 2 samples are not finite"),
+    "frame missing": (vicon(["1,0,0,0,0,1,1,1", ",0,0,0,0,1,1,1"]), "Frame: 1 of 2 samples are not finite"),
     "no pose": (vicon(["1,0,1"], columns="Frame,Sub Frame,RX", units=",,rad"), "TX, TY, TZ, RY, RZ are missing"),
     "odd unit": (
         vicon(["1,0,0,0,0,1,1,1", "2,0,0,0,0,1,1,2"], units=",,rad,rad,rad,ell,ell,ell"),
