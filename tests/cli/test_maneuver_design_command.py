@@ -9,7 +9,7 @@ import pytest
 from commands import one_message, swash
 
 import swashplate as sp
-from swashplate.api.design_maneuver import DesignedManeuver, Offer
+from swashplate.api.designed_maneuver import DesignedManeuver, Offer
 from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.series import parse
 

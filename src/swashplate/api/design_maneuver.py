@@ -4,25 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.api.designed_maneuver import LEAD, DesignedManeuver, Offer, sample_times
 from swashplate.api.saying import Say, silent
 from swashplate.arrays import Array, Complex
-from swashplate.atomic import write_text
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
 from swashplate.errors import ManeuverError, SwashError
 from swashplate.filtering.disturbances import Noise
-from swashplate.flights.csv_export import as_csv
-from swashplate.flights.maneuvers.ardupilot_chirp import MIXER, Chirp
 from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
-from swashplate.flights.maneuvers.maneuver_design import sampled
 from swashplate.flights.maneuvers.multisine import dealt
-from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, FADE, Maneuver, parse
+from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, Maneuver, parse
 from swashplate.identification.design.information import (
     DELAY_SIGMA,
     Sensed,
@@ -35,13 +30,11 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.closed_loop import Controller, simulate_maneuver
 from swashplate.simulation.trim import Trim
-from swashplate.text_table import text_table
 
 LIMITS = ("amplitude", "attitude", "rate", "place", "battery", "seconds")
 """What may be limited: deflection [1], attitude from trim [deg], body rates [deg/s], distance [m], a battery's flight
 and the maneuver [s]."""
 _USUAL: Mapping[str, float] = {"attitude": 20.0, "rate": 120.0, "place": 3.0, "seconds": 30.0}
-_LEAD = 3.0
 _PROBE = 0.2
 """Share of the largest deflection at which the closed loop is probed: where it is still linear."""
 _PEAK = 1.7
@@ -51,179 +44,6 @@ _VAGUE = 50.0
 _TRIES = 6
 _SMALLEST = 0.02
 _STEPS = (0.25, 0.5, 1.0, 2.0)
-
-
-@dataclass(frozen=True)
-class Offer:
-    """One way to fly, and what it would tell.
-
-    Attributes:
-        kind: "multisine" (designed), "sweep" or "3211".
-        pieces: maneuvers, flown one after the other.
-        seconds: of excitation.
-        bounds: standard deviation of each unknown, in its unit, the worst of the prior's draws.
-        peaks: largest attitude [deg], rate [deg/s] and distance [m] in the draws.
-    """
-
-    kind: str
-    pieces: tuple[Maneuver, ...]
-    seconds: float
-    bounds: Mapping[str, float]
-    peaks: Mapping[str, float]
-
-
-@dataclass(frozen=True, repr=False)
-class DesignedManeuver:
-    """What to fly for some parameters.
-
-    Attributes:
-        vehicle: whose. unknown: the parameters.
-        offers: the designed multisine first, then the usual maneuvers of the same length and limits.
-        buys: seconds of the designed one, and the bounds then.
-        limits: that were kept. criterion, robust, draws, spread: see `design_maneuver`.
-        rate: of the series [Hz].
-    """
-
-    vehicle: Vehicle
-    unknown: tuple[str, ...]
-    offers: tuple[Offer, ...]
-    buys: tuple[tuple[float, Mapping[str, float]], ...]
-    limits: Mapping[str, float]
-    criterion: str
-    robust: str
-    draws: int
-    spread: float
-    rate: float
-
-    @property
-    def best(self) -> Offer:
-        """The offer whose bounds multiply (D) or add up, in squares, (A) to least."""
-        values = [abs(self.vehicle.card.parameters[n].value) or 1.0 for n in self.unknown]
-
-        def size(offer: Offer) -> float:
-            relative = np.array([offer.bounds[n] for n in self.unknown]) / values
-            return float(np.sum(np.log(relative)) if self.criterion == "D" else np.sum(relative**2))
-
-        return min(self.offers, key=size)
-
-    def percent(self, bounds: Mapping[str, float]) -> list[str]:
-        """Bounds in percent of the values."""
-        return [
-            f"{100.0 * bounds[n] / (abs(self.vehicle.card.parameters[n].value) or np.nan):.3g}" for n in self.unknown
-        ]
-
-    def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Heading and cells: what each way to fly would tell, bounds in percent."""
-        head = ("fly", "seconds", *(f"{n} %" for n in self.unknown), "attitude deg", "rate deg/s", "place m")
-        rows = [
-            (
-                o.kind,
-                f"{o.seconds:g}",
-                *self.percent(o.bounds),
-                *(f"{o.peaks[k]:.3g}" for k in ("attitude", "rate", "place")),
-            )
-            for o in self.offers
-        ]
-        return head, rows
-
-    def seconds_rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Heading and cells: what each length of the designed maneuver buys."""
-        head = ("seconds", *(f"{n} %" for n in self.unknown))
-        return head, [(f"{t:g}", *self.percent(bounds)) for t, bounds in self.buys]
-
-    def card(self) -> str:
-        """The flight card, to print: what to fly, in which order, when to stop."""
-        best, limits = self.best, self.limits
-        bounds = [f"{n} {p} %" for n, p in zip(self.unknown, self.percent(best.bounds), strict=True)]
-        lines = [
-            f"FLIGHT CARD   {self.vehicle.name}: {', '.join(self.unknown)}",
-            "",
-            "Before",
-            f"  [ ] log at {self.rate:g} Hz or faster: commands, pose, battery voltage"
-            + (", both rotor speeds" if self.vehicle.traits.coaxial else ""),
-            f"  [ ] room of {2.0 * limits['place']:.3g} m, nobody inside; battery for at least "
-            f"{best.seconds + 2.0 * _LEAD * len(best.pieces):.0f} s",
-            "Fly",
-        ]
-        for number, piece in enumerate(best.pieces, 1):
-            band = "" if piece.band is None else f", {piece.band[0]:.2g}-{piece.band[1]:.2g} Hz"
-            peaks = f"at most {piece.amplitude:.3g}"
-            if isinstance(piece, ComposedMultisine):
-                tops = {axis: float(np.max(np.abs(s))) for axis, s in piece.signals(_times(piece, self.rate)).items()}
-                peaks = ", ".join(f"{axis} at most {top:.3g}" for axis, top in tops.items())
-            lines.append(
-                f"  [ ] {number}. hover {_LEAD:g} s, {piece.kind} of {'+'.join(piece.axes)}{band}, "
-                f"{piece.duration:.4g} s, {peaks}, hover {_LEAD:g} s"
-            )
-        lines += [
-            "Expect",
-            f"  attitude within {best.peaks['attitude']:.3g} deg, rates within {best.peaks['rate']:.3g} deg/s, "
-            f"{best.peaks['place']:.2g} m from the start",
-            "Stop",
-            f"  [ ] beyond {limits['attitude']:g} deg, {limits['rate']:g} deg/s or {limits['place']:g} m; "
-            "an input at its limit for a second; a sound that is new; battery low",
-            "After",
-            f"  [ ] the bounds should be {', '.join(bounds)}",
-        ]
-        return "\n".join(lines)
-
-    def save(self, path: str | Path) -> tuple[Path, ...]:
-        """Write the best offer's series as .csv (numbered where there are several), the card as .txt, and ArduPilot's
-        parameters as .param where all of it is sweeps of sticks.
-
-        Raises:
-            ManeuverError: for another suffix than .csv.
-        """
-        file = Path(path)
-        if file.suffix.lower() != ".csv":
-            raise ManeuverError(f"ends in '{file.suffix}', expected .csv.", where=path)
-        written, pieces = [], self.best.pieces
-        for number, piece in enumerate(pieces, 1):
-            own = file if len(pieces) == 1 else file.with_stem(f"{file.stem}-{number}")
-            written.append(write_text(own, as_csv(sampled(piece, rate=self.rate))))
-            if piece.kind == "sweep" and piece.axes[0] in MIXER and piece.amplitude <= 1.0 and piece.band is not None:
-                fade = FADE * piece.duration
-                chirp = Chirp.planned(
-                    MIXER[piece.axes[0]], piece.amplitude, piece.band, record=piece.duration, fade=fade
-                )
-                written.append(write_text(own.with_suffix(".param"), chirp.parameter_file()))
-        written.append(write_text(file.with_suffix(".txt"), self.card() + "\n"))
-        return tuple(written)
-
-    def to_document(self) -> dict[str, Any]:
-        """All of it as what becomes JSON."""
-        return {
-            "vehicle": self.vehicle.name,
-            "unknown": list(self.unknown),
-            "best": self.best.kind,
-            "offers": [
-                {"kind": o.kind, "seconds": o.seconds, "bounds": dict(o.bounds), "peaks": dict(o.peaks),
-                 "pieces": [vars(p) for p in o.pieces]}
-                for o in self.offers
-            ],
-            "buys": [{"seconds": t, "bounds": dict(bounds)} for t, bounds in self.buys],
-            "limits": dict(self.limits),
-            "criterion": self.criterion,
-            "robust": self.robust,
-            "draws": self.draws,
-            "spread": self.spread,
-        }  # fmt: skip
-
-    def __repr__(self) -> str:
-        told = (
-            f"bounds are the worst of {self.draws} draws of the prior" if self.draws > 1 else "at the model's numbers"
-        )
-        return "\n".join(
-            [
-                f"For {', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
-                text_table(*self.rows()),
-                "",
-                "What each second buys",
-                text_table(*self.seconds_rows()),
-                "",
-                self.card(),
-            ]
-        )
 
 
 def design_maneuver(
@@ -274,11 +94,11 @@ def design_maneuver(
     _checked(criterion, robust, spread, draws, band, rate)
     moved = _axes_of(vehicle, axes)
     seconds, noise = kept["seconds"], noise or Noise()
-    if "battery" in kept and seconds + 2.0 * _LEAD > kept["battery"]:
+    if "battery" in kept and seconds + 2.0 * LEAD > kept["battery"]:
         raise ManeuverError(
-            f"{seconds:g} s and {2.0 * _LEAD:g} s of hover are more than the battery's {kept['battery']:g} s.",
+            f"{seconds:g} s and {2.0 * LEAD:g} s of hover are more than the battery's {kept['battery']:g} s.",
             channel="battery",
-            hint=f"Fly at most {max(kept['battery'] - 2.0 * _LEAD, 0.0):g} s at a time.",
+            hint=f"Fly at most {max(kept['battery'] - 2.0 * LEAD, 0.0):g} s at a time.",
         )
     lines = dealt(band[0], band[1], seconds, axes=len(moved))
     if min(own.size for own in lines) < 2 or seconds * band[0] < 2.0:
@@ -428,8 +248,8 @@ class _Told:
     def fly(self, draw: int, maneuver: Maneuver) -> tuple[Array, Array, Array]:
         """Time from the maneuver's start, states and inputs; a flight that is lost is none."""
         vehicle = self.models[draw]
-        flown = simulate_maneuver(vehicle, maneuver, controller=self.controller, lead=_LEAD, tail=_LEAD, rate=self.rate)
-        time = flown.time(vehicle.state_names[0]) - _LEAD
+        flown = simulate_maneuver(vehicle, maneuver, controller=self.controller, lead=LEAD, tail=LEAD, rate=self.rate)
+        time = flown.time(vehicle.state_names[0]) - LEAD
         return time, flown.array(vehicle.state_names), flown.array(vehicle.input_names)
 
     def probe(
@@ -460,7 +280,7 @@ class _Told:
         """Information (p + 1, p + 1) of maneuvers that are flown one after the other."""
         total = np.zeros((len(self.unknown) + 1,) * 2)
         for piece in pieces:
-            time = _times(piece, self.rate)
+            time = sample_times(piece, self.rate)
             length = time.size / self.rate
             for axis, signal in piece.signals(time).items():
                 amplitude = 2.0 * np.abs(np.fft.rfft(signal)) / time.size
@@ -474,10 +294,6 @@ class _Told:
                 own = self.lines(draw, frequency[seen], response)
                 total += length * np.einsum("f,fpq->pq", amplitude[seen] ** 2, own)
         return total
-
-
-def _times(piece: Maneuver, rate: float) -> Array:
-    return np.arange(round(piece.duration * rate)) / rate
 
 
 def _between(frequency: Array, known: Array, response: Complex) -> Complex:
@@ -509,13 +325,13 @@ def _offer(
 
 
 def _fitted(piece: Maneuver, told: _Told, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
-    share = 1.0
+    share, lost = 1.0, ""
     for _ in range(_TRIES):
         tried = _smaller(piece, share)
         try:
             every = [_peaks(told, draw, tried) for draw in range(len(told.models))]
-        except SwashError:  # lost in flight
-            share *= 0.4
+        except SwashError as trouble:  # lost in flight
+            share, lost = 0.4 * share, f" The last flight that was lost: {trouble.problem}"
             continue
         reached = {name: max(one[name] for one in every) for name in every[0]}
         over = max(reached[name] / limits[name] for name in reached)
@@ -526,7 +342,7 @@ def _fitted(piece: Maneuver, told: _Told, limits: Mapping[str, float]) -> tuple[
             break
     raise ManeuverError(
         f"not even {100.0 * share:.2g} % of the usual deflection keeps "
-        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m.",
+        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m.{lost}",
         hint="Widen the limits, or fly a controller that holds better.",
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,7 +13,7 @@ from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 
 
-class ReportFolder(Shown):
+class ReportFolder(Shown, ABC):
     """A result with a report and files of its own.
 
     Attributes:
@@ -21,9 +22,9 @@ class ReportFolder(Shown):
 
     files: ClassVar[tuple[str, ...]] = ("report.html",)
 
+    @abstractmethod
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""
-        raise NotImplementedError
 
     def write(self, folder: Path) -> None:
         """The files of `save` into a folder that is there."""

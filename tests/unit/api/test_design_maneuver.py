@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.api.design_maneuver import DesignedManeuver
+from swashplate.api.designed_maneuver import DesignedManeuver
 from swashplate.errors import IdentificationError, ManeuverError
 from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
 
