@@ -25,6 +25,9 @@ EXTRA_OF: Mapping[str, str] = {
     "rosbags": "logs",
     "mcap": "mcap",
     "gymnasium": "rl",
+    "dask": "scale",
+    "distributed": "scale",
+    "zarr": "scale",
 }
 """Extras of `pyproject.toml` by the module that they bring; `all` brings every one."""
 
