@@ -13,7 +13,7 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.core.result_file import load
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
-from swashplate.models.linear.answering import Answering
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.case_parts import CaseParts
@@ -74,7 +74,7 @@ def compare(
 
 def _of_models(named: Mapping[str, Any]) -> CaseParts:
     """Modes and responses of what can be linearised; of what cannot, why."""
-    models: dict[str, Answering] = {}
+    models: dict[str, LinearResponse] = {}
     told = []
     for name, one in named.items():
         try:
@@ -86,10 +86,10 @@ def _of_models(named: Mapping[str, Any]) -> CaseParts:
     return compare_modes(models) + compare_answers(models) + CaseParts(told=tuple(told))
 
 
-def _linear(one: Any) -> Answering:
+def _linear(one: Any) -> LinearResponse:
     made = one.model if isinstance(one, Result) else one
     made = made.as_linear() if isinstance(made, Vehicle) else made
-    if isinstance(made, Answering):
+    if isinstance(made, LinearResponse):
         return made
     raise SwashError(f"is a {type(made).__name__}, expected responses, fits or models.", channel="cases")
 

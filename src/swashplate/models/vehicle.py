@@ -11,7 +11,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
 from swashplate.models.card import Card
 from swashplate.models.choices import Choice
-from swashplate.models.linear.answering import Answering
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
@@ -123,13 +123,13 @@ class Vehicle:
 
         write_text(path, self.card.to_toml())
 
-    def as_linear(self) -> Answering:
+    def as_linear(self) -> LinearResponse:
         """The linear model: of its structure, else about hover (about another trim: `swashplate.linearize`).
 
         Raises:
             SwashError: for a vehicle that has no hover.
         """
-        made: Answering = resolve("linearize")(self) if self.structure is None else self.structure
+        made: LinearResponse = resolve("linearize")(self) if self.structure is None else self.structure
         return made
 
     def response(self, omega: Array) -> Complex:

@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from swashplate.arrays import Complex
 from swashplate.identification.frequency.response_cost import Target, cost_of
 from swashplate.identification.responses.frequency_response import TWO_PI
-from swashplate.models.linear.answering import Answering
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.usual_axes import usual_axes
 from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
 from swashplate.reporting.structure import Cell, Table
@@ -23,7 +23,7 @@ _RATES = {"roll": "p", "pitch": "q", "yaw": "r", "heave": "w"}
 _ORIGIN = 1e-5
 
 
-def compare_modes(cases: Mapping[str, Answering]) -> CaseParts:
+def compare_modes(cases: Mapping[str, LinearResponse]) -> CaseParts:
     """Eigenvalues [1/s], those of the first with the nearest of the others, and the difference in per cent."""
     names = list(cases)
     found = {name: eigenvalues(model) for name, model in cases.items()}
@@ -53,7 +53,7 @@ def compare_modes(cases: Mapping[str, Answering]) -> CaseParts:
     return CaseParts((Table("Modes", head, tuple(rows), note=note),), document={"modes": entries})
 
 
-def eigenvalues(model: Answering) -> list[complex]:
+def eigenvalues(model: LinearResponse) -> list[complex]:
     """With imaginary part zero or more, slowest last; those at the origin are no modes."""
     values = [complex(v) for v in model.eigenvalues() if v.imag >= 0.0 and abs(v) > _ORIGIN]
     return sorted(values, key=lambda v: (-abs(v), v.imag))
@@ -78,7 +78,7 @@ def _shown(value: complex) -> str:
     return f"{value.real:+.3f} +/- {value.imag:.3f}j ({abs(value):.2f}, {-value.real / abs(value):.2f})"
 
 
-def compare_answers(cases: Mapping[str, Answering]) -> CaseParts:
+def compare_answers(cases: Mapping[str, LinearResponse]) -> CaseParts:
     """Responses over each other from 0.1 to 5 Hz, delays included, and J of each against the first.
 
     Pairs of an axis (p over roll ...) where inputs are named as usual; otherwise all that the models share.
@@ -113,7 +113,7 @@ def compare_answers(cases: Mapping[str, Answering]) -> CaseParts:
     return CaseParts((table,), (bode_overlay(curves),), document={"responses": document})
 
 
-def response(model: Answering, outputs: Sequence[str], inputs: Sequence[str]) -> Complex:
+def response(model: LinearResponse, outputs: Sequence[str], inputs: Sequence[str]) -> Complex:
     """H(j omega) over BAND with delays, shape (n, n_outputs, n_inputs)."""
     o, i = ([every.index(n) for n in names] for every, names in ((model.outputs, outputs), (model.inputs, inputs)))
     return np.asarray(model.response(BAND)[:, o][:, :, i], dtype=np.complex128)

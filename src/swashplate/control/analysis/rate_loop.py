@@ -18,7 +18,7 @@ from swashplate.control.analysis.rate_loop_steps import stepped
 from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import model_margins
 from swashplate.identification.frequency.reading_accuracy import Fitted
-from swashplate.models.linear.answering import Answering, pair_response
+from swashplate.models.linear.answering import LinearResponse, pair_response
 from swashplate.models.linear.state_space import StateSpaceModel
 
 LOWEST = 2.0 * np.pi * 0.05
@@ -69,7 +69,7 @@ class RateLoop:
         fit: where the model comes from one, for the bounds of margins.
     """
 
-    model: Answering
+    model: LinearResponse
     axis: str
     rate: str
     command: str

@@ -22,7 +22,7 @@ from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
-from swashplate.identification.core.result import Result
+from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
@@ -152,14 +152,14 @@ def linear_result(
         settings={**settings, "records": [piece.name for piece in solved.likelihood.records]},
         seconds=seconds,
     )
-    return replace(found, warnings=(*found.warnings, *_torn(found)))
+    return replace(found, warnings=(*found.warnings, *torn(found.estimates, model)))
 
 
-def _torn(found: Result[StateSpaceModel, TimeDetails]) -> list[str]:
+def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
     """Where the records say something else than the fit which the start comes from, by more than both allow."""
     apart = {}
-    for e in found.estimates:
-        known = found.start.parameters[e.name].cramer_rao
+    for e in estimates:
+        known = start.parameters[e.name].cramer_rao
         spread = np.hypot(known, e.best_sigma)
         if not e.fixed and np.isfinite(spread) and abs(e.value - e.start) > _TORN * spread:
             apart[f"{e.name} {e.start:.3g} before, {e.value:.3g} now"] = abs(e.value - e.start) / spread

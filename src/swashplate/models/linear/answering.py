@@ -1,4 +1,4 @@
-"""`Answering`: what can be asked for its frequency response, whatever it is made of."""
+"""`LinearResponse`: what can be asked for its frequency response, whatever it is made of."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from swashplate.arrays import Array, Complex
 
 
 @runtime_checkable
-class Answering(Protocol):
+class LinearResponse(Protocol):
     """A model that answers its inputs linearly.
 
     A state-space model, transfer functions of one input (`TransferFunctions`) and what `swashplate.linearize` gives are
@@ -30,6 +30,6 @@ class Answering(Protocol):
         """Poles of all responses [1/s], each once, fastest first."""
 
 
-def pair_response(model: Answering, output: str, input: str, omega: Array) -> Complex:
+def pair_response(model: LinearResponse, output: str, input: str, omega: Array) -> Complex:
     """One response of a model at frequencies [rad/s], shape (n,)."""
     return model.response(omega)[:, model.outputs.index(output), model.inputs.index(input)]

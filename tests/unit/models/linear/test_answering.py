@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import swashplate as sp
-from swashplate.models.linear.answering import Answering, pair_response
+from swashplate.models.linear.answering import LinearResponse, pair_response
 from swashplate.models.linear.transfer_function import Form, TransferFunction, TransferFunctions
 from swashplate.simulation.linearize import LinearModel
 
@@ -42,7 +42,7 @@ def test_a_structure_and_its_vehicle_answer_alike() -> None:
 
 
 def test_functions_answer_by_output_with_their_delays() -> None:
-    assert isinstance(PAIR, Answering)
+    assert isinstance(PAIR, LinearResponse)
     assert (PAIR.inputs, PAIR.outputs) == (("stick",), ("p", "q"))
     expected = np.exp(-0.04j * OMEGA) / (1j * OMEGA + 3.0)
     np.testing.assert_allclose(PAIR.response(OMEGA)[:, :, 0], expected[:, None] * [2.0, -5.0], rtol=1e-12)
