@@ -33,7 +33,7 @@ def test_it_shows_writes_and_exports(log: Path, tmp_path: Path) -> None:
     assert sorted(p.name for p in out.iterdir()) == ["report.html", "track.json"]
     assert sorted(p.name for p in code.iterdir()) == ["track_q.c", "track_q.h"]
     as_json = json.loads(swash("track", log, "--equation", EQUATION, "--held", "servo_pitch", "--json").out)
-    assert as_json["equations"][0]["values"]["Md"] == pytest.approx(-10.0, rel=0.05)
+    assert as_json["followed"][0]["values"]["Md"] == pytest.approx(-10.0, rel=0.05)
 
 
 def test_what_cannot_be_told_ends_with_a_message(log: Path) -> None:

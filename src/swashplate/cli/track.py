@@ -20,7 +20,8 @@ def track(
         ),
     ] = None,
     model: Annotated[
-        str | None, typer.Option("--model", help="A linear model's file: its rows, in place of --equation.")
+        str | None,
+        typer.Option("--model", help="A linear model, its rows in place of --equation; or a vehicle, with --unknown."),
     ] = None,
     out: options.OutFolder = None,
     rate: Annotated[
@@ -39,6 +40,11 @@ def track(
     delay: Annotated[
         list[str] | None, typer.Option("--delay", metavar="NAME=SECONDS", help="A channel acts this late. Repeatable.")
     ] = None,
+    unknown: Annotated[
+        str | None, typer.Option("--unknown", metavar="NAMES", help="Parameters of the vehicle, by commas: mass.")
+    ] = None,
+    spread: Annotated[float, typer.Option("--spread", help="What they may be off at the start, as a share.")] = 0.2,
+    wander: Annotated[float, typer.Option("--wander", help="Share that they may wander in a second.")] = 0.02,
     every: Annotated[float, typer.Option("--every", help="Between looks at the estimate [s].", min=0.001)] = 0.2,
     c_code: Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write the estimators as C99 here.")] = None,
     rename: flying.Rename = "",
@@ -50,10 +56,13 @@ def track(
 ) -> None:
     """Estimate coefficients of equations of motion along a log, sample by sample as on board, with bounds over time.
 
-    Recursive Fourier regression: no derivative is taken and nothing is filtered. Gaps, values that are no numbers and
-    clocks that jump freeze the estimate, and are told. Writes report.html and track.json to --out. Example:
+    Equations go through recursive Fourier regression (no derivative is taken, nothing is filtered), parameters of a
+    vehicle through an extended Kalman filter. Gaps, values that are no numbers and clocks that jump freeze the
+    estimate, and are told. Writes report.html and track.json to --out. Examples:
 
     swash track flight.csv --equation "q_dot = Mq*q + Md*servo_pitch + bias" --held servo_pitch --out tracked
+
+    swash track flight.nc --model coax --unknown mass --out tracked
     """
     import swashplate as sp
     from swashplate.api.track import Tracking
@@ -61,6 +70,9 @@ def track(
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.cli.reading import asked, read
 
+    names = flying.names(unknown)
+    if names and model is None:
+        raise SwashError("is of a vehicle: give --model too.", channel="--unknown")
     if (model is None) == (not equation):
         raise SwashError("is wanted, or --model: one of the two.", channel="--equation")
     limits = flying.band(band)
@@ -71,13 +83,16 @@ def track(
     ):
         found = sp.track(
             read(log, how=asked(mapping, unit, drop_bad_stamps)),
-            sp.structure(model) if model is not None else equation or (),
+            (sp.vehicle(model) if names else sp.structure(model)) if model is not None else equation or (),
             rate=rate,
             band=limits,
             spacing=spacing,
             memory=memory,
             held=flying.names(held),
             delays=options.numbers_by_name(delay, option="--delay"),
+            unknown=names,
+            spread=spread,
+            wander=wander,
             every=every,
             names=flying.renamed(rename, option="--rename"),
             say=line.say,

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from swashplate.flights.schema import channel
-from swashplate.identification.recursive.equation import BIAS, RegressionEquation
-from swashplate.identification.recursive.tracked import TrackedEquation
+from swashplate.identification.recursive.tracked import Tracked
 from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import BAND, MODEL, VERMILION, line, numbers, quantity, stacked
 from swashplate.reporting.versions import date, versions
@@ -18,65 +16,51 @@ _MOST = 12
 _HEIGHT = 130
 
 
-def coefficient_unit(equation: RegressionEquation, name: str) -> str:
-    """The unit of a coefficient, from those of its channels; "" where one of them is unknown."""
-    left = channel(equation.left).unit
-    if equation.derivative and left:
-        left = "1/s" if left == "1" else f"{left}/s" if "/s" not in left else left.replace("/s^2", "/s").replace(
-            "/s", "/s^3" if "/s^2" in left else "/s^2"
-        )  # fmt: skip
-    if name == BIAS:
-        return left
-    right = channel(equation.regressors[name]).unit
-    return "" if not (left and right) else left if right == "1" else f"({left})/({right})"
-
-
 def compose_tracking(
-    source: str, found: Sequence[TrackedEquation], notes: Sequence[str], *, simulated: bool, title: str | None
+    source: str, found: Sequence[Tracked], notes: Sequence[str], *, simulated: bool, title: str | None
 ) -> Report:
     """The report's structure, a section for each equation."""
     told = sum(one.final is not None for one in found)
     banners = (("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),) if simulated else ()
-    missing = [one.plan.equation.text for one in found if one.final is None]
+    missing = [one.text for one in found if one.final is None]
     if missing:
         banners = (("bad", f"Not told apart by this stream: {'; '.join(missing)}."), *banners)
     return Report(
         title=title or f"Identification in flight: {source}",
         banners=banners,
         summary=(
-            ("Equations", f"{told} of {len(found)} estimated at the end", "plain" if told == len(found) else "bad"),
+            ("Estimated", f"{told} of {len(found)} at the end", "plain" if told == len(found) else "bad"),
             ("Stood still", _stood(found), "caution" if any(one.frozen for one in found) else "plain"),
         ),
         picture=None,
-        sections=tuple(
-            Section(f"equation-{k}", one.plan.equation.text, _blocks(one, k, source)) for k, one in enumerate(found)
-        )
+        sections=tuple(Section(f"equation-{k}", one.text, _blocks(one, k, source)) for k, one in enumerate(found))
         + ((Section("notes", "Notes", (Points(tuple(notes)),)),) if notes else ()),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
-def _stood(found: Sequence[TrackedEquation]) -> str:
+def _stood(found: Sequence[Tracked]) -> str:
     times = max((len(one.frozen) for one in found), default=0)
     return f"{times} times, see below" if times else "never: no gap, no value that is no number"
 
 
-def _blocks(one: TrackedEquation, k: int, source: str) -> tuple[Text | Points | Table | Figure, ...]:
-    e, final = one.plan.equation, one.final
+def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | Figure, ...]:
+    final = one.final
     rows = tuple(
         (
             Cell(name),
             Cell("-" if final is None else f"{final.values[i]:.5g}", True),
             Cell("-" if final is None else f"{final.sigmas[i]:.2g}", True),
-            Cell(coefficient_unit(e, name) or "unknown"),
+            Cell(one.units[i] or "unknown"),
         )
-        for i, name in enumerate(e.names)
+        for i, name in enumerate(one.names)
     )
     caption = f"At the end, after {one.counted:.1f} s that counted."
     note = "Standard errors count residuals that are not independent; see the how-to."
     blocks: list[Text | Points | Table | Figure] = [
+        *(Text(words, tone="caution") for words in one.notes),
         _figure(one, k, source),
-        Table(caption, ("coefficient", "value", "standard error", "unit"), rows, note=note),
+        Table(caption, ("unknown", "value", "standard error", "unit"), rows, note=note),
     ]
     if one.frozen:
         items = [f"{s.start:.2f} to {s.stop:.2f} s: {s.why}" for s in one.frozen[:_MOST]]
@@ -85,11 +69,10 @@ def _blocks(one: TrackedEquation, k: int, source: str) -> tuple[Text | Points | 
     return tuple(blocks)
 
 
-def _figure(one: TrackedEquation, k: int, source: str) -> Figure:
-    e = one.plan.equation
-    layout = stacked([quantity(name, coefficient_unit(e, name)) for name in e.names], height=_HEIGHT)
+def _figure(one: Tracked, k: int, source: str) -> Figure:
+    layout = stacked([quantity(name, unit) for name, unit in zip(one.names, one.units, strict=True)], height=_HEIGHT)
     traces = []
-    for i, name in enumerate(e.names):
+    for i, name in enumerate(one.names):
         number = "" if i == 0 else str(i + 1)
         value, sigma = one.values[:, i], one.sigmas[:, i]
         known = np.isfinite(value)
@@ -134,7 +117,7 @@ def _figure(one: TrackedEquation, k: int, source: str) -> Figure:
         f"track-{k}",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        f"Estimates of '{e.text}' over time, {source}.",
-        f"Coefficients {', '.join(e.names)} over time with two standard errors to each side.",
+        f"Estimates of '{one.text}' over time, {source}.",
+        f"Coefficients {', '.join(one.names)} over time with two standard errors to each side.",
         keys=(*keys, *stood),
     )

@@ -30,7 +30,7 @@ def test_a_log_becomes_estimates_over_time_with_bounds(tmp_path: Path) -> None:
     for name, value in TRUTH.items():
         estimate, sigma = found[name]
         assert abs(estimate - value) < 3.0 * sigma
-    (one,) = found.equations
+    (one,) = found.followed
     assert [(round(s.start, 2), round(s.stop, 2)) for s in one.frozen] == [(6.99, 7.2)]
     assert np.isnan(one.values[0]).all()
     assert one.sigmas[-1, 0] < 0.5 * np.nanmax(one.sigmas[:, 0])
@@ -38,7 +38,7 @@ def test_a_log_becomes_estimates_over_time_with_bounds(tmp_path: Path) -> None:
     assert "(rad/s^2)/(m/s)" in repr(found)
     found.save(tmp_path / "out")
     document = json.loads((tmp_path / "out" / "track.json").read_text())
-    assert document["equations"][0]["values"]["Mq"] == pytest.approx(found["Mq"][0])
+    assert document["followed"][0]["values"]["Mq"] == pytest.approx(found["Mq"][0])
     assert "stood still" in (tmp_path / "out" / "report.html").read_text().lower()
     assert found.problems == ()
     code = found.code()
@@ -55,6 +55,13 @@ def test_what_the_stream_does_not_tell_is_said(tmp_path: Path) -> None:
     with pytest.raises(KeyError):
         found["Mq"]
     assert "Not told apart by this stream" in found.page().banners[0][1]
+
+
+def test_gusts_that_bias_are_told() -> None:
+    calm, rough = (sp.track(flight_of(short_period(900, gust=g)), EQUATION, held=["servo_pitch"]) for g in (0.05, 0.8))
+    assert calm.followed[0].notes == ()
+    assert "bias the coefficients" in rough.followed[0].notes[0]
+    assert "bias the coefficients" in repr(rough)
 
 
 def test_slower_streams_keep_their_last_value_and_grow_stale() -> None:
@@ -82,6 +89,7 @@ def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
     [
         ("q_dot = Ma*alpha", {}, FlightError),
         ("q_dot = Mq*q", {"delays": {"alpha": 0.1}}, IdentificationError),
+        ("q_dot = Mq*q", {"held": ["servo_pich"]}, IdentificationError),
         ("q_dot = Mq*q", {"rate": 2.0}, IdentificationError),
         ([], {}, IdentificationError),
     ],

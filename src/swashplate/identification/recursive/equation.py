@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from swashplate.errors import IdentificationError
+from swashplate.flights.schema import channel
 
 BIAS = "bias"
 _DERIVATIVE = "_dot"
@@ -109,3 +110,17 @@ def regression_equation(text: str, *, delays: Mapping[str, float] | None = None)
         bias=bias,
         delays=late,
     )
+
+
+def coefficient_unit(equation: RegressionEquation, name: str) -> str:
+    """The unit of a coefficient, from those of its channels; "" where one of them is unknown."""
+    left = channel(equation.left).unit
+    if equation.derivative and left:
+        left = _PER_SECOND.get(left, f"({left})/s")
+    if name == BIAS:
+        return left
+    right = channel(equation.regressors[name]).unit
+    return "" if not (left and right) else left if right == "1" else f"({left})/({right})"
+
+
+_PER_SECOND = {"1": "1/s", "m": "m/s", "rad": "rad/s", "m/s": "m/s^2", "rad/s": "rad/s^2"}
