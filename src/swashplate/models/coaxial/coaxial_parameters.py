@@ -108,10 +108,11 @@ _ROTOR = (
     "rotor_root_cutout",
     "rotor_induced_factor",
 )
-OneRotor: Any = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, "hub_height", "shaft_tilt")])  # type: ignore[misc]
+OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, "hub_height", "shaft_tilt")])  # type: ignore[misc]
 """The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright."""
 
 
 def one_rotor(par: Any, hub_height: Any) -> Any:
     """The numbers of the rotor at this height."""
-    return OneRotor(*(getattr(par, name) for name in _ROTOR), hub_height, 0.0)
+    numbers = [getattr(par, name) for name in _ROTOR]
+    return OneRotor._make((*numbers, hub_height, 0.0))

@@ -21,7 +21,7 @@ from swashplate.models.coaxial.coaxial import (
 )
 from swashplate.models.coaxial.coaxial_checks import checked_numbers
 from swashplate.models.coaxial.coaxial_options import coaxial_options
-from swashplate.models.coaxial.coaxial_parameters import CoaxialParameters
+from swashplate.models.coaxial.coaxial_parameters import UNITS, CoaxialParameters
 from swashplate.models.conventional.helicopter_limits import rotor_doubts
 from swashplate.models.nesting import rebuild
 from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
@@ -158,11 +158,12 @@ def coaxial(card: Card) -> Vehicle:
     options = coaxial_options(card)
     card = checked_numbers(card)
     numbers = card.values()
-    parameters = CoaxialParameters(*(numbers[name] for name in CoaxialParameters._fields))
-    switches, names = options.upper, commands_of(options)._fields
+    parameters: Any = CoaxialParameters._make(numbers[each] for each in UNITS)
+    switches = options.upper
+    names: tuple[str, ...] = commands_of(options)._fields
     count = len(names)
-    servos = _tuple("CoaxialServos", tuple(f"{name}_servo" for name in names))
-    late = (*(f"{name}_late" for name in names), *(f"{name}_late_rate" for name in names))
+    servos = _tuple("CoaxialServos", tuple(f"{each}_servo" for each in names))
+    late = (*(f"{each}_late" for each in names), *(f"{each}_late_rate" for each in names))
     delays = _tuple("CoaxialDelays", late)
     at = (_START_PITCH, *(0.0,) * (count - 1))
     state = CoaxialState(

@@ -186,6 +186,7 @@ def loads(
         density,
         xp,
         sense,
+        sticks.theta0 if options.stabilator else None,
     )
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.

@@ -82,6 +82,10 @@ def check_numbers(card: Card) -> None:
     for low, high in (("collective_low", "collective_high"), ("tail_low", "tail_high"), ("bar_inner", "bar_outer")):
         if not value[low] < value[high]:
             refuse(low, f"is {value[low]:g}, not below {high} = {value[high]:g}.")
+    if not value["stabilator_from"] < value["stabilator_to"]:
+        refuse(
+            "stabilator_from", f"is {value['stabilator_from']:g}, not below stabilator_to = {value['stabilator_to']:g}."
+        )
     for name in ANGLES:
         if abs(value[name]) > LARGEST_ANGLE:
             refuse(
