@@ -119,6 +119,9 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
     what="kind of campaign",
     own={
         "monte-carlo": "swashplate.api.campaigns.kinds.monte_carlo:MONTE_CARLO",
+        "recovery": "swashplate.api.campaigns.kinds.recovery:RECOVERY",
+        "multi-start": "swashplate.api.campaigns.kinds.multi_start:MULTI_START",
+        "fleet": "swashplate.api.campaigns.kinds.fleet:FLEET",
     },
 )
 """By the name that a campaign's file says as `of`."""

@@ -24,7 +24,7 @@ def share_words(count: int, of: int) -> str:
     if not of:
         return "none yet"
     low, high = share_interval(count, of)
-    return f"{count} of {of} ({100 * count / of:.3g} %; with 95 % confidence {100 * low:.2g} to {100 * high:.2g} %)"
+    return f"{count} of {of} ({100 * count / of:.3g} %; with 95 % confidence {100 * low:.3g} to {100 * high:.3g} %)"
 
 
 def quantile(values: Array, share: float) -> tuple[float, float, float]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 
+from swashplate.api.campaigns.flown import gusts_of, vehicle_of
 from swashplate.api.campaigns.kind import CampaignFindings, CampaignSettings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion
@@ -21,10 +20,7 @@ from swashplate.control.draws.spread import SHOWN, Limits
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.models.catalogue import vehicle as find_vehicle
-from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop_batch import BLOCK
-from swashplate.simulation.wind import Gusts, indoor, outdoor
 
 
 class FlightVaries(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -78,7 +74,7 @@ class FlightsKind:
 
     def parts(self, settings: FlightsCampaign, folder: Path) -> tuple[Portion, ...]:
         _limits(settings.limits)
-        _gusts(settings.varies.gusts)
+        gusts_of(settings.varies.gusts)
         parse_maneuver(settings.maneuver)
         return in_batches(settings, usual=BLOCK)
 
@@ -113,7 +109,7 @@ class FlightsKind:
             maneuver=settings.maneuver,
             count=portion.count,
             fit=None if varies.fit is None else files[varies.fit],
-            gusts=_gusts(varies.gusts),
+            gusts=gusts_of(varies.gusts),
             battery=settings.battery,
             tolerances=varies.tolerances,
             vary=varies.numbers or None,
@@ -125,12 +121,6 @@ class FlightsKind:
         )
 
 
-@lru_cache(maxsize=4)
-def vehicle_of(name_or_file: str) -> Vehicle:
-    """A vehicle, read once in a worker's life."""
-    return find_vehicle(name_or_file)
-
-
 def _limits(given: Mapping[str, float]) -> Limits:
     found = Limits()
     for name, value in given.items():
@@ -140,20 +130,6 @@ def _limits(given: Mapping[str, float]) -> Limits:
             )
         found = replace(found, **{name: value / SHOWN[name][1] if value else math.inf})
     return found
-
-
-def _gusts(given: Mapping[str, float]) -> Gusts | None:
-    if not given:
-        return None
-    makers: Mapping[str, Any] = {"indoor": indoor, "outdoor": outdoor}
-    if len(given) != 1 or next(iter(given)) not in makers:
-        raise CampaignError(
-            f"{', '.join(given)}: expected one of {{indoor = SIGMA}} and {{outdoor = MEAN}} in m/s.",
-            channel="varies.gusts",
-        )
-    name, value = next(iter(given.items()))
-    gusts: Gusts = makers[name](value)
-    return gusts
 
 
 MONTE_CARLO = FlightsKind()
