@@ -101,7 +101,7 @@ class DaskEngine:
         return found
 
     def _check_workers(self) -> None:
-        """That every worker is the same program as this one, and works at one task at a time.
+        """That the scheduler and every worker are the same program as this one, and work at one task at a time.
 
         Raises:
             CampaignError: naming the first that is not, and what differs.
@@ -115,17 +115,22 @@ class DaskEngine:
                         hint="Start it with: dask worker ADDRESS --nthreads 1",
                     )
             wanted = program.program()
-            for address, found in self._client.run(_program, on_error="return").items():
+            every = dict(self._client.run(_program, on_error="return"))
+            try:
+                every[f"scheduler {self._address}"] = self._client.run_on_scheduler(_program)
+            except Exception as error:  # whatever its process lacks
+                every[f"scheduler {self._address}"] = error
+            for address, found in every.items():
                 if isinstance(found, BaseException):
                     raise CampaignError(
-                        f"the worker cannot say what program it is: {in_words(found)}.",
+                        f"it cannot say what program it is: {in_words(found)}.",
                         where=address,
                         hint="Install the same swashplate[scale] there.",
                     )
                 differing = program.differences(wanted, found)
                 if differing:
                     raise CampaignError(
-                        f"the worker has another program: {'; '.join(differing)}.",
+                        f"it has another program: {'; '.join(differing)}.",
                         where=address,
                         hint="Install the same versions there.",
                     )
@@ -183,8 +188,7 @@ class DaskEngine:
 
 
 def _program() -> dict[str, str]:
-    """On a worker: what program it is."""
-    program.prepare()
+    """On a worker or a scheduler: what program it is."""
     return program.program()
 
 
