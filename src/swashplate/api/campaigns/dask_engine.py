@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import queue
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
@@ -16,6 +17,8 @@ from swashplate.errors import CampaignError
 from swashplate.extras import library
 
 _CONNECT = 15.0  # s until a scheduler that does not answer is not there
+_COUNTED = 2.0  # s that a number of workers is believed
+_STARTS = 3
 _GONE = 20.0  # s without a scheduler until it is gone
 
 
@@ -53,21 +56,14 @@ class DaskEngine:
         self._tasks: dict[Any, CampaignTask] = {}
         self._cluster: Any = None
         self._client: Any = None
-        self._lost_for = 0.0
+        self._lost_for, self._counted, self._count = 0.0, float("-inf"), 1
         self._killed = distributed.scheduler.KilledWorker
         try:
             if scheduler is None:
-                self._cluster = distributed.LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    memory_limit=None,
-                    dashboard_address=None,
-                    silence_logs=logging.CRITICAL,
-                )
+                self._cluster = _own_cluster(distributed.LocalCluster, workers)
             self._client = distributed.Client(self._cluster or scheduler, timeout=_CONNECT, set_as_default=False)
             self._client.wait_for_workers(workers if scheduler is None else least, timeout=4 * _CONNECT)
-        except (OSError, TimeoutError) as error:
+        except (OSError, TimeoutError, RuntimeError) as error:
             self.close()
             raise CampaignError(
                 f"no worker answers: {in_words(error)}.",
@@ -82,7 +78,9 @@ class DaskEngine:
 
     @property
     def workers(self) -> int:
-        return max(1, len(self._known()))
+        if time.monotonic() - self._counted > _COUNTED:  # asked of the scheduler: not for every task
+            self._counted, self._count = time.monotonic(), max(1, len(self._known()))
+        return self._count
 
     @property
     def words(self) -> str:
@@ -185,6 +183,24 @@ class DaskEngine:
         if self._cluster is not None:
             with suppress(Exception):
                 self._cluster.close(timeout=5.0)
+
+
+def _own_cluster(make: Any, workers: int) -> Any:
+    """A cluster of this machine. One whose worker is killed while it starts is started again."""
+    for attempt in range(_STARTS):
+        try:
+            return make(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=None,
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            )
+        except RuntimeError:
+            if attempt == _STARTS - 1:
+                raise
+    return None
 
 
 def _program() -> dict[str, str]:

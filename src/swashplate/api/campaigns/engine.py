@@ -66,7 +66,7 @@ class TaskEngine(Protocol):
 
 
 @dataclass
-class Standing:
+class CampaignStanding:
     """How far a campaign is, told after every task.
 
     Attributes:
@@ -102,8 +102,8 @@ def carry_out(
     engine: TaskEngine,
     store: CampaignStore,
     *,
-    standing: Standing,
-    tell: Callable[[Standing], None],
+    standing: CampaignStanding,
+    tell: Callable[[CampaignStanding], None],
 ) -> None:
     """Give every task to an engine and its result to the store.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from swashplate.api.campaigns import worker
-from swashplate.api.campaigns.engine import Standing, TaskEngine, Work, carry_out
+from swashplate.api.campaigns.engine import CampaignStanding, TaskEngine, Work, carry_out
 from swashplate.api.campaigns.plan import CampaignPlan, changes, cores, duration, plan_campaign, planned_in
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.program import differences, program
@@ -165,7 +165,7 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
     done, failed = store.done(), store.failed()
     left: Sequence[CampaignTask] = [t for t in made.tasks if t.name not in done and t.name not in failed]
     names = {task.name for task in made.tasks}
-    standing = Standing(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
+    standing = CampaignStanding(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
     if not left:
         return
     say("starting the workers")
@@ -179,7 +179,7 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
             engine.close()
 
 
-def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: Standing) -> None:
+def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:
     left = "" if standing.seconds_left is None else f", {duration(standing.seconds_left)} left"
     failed = f", {standing.failed} failed" if standing.failed else ""
     say(

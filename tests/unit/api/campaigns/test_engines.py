@@ -17,7 +17,7 @@ import pytest
 import made_campaigns
 from swashplate.api.campaigns import program
 from swashplate.api.campaigns.dask_engine import DaskEngine
-from swashplate.api.campaigns.engine import TRIES, Standing, TaskEngine, carry_out
+from swashplate.api.campaigns.engine import TRIES, CampaignStanding, TaskEngine, carry_out
 from swashplate.api.campaigns.pool import ProcessPool
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
@@ -38,9 +38,9 @@ def expected(every: tuple[CampaignTask, ...], folder: Path) -> dict[str, bytes]:
     return bits(store)
 
 
-def done(every: tuple[CampaignTask, ...], engine: TaskEngine, folder: Path) -> tuple[CampaignStore, Standing]:
+def done(every: tuple[CampaignTask, ...], engine: TaskEngine, folder: Path) -> tuple[CampaignStore, CampaignStanding]:
     """Tasks carried out; the engine is closed."""
-    store, standing = CampaignStore(folder), Standing(total=len(every), done=0, failed=0)
+    store, standing = CampaignStore(folder), CampaignStanding(total=len(every), done=0, failed=0)
     store.begin("", {}, {})
     try:
         with store.held():
@@ -197,7 +197,7 @@ def test_nobody_at_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_time_left_is_counted_from_the_second_task_of_each_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([100.0, 110.0, 112.0, 114.0])
     monkeypatch.setattr(time, "monotonic", lambda: next(clock))
-    standing = Standing(total=10, done=2, failed=1, workers=2)
+    standing = CampaignStanding(total=10, done=2, failed=1, workers=2)
     told = []
     for _ in range(4):
         standing.count()

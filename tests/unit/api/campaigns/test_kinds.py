@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -214,3 +215,19 @@ def _with(file: Path, line: str, *, pattern: str = "*.nc") -> Path:
     other = file.with_name("other.toml")
     other.write_text(file.read_text().replace("*.nc", pattern) + line + "\n")
     return other
+
+
+# ---- the page --------------------------------------------------------------------------------------------------------
+def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[4] / "docs" / "howto" / "campaigns.md").read_text(encoding="utf-8")
+    written = re.findall(r"<!-- file: (\S+) -->\n```toml\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "logs").mkdir()
+    for name in ("hold.toml", "fit.json", "flight.nc", "logs/a.bin"):
+        (tmp_path / name).write_bytes(b"")
+    rows = {}
+    for name, text in written:
+        (tmp_path / name).write_text(text)
+        made = sp.plan_campaign(tmp_path / name)
+        rows[made.of] = made.rows
+    assert rows == {"monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1}
+    assert set(rows) == set(CAMPAIGNS), "every kind is shown"
