@@ -92,3 +92,41 @@ def test_one_two_and_eight_workers_have_the_same_bits(tmp_path: Path) -> None:
             folder = tmp_path / f"{engine}-{workers}"
             assert client(folder, workers, engine).wait(timeout=900) == 0
             assert bits(folder) == whole
+
+
+FLIGHTS = """
+kind = "campaign"
+of = "monte-carlo"
+count = 512
+batch = 128
+vehicle = "thirteen_state"
+controller = "hold.toml"
+maneuver = "hover:2s"
+varies = {numbers = {Lb = "5%"}}
+"""
+
+
+@pytest.mark.proof
+def test_flights_have_the_same_bits_on_any_engine(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate"]
+    design = [
+        "control",
+        "design",
+        "thirteen_state",
+        "--sensors",
+        "gyro@50,mocap@50",
+        "--rate",
+        "50",
+        "--gain",
+        "steady",
+    ]
+    subprocess.run([*command, *design, "--out", "hold.toml", "-q"], cwd=tmp_path, check=True)
+    (tmp_path / "c.toml").write_text(FLIGHTS)
+    found = []
+    for engine, workers in (("processes", "1"), ("dask", "2")):
+        out = tmp_path / engine
+        run = ["campaign", "run", "c.toml", "-o", str(out), "--engine", engine, "--workers", workers, "-q"]
+        subprocess.run([*command, *run], cwd=tmp_path, check=True, timeout=600)
+        found.append(bits(out))
+    assert len(found[0]) == 4
+    assert found[0] == found[1]
