@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from swashplate.api.campaigns.engine import TaskOutcome, Work
+from swashplate.api.campaigns.pool import in_words
 from swashplate.api.campaigns.program import program
 from swashplate.api.campaigns.tasks import CampaignTask, Columns, made_tasks, portions
-from swashplate.errors import SwashError
 
 
 def numbers(task: CampaignTask) -> Columns:
@@ -73,8 +73,8 @@ class InProcess:
         self.did.append(task)
         try:
             yield TaskOutcome(task, columns=self._work(task))
-        except SwashError as error:
-            yield TaskOutcome(task, error=str(error))
+        except Exception as error:
+            yield TaskOutcome(task, error=in_words(error))
 
     def do(self, task: CampaignTask) -> TaskOutcome:
         self.submit(task)
