@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import queue
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
+from urllib.parse import urlsplit
 
 from swashplate.api.campaigns import program
 from swashplate.api.campaigns.engine import DEATHS, TaskOutcome, Work
@@ -59,6 +61,8 @@ class DaskEngine:
         self._lost_for, self._counted, self._count = 0.0, float("-inf"), 1
         self._killed = distributed.scheduler.KilledWorker
         try:
+            if scheduler is not None:
+                _knock(scheduler)
             if scheduler is None:
                 self._cluster = _own_cluster(distributed.LocalCluster, workers)
             self._client = distributed.Client(self._cluster or scheduler, timeout=_CONNECT, set_as_default=False)
@@ -70,9 +74,6 @@ class DaskEngine:
                 where=scheduler or "the cluster of this machine",
                 hint="Start it with `dask scheduler`, workers with `dask worker ADDRESS --nthreads 1`.",
             ) from None
-        except ValueError as error:  # an address that is none
-            self.close()
-            raise CampaignError(f"is no address: {error}.", where=scheduler, hint="Example: tcp://host:8786") from None
         if scheduler is not None:
             self._check_workers()
 
@@ -183,6 +184,24 @@ class DaskEngine:
         if self._cluster is not None:
             with suppress(Exception):
                 self._cluster.close(timeout=5.0)
+
+
+def _knock(address: str) -> None:
+    """That something listens at an address: a client of Dask that cannot connect is never quite closed.
+
+    Raises:
+        CampaignError: where it is no address.
+        OSError: where nobody answers.
+    """
+    try:
+        place = urlsplit(address)
+        host, port = place.hostname, place.port
+    except ValueError:  # a port that is no number
+        host = port = None
+    if not host or not port or place.scheme not in ("tcp", "tls", "ws", "wss"):
+        raise CampaignError("is no address of a scheduler.", where=address, hint="Example: tcp://host:8786")
+    with socket.create_connection((host, port), timeout=_CONNECT):
+        pass
 
 
 def _own_cluster(make: Any, workers: int) -> Any:
