@@ -200,8 +200,15 @@ def _knock(address: str) -> None:
         host = port = None
     if not host or not port or place.scheme not in ("tcp", "tls", "ws", "wss"):
         raise CampaignError("is no address of a scheduler.", where=address, hint="Example: tcp://host:8786")
-    with socket.create_connection((host, port), timeout=_CONNECT):
-        pass
+    until = time.monotonic() + _CONNECT
+    while True:  # it may have been started a moment ago
+        try:
+            socket.create_connection((host, port), timeout=_CONNECT).close()
+            return
+        except OSError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.1)
 
 
 def _own_cluster(make: Any, workers: int) -> Any:
