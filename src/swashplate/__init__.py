@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.stitch import stitch
     from swashplate.api.structures import show_structure, structures
+    from swashplate.api.track import recursive_estimator, track
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
@@ -204,6 +205,7 @@ __all__ = [
     "read",
     "read_control",
     "reconstruct",
+    "recursive_estimator",
     "replay",
     "replay_campaign",
     "report",
@@ -230,6 +232,7 @@ __all__ = [
     "structures",
     "suggest_gains",
     "synchronise",
+    "track",
     "trim",
     "trim_curve",
     "uniform_records",
