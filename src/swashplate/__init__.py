@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from swashplate.api.accept_autopilot import accept_autopilot
     from swashplate.api.autopilot_gains import autopilot_gains
     from swashplate.api.bench import evaluate_bench, simulate_bench
+    from swashplate.api.campaigns.plan import plan_campaign
+    from swashplate.api.campaigns.results import campaign_results
+    from swashplate.api.campaigns.verbs import campaign, replay_campaign, resume_campaign
     from swashplate.api.check_autopilot import check_autopilot
     from swashplate.api.check_controller import check_controller
     from swashplate.api.compare import compare
@@ -135,6 +138,8 @@ __all__ = [
     "accept_autopilot",
     "autopilot",
     "autopilot_gains",
+    "campaign",
+    "campaign_results",
     "check_autopilot",
     "check_controller",
     "compare",
@@ -192,6 +197,7 @@ __all__ = [
     "omit_derivatives",
     "open_logs",
     "plan_bench",
+    "plan_campaign",
     "plan_maneuver",
     "plot_logs",
     "posterior",
@@ -201,9 +207,11 @@ __all__ = [
     "reconstruct",
     "recursive_estimator",
     "replay",
+    "replay_campaign",
     "report",
     "residuals",
     "respond",
+    "resume_campaign",
     "rotor_speed",
     "show_replay",
     "show_structure",

@@ -108,6 +108,10 @@ class ExportError(SwashError):
     """A model that a format cannot hold, or a tool that writing it needs and that is not here."""
 
 
+class CampaignError(SwashError):
+    """A campaign whose file, store or workers do not fit together."""
+
+
 class LinkError(SwashError):
     """A link to another program that cannot be opened, or a servo mapping that does not fit the vehicle."""
 

@@ -30,6 +30,11 @@ _LIGHT: Mapping[str, str] = {
     "Validation": "swashplate.validation.validation:Validation",
     "Vector": "swashplate.physics.frames:Vector",
     "Vehicle": "swashplate.models.vehicle:Vehicle",
+    "campaign": "swashplate.api.campaigns.verbs:campaign",
+    "campaign_results": "swashplate.api.campaigns.results:campaign_results",
+    "plan_campaign": "swashplate.api.campaigns.plan:plan_campaign",
+    "replay_campaign": "swashplate.api.campaigns.verbs:replay_campaign",
+    "resume_campaign": "swashplate.api.campaigns.verbs:resume_campaign",
     "datasets": "swashplate.flights.datasets:listing",
     "equation_error": "swashplate.identification.time.equation_error:equation_error",
     "evaluate_bench": "swashplate.api.bench:evaluate_bench",
@@ -179,6 +184,12 @@ def place(name: str) -> str:
     return {**_BEHIND_METHODS, **_LIGHT, **_COMPUTING}[name]
 
 
+def set_up() -> None:
+    """Set JAX up as the first use of a verb that computes does: float64, compiled code kept between runs."""
+    for step in _SET_UP:
+        _load(step)()
+
+
 def _load(where: str) -> Any:
     module, _, attribute = where.partition(":")
     return getattr(import_module(module), attribute)
@@ -193,8 +204,7 @@ def resolve(name: str) -> Any:
     """
     try:
         if name in _COMPUTING:
-            for step in _SET_UP:
-                _load(step)()
+            set_up()
         return _load(place(name))
     except ModuleNotFoundError as error:
         if isinstance(error, MissingLibraryError) or (error.name or "").partition(".")[0] not in EXTRA_OF:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -129,20 +129,14 @@ def fly_maneuver(
     """
     if pilot and controller is None:
         raise SwashError("is for a --controller; the hover hold takes no commands.", channel="--pilot")
-    coaxial = vehicle.traits.coaxial
     remarks = []
-    if controller is None and coaxial and any(input_delays(vehicle).values()):
+    if controller is None and vehicle.traits.coaxial and any(input_delays(vehicle).values()):
         remarks.append("The hover hold acts at once; identified delays are left out.")
-
-    def make(vehicle: Vehicle, trim: Trim) -> Controller:
-        if controller is not None:
-            return flown_by(controller, vehicle, trim, seed=seed)[0]
-        return hover_hold(vehicle, trim) if coaxial else state_hold(vehicle, trim)
 
     truth = simulate_maneuver(
         vehicle,
         maneuver,
-        controller=make,
+        controller=holding(controller, seed=seed),
         pilot=pilot,
         speed=speed,
         voltage=voltage,
@@ -155,6 +149,19 @@ def fly_maneuver(
     if sensors != "none":
         seen = observe(truth, vehicle, sensors=QUIET if sensors == "clean" else Sensors(), seed=seed)
     return SimulatedFlight(vehicle, str(maneuver), truth, seen, tuple(remarks))
+
+
+def holding(
+    controller: Controller | str | Path | None = None, *, seed: int = 0
+) -> Callable[[Vehicle, Trim], Controller]:
+    """What makes the controller that a maneuver is flown under: one, its file, or the hold of the vehicle's kind."""
+
+    def make(vehicle: Vehicle, trim: Trim) -> Controller:
+        if controller is not None:
+            return flown_by(controller, vehicle, trim, seed=seed)[0]
+        return hover_hold(vehicle, trim) if vehicle.traits.coaxial else state_hold(vehicle, trim)
+
+    return make
 
 
 def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:

@@ -69,6 +69,10 @@ class MonteCarlo(Shown):
         """Flights that were beyond a limit or diverged."""
         return self.spread.lost
 
+    def flight(self, number: int) -> Flight:
+        """One of the flights, up to where it diverged."""
+        return _up_to_divergence(self.flights, number)
+
     def save(self, path: str | Path) -> tuple[Path, ...]:
         """Write the worst flight: .nc (nothing lost) or .csv."""
         return save_flight(self.worst, path)
@@ -200,12 +204,7 @@ def monte_carlo(
     moves_on = any(axis in _SPEEDS for axis in asked)
     judged = limits or Limits()
     found = spread(flown, hover, limits=replace(judged, place=math.inf) if moves_on else judged)
-    try:
-        worst = flown.flight(found.worst)
-    except DivergenceError as error:
-        if error.flight is None:
-            raise
-        worst = error.flight  # type: ignore[assignment]
+    worst = _up_to_divergence(flown, found.worst)
     own = {name: float(values[found.worst]) for name, values in drawn.items()}
     remarks: tuple[str, ...] = (_NO_STICK,) if not kind.takes_stick and set(excitation.axes) - set(asked) else ()
     remarks += (_MOVES_ON,) if moves_on else ()
@@ -214,6 +213,15 @@ def monte_carlo(
     settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall, "bits": bits}
     told = lateness(vehicle, pilot, given=None) + further
     return MonteCarlo(vehicle, name, found, worst, flown, drawn, told, remarks, settings)
+
+
+def _up_to_divergence(flown: Batch, number: int) -> Flight:
+    try:
+        return flown.flight(number)
+    except DivergenceError as error:
+        if not isinstance(error.flight, Flight):
+            raise
+        return error.flight
 
 
 def not_followed(flown: Batch, start: Trim, asked: Mapping[str, Array], time: Array) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import typer
 
 from swashplate.cli import (
     bench,
+    campaign,
     compare,
     control,
     data,
@@ -101,6 +102,7 @@ app.command("compare", short_help="Responses, models or fits side by side.")(com
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)
 app.add_typer(bench.app, name="bench")
+app.add_typer(campaign.app, name="campaign")
 app.add_typer(maneuver.app, name="maneuver")
 app.add_typer(link.app, name="link")
 app.add_typer(control.app, name="control")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -33,11 +34,17 @@ def console() -> Console:
 class Progress:
     """One line on standard error that says what is being done; it appears after a second on a terminal.
 
-    Elsewhere (a pipe, a file), what takes more than ten seconds says every stage as a line of its own. Where whoever
-    started the command asks for it, every change is a line of `progress_lines` instead.
+    Elsewhere (a pipe, a file), what takes more than ten seconds says every stage as a line of its own, and how far it
+    is every so often where it has steps to count (`every`). Where whoever started the command asks for it, every change
+    is a line of `progress_lines` instead.
+
+    Args:
+        quiet: True says nothing.
+        every: seconds between two lines about one stage, without a terminal; None for one line a stage.
     """
 
-    def __init__(self, *, quiet: bool) -> None:
+    def __init__(self, *, quiet: bool, every: float | None = None) -> None:
+        self._every, self._last = every, 0.0
         self._lock = threading.Lock()
         self._bar: Any = None
         self._latest: dict[str, Any] = {"description": "", "completed": 0.0, "total": None, "note": ""}
@@ -58,9 +65,12 @@ class Progress:
 
     def _tell_stage(self) -> None:
         what = self._latest["description"]
-        if self._stages and what and what != self._told:
-            self._told = what
-            print(f"... {what}", file=sys.stderr, flush=True)
+        now = time.monotonic()
+        again = self._every is not None and self._latest["note"] and now - self._last >= self._every
+        if self._stages and what and (what != self._told or again):
+            self._told, self._last = what, now
+            note = f": {self._latest['note']}" if self._every is not None and self._latest["note"] else ""
+            print(f"... {what}{note}", file=sys.stderr, flush=True)
 
     def _show(self) -> None:
         from rich.console import Console
@@ -102,9 +112,9 @@ def doing(what: str, *, quiet: bool) -> Iterator[None]:
 
 
 @contextmanager
-def progress(*, quiet: bool) -> Iterator[Progress]:
-    """A progress line that is gone when the block ends, however it ends."""
-    line = Progress(quiet=quiet)
+def progress(*, quiet: bool, every: float | None = None) -> Iterator[Progress]:
+    """A progress line that is gone when the block ends, however it ends; arguments as of `Progress`."""
+    line = Progress(quiet=quiet, every=every)
     try:
         yield line
     finally:

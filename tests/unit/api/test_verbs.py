@@ -21,6 +21,11 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "bench evaluate": ("evaluate_bench",),
     "bench plan": ("plan_bench",),
     "bench simulate": ("simulate_bench",),
+    "campaign replay": ("replay_campaign",),
+    "campaign report": ("campaign_results", "report"),
+    "campaign resume": ("resume_campaign",),
+    "campaign run": ("campaign", "plan_campaign"),
+    "campaign status": ("campaign_results",),
     "control check": ("check_controller",),
     "control decouple": ("decouple_axes",),
     "control design": ("design_controller",),
@@ -54,9 +59,10 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 """Names of `swashplate` by verb, where a verb has another name there or several; `fit-ss` is `sp.fit_ss`."""
 
 STUDIES = (
-    "check_controller", "compare", "decouple", "decouple_axes", "derivatives", "demo", "design_controller",
-    "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver", "identify_and_validate", "monte_carlo",
-    "observability", "respond", "track", "trim_curve", "validate_linear",
+    "campaign", "campaign_results", "check_controller", "compare", "decouple", "decouple_axes", "demo",
+    "derivatives", "design_controller", "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver",
+    "identify_and_validate", "monte_carlo", "observability", "respond", "resume_campaign", "track",
+    "trim_curve", "validate_linear",
 )  # fmt: skip
 """Verbs whose result is worth a page."""
 UNSAVED = ("derivatives", "observability", "trim_curve", "check_controller")

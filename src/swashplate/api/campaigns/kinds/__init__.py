@@ -1,0 +1,1 @@
+"""What campaigns are of: one file a kind."""

@@ -1,0 +1,143 @@
+"""What a worker's process is: which versions compute, on which core, with which settings of the libraries."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import os
+import platform
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import swashplate
+from swashplate.errors import CampaignError
+
+_LIBRARIES = ("swashplate", "jax", "jaxlib", "numpy", "scipy")
+_OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
+"""What `compile_small_loops_whole` adds to XLA's flags of a process that has computed; no choice of the user's."""
+_ONE_THREAD = "--xla_cpu_multi_thread_eigen=false"
+_held: list[int] = []
+"""The core that this process has pinned itself to, and the descriptor of its lock."""
+
+
+def worker_environment() -> dict[str, str]:
+    """Environment variables of every worker, to be set before anything is imported there.
+
+    One thread for every library, and XLA's flags as the client has them: they may change the last bits of a result.
+    """
+    flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    cache_folder = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    shared = {} if cache_folder is None else {"JAX_COMPILATION_CACHE_DIR": cache_folder}
+    return {**threads, "XLA_FLAGS": " ".join([*flags, _ONE_THREAD]), "TF_CPP_MIN_LOG_LEVEL": "3", **shared}
+
+
+def program() -> dict[str, str]:
+    """What a result depends on beside its task: versions, our own source and XLA's flags, by name."""
+    found = dict(_versions())
+    flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
+    return found | {"XLA flags": " ".join(flags)}
+
+
+@cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    found = {"python": ".".join(platform.python_version_tuple()[:2])}
+    for name in _LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    every = metadata.entry_points()
+    for group in (name for name in every.groups if name.startswith("swashplate.")):
+        for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own
+            if point.dist is not None:
+                found[point.dist.name] = point.dist.version
+    return tuple({**found, "source": _source()}.items())
+
+
+def _source() -> str:
+    """SHA-256 of the package's equations and cards, shortened: a changed file is another program."""
+    home, digest = Path(swashplate.__file__).parent, hashlib.sha256()
+    for place in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".toml", ".c", ".h")):
+        digest.update(str(place.relative_to(home)).encode() + b"\0" + place.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def differences(wanted: Mapping[str, str], found: Mapping[str, str]) -> list[str]:
+    """What differs between two programs, in words; empty where nothing does."""
+    names = sorted({*wanted, *found})
+    pairs = [(name, found.get(name, "nothing"), wanted.get(name, "nothing")) for name in names]
+    return [f"{name} is {is_ or 'empty'}, expected {expected or 'empty'}" for name, is_, expected in pairs
+            if is_ != expected]  # fmt: skip
+
+
+def check_program(wanted: Mapping[str, str], *, where: str) -> None:
+    """That this process is the program that a task was made for.
+
+    Raises:
+        CampaignError: with what differs; results of two programs must not share a table.
+    """
+    found = differences(wanted, program())
+    if found:
+        raise CampaignError(
+            f"the worker has another program: {'; '.join(found)}.",
+            where=where,
+            hint="Install the same versions there, and run `swash campaign resume`.",
+        )
+
+
+def prepare() -> int | None:
+    """Make this process a worker: JAX's threads one, and one core of its own; returns the core. A second call does
+    nothing.
+
+    Cores are shared out by locks on files, one a core, among all workers of a machine whoever started them: the lock
+    goes when the process ends, however it ends. Where all are taken, two workers share one.
+    """
+    if _held:
+        return _held[0]
+    for name, value in worker_environment().items():
+        os.environ[name] = value
+    if not hasattr(os, "sched_setaffinity"):
+        return None
+    cores = sorted(os.sched_getaffinity(0))
+    core, descriptor = next(_free(cores), (cores[os.getpid() % len(cores)], -1))
+    _held.extend((core, descriptor))
+    for thread in [int(name) for name in os.listdir("/proc/self/task")] if os.path.isdir("/proc/self/task") else [0]:
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(thread, {core})
+    return core
+
+
+def _free(cores: list[int]) -> Iterator[tuple[int, int]]:
+    """Cores that no other worker holds, each with the descriptor of a lock that is held from now on."""
+    folder = Path(tempfile.gettempdir()) / f"swashplate-cores-{os.getuid()}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        for core in cores:
+            descriptor = os.open(folder / str(core), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(descriptor)
+                continue
+            yield core, descriptor
+            return
+
+
+def end_with_parent() -> None:
+    """Let this process end when the one that started it does, killed or not: nobody would take its results."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True, name="parent").start()

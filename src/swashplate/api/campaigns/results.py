@@ -1,0 +1,215 @@
+"""What a campaign has found, as far as it is: its table, what its kind makes of it, and what failed."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from swashplate import atomic
+from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings
+from swashplate.api.campaigns.plan import planned_in
+from swashplate.api.campaigns.shares import quantile
+from swashplate.api.campaigns.store import CampaignStore
+from swashplate.api.campaigns.tasks import Columns
+from swashplate.api.campaigns.worker import settings_of
+from swashplate.errors import CampaignError
+from swashplate.reporting.campaign import FailedTask, Shape, WorstRow, compose_campaign
+from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
+from swashplate.text_table import text_table
+
+QUANTILES = (0.05, 0.5, 0.95, 0.99)
+_WORST = 10
+
+
+@dataclass(frozen=True, repr=False)
+class Campaign(Shown):
+    """What a campaign has found so far.
+
+    Attributes:
+        folder: its store.
+        of, document: its kind, and what its file says.
+        names: of its tasks, in the order of their rows. done: those that are here.
+        failed: tasks that were given up, by name.
+        at_work: who computes it now, in words; "" for nobody.
+    """
+
+    folder: Path
+    of: str
+    document: Mapping[str, Any]
+    names: tuple[str, ...]
+    done: frozenset[str]
+    failed: Mapping[str, Mapping[str, Any]] = field(repr=False)
+    at_work: str = ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every task is done."""
+        return len(self.done) == len(self.names)
+
+    @cached_property
+    def table(self) -> Columns:
+        """All rows that are here, by column, in the order of their numbers.
+
+        Raises:
+            CampaignError: a result that cannot be read, or columns that differ.
+        """
+        store, parts = CampaignStore(self.folder), []
+        for name in self.names:
+            if name in self.done:
+                parts.append(store.columns(name))
+                if parts[-1].keys() != parts[0].keys():
+                    raise CampaignError("has other columns than the first task.", where=self.folder, channel=name)
+        return {c: np.concatenate([part[c] for part in parts]) for c in parts[0]} if parts else {}
+
+    @cached_property
+    def findings(self) -> CampaignFindings:
+        """What its kind makes of the table."""
+        kind = CAMPAIGNS[self.of]
+        document = {key: value for key, value in self.document.items() if key not in ("kind", "of")}
+        return kind.findings(settings_of(kind, self.of, document, where=str(self.folder)), self.table)
+
+    @property
+    def quantiles(self) -> dict[str, tuple[tuple[float, float, float], ...]]:
+        """Quantiles of what is shown, in its units, by column: each with the ends of its 95 % interval."""
+        found = {}
+        for name, (_, factor) in self.findings.shown.items():
+            values = factor * np.asarray(self.table[name], dtype=np.float64)
+            found[name] = tuple(quantile(values[~np.isnan(values)], share) for share in QUANTILES)
+        return found
+
+    def worst(self, count: int = _WORST) -> tuple[WorstRow, ...]:
+        """Rows with the largest of the kind's measure of badness, the worst first."""
+        by = self.findings.worst
+        if not by or not self.table:
+            return ()
+        values = np.asarray(self.table[by], dtype=np.float64)
+        order = np.argsort(-np.where(np.isnan(values), -np.inf, values), kind="stable")[:count]
+        factor = self.findings.shown.get(by, ("", 1.0))[1]
+        rows = self.table
+        return tuple(WorstRow(int(rows["number"][k]), int(rows["seed"][k]), float(factor * values[k])) for k in order)
+
+    @property
+    def standing(self) -> str:
+        """How far it is, in words."""
+        told = f"{len(self.done)} of {len(self.names)} tasks done"
+        if self.failed:
+            told += f", {len(self.failed)} given up"
+        left = len(self.names) - len(self.done) - len(self.failed)
+        if left and not self.at_work:
+            told += f"; `swash campaign resume {self.folder}` goes on"
+        return told + (f"; at work: {self.at_work}" if self.at_work else "")
+
+    def to_document(self) -> dict[str, Any]:
+        """The summary as what becomes JSON."""
+        return {
+            "kind": "campaign-results",
+            "of": self.of,
+            "tasks": len(self.names),
+            "done": len(self.done),
+            "rows": len(self.table.get("number", ())),
+            "failed": {name: dict(told) for name, told in self.failed.items()},
+            "summary": {label: words for label, words, _ in self.findings.summary},
+            "careful": list(self.findings.careful),
+            "quantiles": {
+                name: {f"{share:g}": list(found) for share, found in zip(QUANTILES, every, strict=True)}
+                for name, every in self.quantiles.items()
+            },
+            "worst": [row._asdict() for row in self.worst()],
+        }
+
+    def page(self, *, title: str | None = None) -> Report:
+        """What `sp.report` writes: distributions, convergence, worst rows, failures."""
+        found = self.findings
+        shapes = [
+            Shape(name, unit, factor * np.asarray(self.table[name], dtype=np.float64), quantiles)
+            for (name, (unit, factor)), quantiles in zip(found.shown.items(), self.quantiles.values(), strict=True)
+        ]
+        unit = found.shown.get(found.worst, ("", 1.0))[0]
+        return compose_campaign(
+            title or str(self.document.get("title") or f"{self.of}: {self.folder.name}"),
+            standing=self.standing,
+            rows=CAMPAIGNS[self.of].rows,
+            summary=found.summary,
+            careful=found.careful,
+            shares=QUANTILES,
+            shapes=shapes,
+            worst=self.worst(),
+            worst_by=f"{found.worst} [{unit}]" if unit else found.worst,
+            folder=str(self.folder),
+            tables=found.tables,
+            failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
+                    for told in self.failed.values()],
+        )  # fmt: skip
+
+    def save(self, path: str | Path) -> Path:
+        """Write the table: .nc (netCDF) or .csv.
+
+        Raises:
+            CampaignError: another ending.
+            WriteError: where it cannot be written.
+        """
+        place = Path(path)
+        if place.suffix == ".nc":
+            data = xr.Dataset({name: ("row", values) for name, values in self.table.items()})
+            stream = io.BytesIO()
+            data.to_netcdf(stream, engine="h5netcdf")
+            return atomic.write_bytes(place, stream.getvalue())
+        if place.suffix != ".csv":
+            raise CampaignError(f"ends in '{place.suffix}', expected .nc or .csv.", where=place)
+        lines = [",".join(self.table)]
+        lines += [",".join(map(_cell, row)) for row in zip(*self.table.values(), strict=True)]
+        return atomic.write_text(place, "\n".join(lines) + "\n")
+
+    def __repr__(self) -> str:
+        told = [f"{self.of}: {self.standing}", *(f"Careful: {words}" for words in self.findings.careful)]
+        told += [f"{label}: {words}" for label, words, _ in self.findings.summary]
+        if self.table and self.findings.shown:
+            head = ("", *(f"{100 * share:g} %" for share in QUANTILES), "95 % interval of the last")
+            rows = []
+            for (name, (unit, _)), every in zip(self.findings.shown.items(), self.quantiles.values(), strict=True):
+                last = f"{every[-1][1]:.4g} to {every[-1][2]:.4g}"
+                rows.append((f"{name} [{unit}]" if unit else name, *(f"{found[0]:.4g}" for found in every), last))
+            told.append(text_table(head, rows))
+        for caption, head, cells in self.findings.tables:
+            told.append(text_table(head, cells, left=(0, len(head) - 1)) if cells else caption)
+        by = self.findings.worst
+        if row := next(iter(self.worst(1)), None):
+            told.append(
+                f"worst {by}: number {row.number}, seed {row.seed}: swash campaign replay {self.folder} {row.number}"
+            )
+        for failed in list(self.failed.values())[:3]:
+            told.append(f"given up: rows from {failed['first']} (seed {failed['seed']}): {failed['tries'][-1]}")
+        return "\n".join(told)
+
+
+def campaign_results(folder: str | Path) -> Campaign:
+    """What a campaign has found so far, also while it is computed.
+
+    Args:
+        folder: of the campaign.
+
+    Raises:
+        CampaignError: where there is none.
+    """
+    store = CampaignStore(folder)
+    plan = planned_in(store)
+    names = tuple(task.name for task in plan.tasks)
+    failed = {name: told for name, told in store.failed().items() if name in set(names)}
+    done = store.done() & set(names)
+    return Campaign(Path(folder), plan.of, plan.document, names, done, failed, at_work=store.owner)
+
+
+def _cell(value: Any) -> str:
+    text = repr(value.item()) if hasattr(value, "item") else str(value)
+    if isinstance(value, str | np.str_):
+        text = str(value)
+        return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n') else text
+    return text

@@ -1,0 +1,213 @@
+"""The folder of a campaign: its file, its plan, one file a task, and a lock that says who is at work."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import io
+import json
+import os
+import platform
+import time
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swashplate import atomic, documents
+from swashplate.api.campaigns.tasks import CampaignTask, Columns
+from swashplate.errors import CampaignError
+
+FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
+RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
+_SCHEMA = 1
+
+
+class CampaignStore:
+    """Results by the names of their tasks.
+
+    A result is one file, `results/NAME.npz`, that appears by rename when it is complete and is never written again: a
+    task that two workers have done after all is in the table once. What failed for good is `failed/NAME.json`.
+
+    Args:
+        folder: of the campaign; it need not be there.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    @property
+    def exists(self) -> bool:
+        """Whether a campaign was ever begun here."""
+        return (self.folder / PLAN).is_file()
+
+    # ---- plan ------------------------------------------------------------------------------------------------------
+    def begin(self, text: str, plan: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+        """Write what the campaign is: its file, the files that it names, and what was made of it, the plan last."""
+        for folder in (RESULTS, FAILED, INPUTS):
+            atomic.make_folder(self.folder / folder)
+        for content in files.values():
+            atomic.write_bytes(self.folder / INPUTS / hashlib.sha256(content).hexdigest(), content)
+        atomic.write_text(self.folder / FILE, text)
+        atomic.write_json(self.folder / PLAN, {"kind": "campaign-plan", "schema": _SCHEMA, **plan})
+
+    def plan(self) -> dict[str, Any]:
+        """What `begin` was given.
+
+        Raises:
+            CampaignError: where there is no campaign, or one of another schema.
+        """
+        if not self.exists:
+            raise CampaignError(
+                "holds no campaign.", where=self.folder, hint="Begin one: swash campaign run FILE -o FOLDER"
+            )
+        found = documents.read_document(self.folder / PLAN, form="json", error=CampaignError)
+        if found.get("kind") != "campaign-plan" or found.get("schema") != _SCHEMA:
+            raise CampaignError(
+                f"is of schema {found.get('schema')}, expected {_SCHEMA}.",
+                where=self.folder / PLAN,
+                hint="Finish it with the version that began it, or begin anew in another folder.",
+            )
+        return found
+
+    def text(self) -> str:
+        """The campaign's file as it was."""
+        return documents.read_text(self.folder / FILE, form="toml", error=CampaignError)
+
+    def input(self, digest: str) -> bytes:
+        """A file that the campaign's file names, by its SHA-256.
+
+        Raises:
+            CampaignError: where it is gone or another one.
+        """
+        path = self.folder / INPUTS / digest
+        content = path.read_bytes() if path.is_file() else b""
+        if hashlib.sha256(content).hexdigest() != digest:
+            raise CampaignError(
+                "is not the file that the campaign was begun with.", where=path, hint="Begin anew in another folder."
+            )
+        return content
+
+    # ---- results ---------------------------------------------------------------------------------------------------
+    def done(self) -> frozenset[str]:
+        """Names of the tasks whose result is here."""
+        return self._names(RESULTS, ".npz")
+
+    def failed(self) -> dict[str, dict[str, Any]]:
+        """What failed for good, by the task's name: see `give_up`."""
+        found = {}
+        for name in sorted(self._names(FAILED, ".json") - self.done()):
+            found[name] = documents.read_document(self.folder / FAILED / f"{name}.json", form="json")
+        return found
+
+    def _names(self, folder: str, ending: str) -> frozenset[str]:
+        place = self.folder / folder
+        if not place.is_dir():
+            return frozenset()
+        names = (entry.name for entry in os.scandir(place))
+        return frozenset(n.removesuffix(ending) for n in names if n.endswith(ending) and not n.startswith("."))
+
+    def keep(self, task: CampaignTask, columns: Columns) -> None:
+        """Write a task's result, once: where it is there already, nothing happens.
+
+        Raises:
+            WriteError: a full disk and the like; nothing of this result is left then, and everything before it is.
+        """
+        path = self.folder / RESULTS / f"{task.name}.npz"
+        if path.exists():
+            return
+        objects = [column for column, values in columns.items() if values.dtype.kind not in "biufU"]
+        if objects:
+            raise CampaignError("is neither numbers nor texts.", where=f"task {task.name}", channel=", ".join(objects))
+        stream = io.BytesIO()
+        np.savez(stream, **columns)  # type: ignore[arg-type]
+        atomic.write_bytes(path, stream.getbuffer())
+        (self.folder / FAILED / f"{task.name}.json").unlink(missing_ok=True)
+
+    def give_up(self, task: CampaignTask, words: Sequence[str]) -> None:
+        """Write that a task has failed for good, with what was said at each try."""
+        portion = task.portion
+        told = {"first": portion.first, "count": portion.count, "seed": portion.seed, "of": portion.of}
+        atomic.write_json(self.folder / FAILED / f"{task.name}.json", {**told, "tries": list(words)})
+
+    def columns(self, name: str) -> Columns:
+        """The result of a task.
+
+        Raises:
+            CampaignError: a file that is none.
+        """
+        path = self.folder / RESULTS / f"{name}.npz"
+        try:
+            with np.load(path, allow_pickle=False) as found:
+                return {key: found[key] for key in found.files}
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise CampaignError(
+                f"is no result of a task: {error}.",
+                where=path,
+                hint="Remove it and run `swash campaign resume`: the task is done again.",
+            ) from None
+
+    # ---- lock ------------------------------------------------------------------------------------------------------
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """The store, for one client alone; the lock goes when the process ends, however it ends.
+
+        Raises:
+            CampaignError: where another client has it, with who that is.
+        """
+        atomic.make_folder(self.folder)
+        path = self.folder / LOCK
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            if not _locked(descriptor):
+                raise CampaignError(
+                    f"is in use by {_owner(path)}.",
+                    where=self.folder,
+                    hint="Wait for it, or look at it with `swash campaign status`; each store has one client.",
+                )
+            now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+            me = {"process": os.getpid(), "host": platform.node(), "since": now}
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, json.dumps(me).encode(), 0)
+            yield
+            os.ftruncate(descriptor, 0)
+        finally:
+            os.close(descriptor)
+
+    @property
+    def owner(self) -> str:
+        """Who is at work here, in words; "" where nobody is."""
+        try:
+            descriptor = os.open(self.folder / LOCK, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError:
+            return ""
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return _owner(self.folder / LOCK)
+        finally:
+            os.close(descriptor)
+        return ""
+
+
+def _locked(descriptor: int) -> bool:
+    """The lock, taken; asked some times, for whoever only looks at a store holds it for an instant."""
+    for attempt in range(5):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except OSError:
+            time.sleep(0.02 * (attempt < 4))
+    return False
+
+
+def _owner(path: Path) -> str:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return f"process {found['process']} on {found['host']} since {found['since']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "another process"

@@ -1,0 +1,190 @@
+"""The verbs of campaigns: begin one, go on with one, see one row of it again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+from swashplate.api.campaigns import worker
+from swashplate.api.campaigns.engine import CampaignStanding, TaskEngine, Work, carry_out
+from swashplate.api.campaigns.plan import CampaignPlan, changes, cores, duration, plan_campaign, planned_in
+from swashplate.api.campaigns.pool import ProcessPool
+from swashplate.api.campaigns.program import differences, program
+from swashplate.api.campaigns.results import Campaign, campaign_results
+from swashplate.api.campaigns.store import FAILED, CampaignStore
+from swashplate.api.campaigns.tasks import CampaignTask
+from swashplate.api.saying import Say, silent
+from swashplate.errors import CampaignError
+
+EngineName = Literal["dask", "processes"]
+
+
+def campaign(
+    file: str | Path,
+    folder: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    engine: EngineName | None = None,
+    accept_changes: bool = False,
+    say: Say = silent,
+) -> Campaign:
+    """Compute a campaign, or what is left of it, into a folder.
+
+    Stopped or killed at any moment it goes on where it was the next time: every task is named by the SHA-256 of what it
+    depends on, and its result is a file that appears when it is complete.
+
+    Args:
+        file: the campaign's TOML file.
+        folder: its store; it is made, or holds what is done already.
+        workers: processes on this machine, one core each; as many as it has cores where None.
+        scheduler: address of a Dask scheduler whose workers are taken instead.
+        engine: "dask" or "processes" (no library needed, the same results); None: Dask where it is installed.
+        accept_changes: go on with a file, or a program, that is not what the store was begun with: tasks whose inputs
+            are the same are kept, results of others are left out of the table.
+        say: told how far it is.
+
+    Raises:
+        CampaignError: a file that is none; one that has changed, with what has; a store that another client holds; no
+            scheduler, or a worker that is another program; nothing that can be done.
+        WriteError: a store that cannot be written to.
+    """
+    made = plan_campaign(file)
+    store = CampaignStore(folder)
+    with store.held():
+        if store.exists:
+            changed = changes(store.plan(), made.stored())
+            if changed and not accept_changes:
+                raise CampaignError(
+                    f"was begun otherwise: {'; '.join(changed)}.",
+                    where=store.folder,
+                    hint="Put that back, or begin anew in another folder, or say --accept-changes: tasks whose inputs "
+                    "are the same are kept, the others are done anew.",
+                )
+        else:
+            changed = ["new"]
+        if changed:
+            say("writing the plan")
+            store.begin(made.text, made.stored(), made.tasks[0].files if made.tasks else {})
+        _finish(made, store, _chosen(engine, scheduler, workers), say=say)
+    return campaign_results(folder)
+
+
+def resume_campaign(
+    folder: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    engine: EngineName | None = None,
+    retry_failed: bool = False,
+    say: Say = silent,
+) -> Campaign:
+    """Go on with a campaign where it was, from its folder alone.
+
+    Args:
+        folder: where it was begun.
+        workers, scheduler, engine, say: as of `campaign`; they may be others than before.
+        retry_failed: try tasks again that were given up.
+
+    Raises:
+        CampaignError: no campaign there, another client at work, another program than it was begun with.
+        WriteError: a store that cannot be written to.
+    """
+    store = CampaignStore(folder)
+    store.plan()
+    with store.held():
+        made = planned_in(store)
+        changed = differences(made.tasks[0].program if made.tasks else {}, program())
+        if changed:
+            raise CampaignError(
+                f"was begun with another program: {'; '.join(changed)}.",
+                where=store.folder,
+                hint="Install that one again, or `swash campaign run FILE --accept-changes`, which does all anew.",
+            )
+        if retry_failed:
+            for name in store.failed():
+                (store.folder / FAILED / f"{name}.json").unlink(missing_ok=True)
+        _finish(made, store, _chosen(engine, scheduler, workers), say=say)
+    return campaign_results(folder)
+
+
+def replay_campaign(folder: str | Path, number: int) -> Any:
+    """One row of a campaign again, whole: a `Flight` of a campaign of flights, a `Result` of one of fits.
+
+    Its task is done again in a process like a worker's, so that the row is what it was.
+
+    Args:
+        folder: of the campaign.
+        number: of the row, as the report has it.
+
+    Raises:
+        CampaignError: a number that the campaign does not have; a task that cannot be done.
+    """
+    made = planned_in(CampaignStore(folder))
+    task = next((t for t in made.tasks if 0 <= number - t.portion.first < t.portion.count), None)
+    if task is None:
+        raise CampaignError(f"has no {made.kind.rows} {number}; it has {made.rows}.", where=folder)
+    replaying: Any = partial(worker.replay, row=number - task.portion.first)
+    pool = ProcessPool(replaying, workers=1)
+    try:
+        outcome = pool.do(task)
+    finally:
+        pool.close()
+    if outcome.columns is None:
+        raise CampaignError(f"cannot be done again: {outcome.error}", where=f"{made.kind.rows} {number}")
+    return outcome.columns
+
+
+def _chosen(engine: EngineName | None, scheduler: str | None, workers: int | None) -> Callable[[Work, int], TaskEngine]:
+    """What makes the engine for so many tasks.
+
+    Raises:
+        CampaignError: a scheduler for an engine that has none.
+    """
+    if engine == "processes" and scheduler is not None:
+        raise CampaignError("needs the engine dask.", channel="scheduler")
+    if workers is not None and workers < 1:
+        raise CampaignError(f"is {workers}, expected one or more.", channel="workers")
+    wanted = workers or cores()
+    if engine == "processes" or (engine is None and scheduler is None and find_spec("distributed") is None):
+        return lambda work, tasks: ProcessPool(work, workers=min(wanted, tasks))
+    from swashplate.api.campaigns.dask_engine import DaskEngine
+
+    least = workers or 1
+    return lambda work, tasks: DaskEngine(
+        work, workers=min(wanted, tasks), scheduler=scheduler, least=least if scheduler else 1
+    )
+
+
+def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int], TaskEngine], *, say: Say) -> None:
+    """Do every task of a plan that the store does not have."""
+    done, failed = store.done(), store.failed()
+    left: Sequence[CampaignTask] = [t for t in made.tasks if t.name not in done and t.name not in failed]
+    names = {task.name for task in made.tasks}
+    standing = CampaignStanding(total=len(made.tasks), done=len(names & done), failed=len(names & set(failed)))
+    if not left:
+        return
+    say("starting the workers")
+    engine = make(worker.work, len(left))
+    try:
+        tell = partial(_told, say, made, engine)
+        tell(standing)
+        carry_out(left, engine, store, standing=standing, tell=tell)
+    finally:
+        with suppress(KeyboardInterrupt):
+            engine.close()
+
+
+def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:
+    left = "" if standing.seconds_left is None else f", {duration(standing.seconds_left)} left"
+    failed = f", {standing.failed} failed" if standing.failed else ""
+    say(
+        f"{made.of} on {engine.words}",
+        done=standing.done + standing.failed,
+        total=standing.total,
+        note=f"{standing.done} of {standing.total} tasks{failed}{left}",
+    )

@@ -1,0 +1,33 @@
+"""A client of a campaign without a model, as a process to be killed: python campaign_client.py FOLDER WORKERS ENGINE N.
+
+What the store does not have yet is done; `made_campaigns.numbers` is the work, a tenth of a second a task.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import made_campaigns
+from swashplate.api.campaigns.dask_engine import DaskEngine
+from swashplate.api.campaigns.engine import CampaignStanding, TaskEngine, carry_out
+from swashplate.api.campaigns.pool import ProcessPool
+from swashplate.api.campaigns.store import CampaignStore
+
+
+def main(folder: str, workers: int, name: str, count: int) -> None:
+    every = made_campaigns.tasks(count, batch=1, wait=0.1)
+    store = CampaignStore(Path(folder))
+    with store.held():
+        store.begin("", {}, {})
+        left = [task for task in every if task.name not in store.done()]
+        engine: TaskEngine = (DaskEngine if name == "dask" else ProcessPool)(made_campaigns.numbers, workers=workers)
+        try:
+            standing = CampaignStanding(total=len(every), done=len(every) - len(left), failed=0)
+            carry_out(left, engine, store, standing=standing, tell=lambda _: None)
+        finally:
+            engine.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), sys.argv[3], int(sys.argv[4]))

@@ -1,0 +1,132 @@
+"""Campaigns under fire, and what a second worker brings; sizes by SWASH_KILLS and SWASH_TASKS."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import campaign_client
+import made_campaigns
+from swashplate.api.campaigns.store import CampaignStore
+
+KILLS, TASKS = int(os.environ.get("SWASH_KILLS", "40")), int(os.environ.get("SWASH_TASKS", "600"))
+CLIENT = Path(campaign_client.__file__)
+
+
+def bits(folder: Path) -> dict[str, bytes]:
+    """Content of every result by its task's name."""
+    store = CampaignStore(folder)
+    return {name: (folder / "results" / f"{name}.npz").read_bytes() for name in sorted(store.done())}
+
+
+def expected(folder: Path) -> dict[str, bytes]:
+    """The same of this process."""
+    store = CampaignStore(folder)
+    store.begin("", {}, {})
+    for task in made_campaigns.tasks(TASKS, batch=1, wait=0.1):
+        store.keep(task, made_campaigns.numbers(replace(task, settings={})))
+    return bits(folder)
+
+
+def client(folder: Path, workers: int, engine: str) -> subprocess.Popen[bytes]:
+    """A client at work."""
+    words = [sys.executable, str(CLIENT), str(folder), str(workers), engine, str(TASKS)]
+    path = os.pathsep.join([str(CLIENT.parent), *(part for part in sys.path if part)])
+    return subprocess.Popen(words, env={**os.environ, "PYTHONPATH": path})
+
+
+def workers_of(client: int) -> list[int]:
+    """Processes that a client has spawned."""
+    found = []
+    for place in Path("/proc").iterdir():
+        with suppress(OSError, ValueError, IndexError):
+            parent = int((place / "stat").read_text().rpartition(")")[2].split()[1])
+            if parent == client and b"spawn_main" in (place / "cmdline").read_bytes():
+                found.append(int(place.name))
+    return found
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize("engine", ["processes", "dask"])
+def test_random_kills_change_no_bit(engine: str, tmp_path: Path) -> None:
+    chance, folder = random.Random(1), tmp_path / engine
+    killed = {"workers": 0, "clients": 0}
+    running = client(folder, 2, engine)
+    began = time.monotonic()
+    while sum(killed.values()) < KILLS and running.poll() != 0:
+        if running.poll() is not None:  # a kill while it started
+            running = client(folder, chance.choice([1, 2, 8]), engine)
+        time.sleep(chance.uniform(0.4, 1.6))
+        workers = workers_of(running.pid)
+        if chance.random() < 0.15 and running.poll() is None:
+            running.kill()
+            running.wait()
+            killed["clients"] += 1
+            time.sleep(1.0)
+        elif workers:
+            with suppress(ProcessLookupError):
+                os.kill(chance.choice(workers), signal.SIGKILL)
+                killed["workers"] += 1
+    while running.wait(timeout=600) != 0:
+        running = client(folder, 2, engine)
+    print(f"{engine}: {TASKS} tasks, kills: {killed}, {time.monotonic() - began:.0f} s")
+    assert CampaignStore(folder).failed() == {}
+    assert bits(folder) == expected(tmp_path / "here")
+    assert killed["workers"] > 0
+
+
+@pytest.mark.proof
+def test_one_two_and_eight_workers_have_the_same_bits(tmp_path: Path) -> None:
+    whole = expected(tmp_path / "here")
+    for engine in ("processes", "dask"):
+        for workers in (1, 2, 8):
+            folder = tmp_path / f"{engine}-{workers}"
+            assert client(folder, workers, engine).wait(timeout=900) == 0
+            assert bits(folder) == whole
+
+
+FLIGHTS = """
+kind = "campaign"
+of = "monte-carlo"
+count = 512
+batch = 128
+vehicle = "thirteen_state"
+controller = "hold.toml"
+maneuver = "hover:2s"
+varies = {numbers = {Lb = "5%"}}
+"""
+
+
+@pytest.mark.proof
+def test_flights_have_the_same_bits_on_any_engine(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate"]
+    design = [
+        "control",
+        "design",
+        "thirteen_state",
+        "--sensors",
+        "gyro@50,mocap@50",
+        "--rate",
+        "50",
+        "--gain",
+        "steady",
+    ]
+    subprocess.run([*command, *design, "--out", "hold.toml", "-q"], cwd=tmp_path, check=True)
+    (tmp_path / "c.toml").write_text(FLIGHTS)
+    found = []
+    for engine, workers in (("processes", "1"), ("dask", "2")):
+        out = tmp_path / engine
+        run = ["campaign", "run", "c.toml", "-o", str(out), "--engine", engine, "--workers", workers, "-q"]
+        subprocess.run([*command, *run], cwd=tmp_path, check=True, timeout=600)
+        found.append(bits(out))
+    assert len(found[0]) == 4
+    assert found[0] == found[1]

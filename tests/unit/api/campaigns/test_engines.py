@@ -1,0 +1,212 @@
+"""Tasks come to their results whatever happens to workers: the same bits, each once, failures said."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import made_campaigns
+from swashplate.api.campaigns import program
+from swashplate.api.campaigns.dask_engine import DaskEngine
+from swashplate.api.campaigns.engine import TRIES, CampaignStanding, TaskEngine, carry_out
+from swashplate.api.campaigns.pool import ProcessPool
+from swashplate.api.campaigns.store import CampaignStore
+from swashplate.api.campaigns.tasks import CampaignTask
+from swashplate.errors import CampaignError, WriteError
+
+
+def bits(store: CampaignStore) -> dict[str, bytes]:
+    """Content of every result by its task's name."""
+    return {name: (store.folder / "results" / f"{name}.npz").read_bytes() for name in sorted(store.done())}
+
+
+def expected(every: tuple[CampaignTask, ...], folder: Path) -> dict[str, bytes]:
+    """The same of this process, without any engine."""
+    store = CampaignStore(folder)
+    store.begin("", {}, {})
+    for task in every:
+        store.keep(task, made_campaigns.numbers(replace(task, settings={})))
+    return bits(store)
+
+
+def done(every: tuple[CampaignTask, ...], engine: TaskEngine, folder: Path) -> tuple[CampaignStore, CampaignStanding]:
+    """Tasks carried out; the engine is closed."""
+    store, standing = CampaignStore(folder), CampaignStanding(total=len(every), done=0, failed=0)
+    store.begin("", {}, {})
+    try:
+        with store.held():
+            carry_out(every, engine, store, standing=standing, tell=lambda _: None)
+    finally:
+        engine.close()
+    return store, standing
+
+
+def test_kills_and_failures_cost_nothing_but_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("swashplate.api.campaigns.engine.DEATHS", 2)
+    every = made_campaigns.tasks(fail=[4], die=[8], die_once=[2], folder=str(tmp_path))
+    store, standing = done(every, ProcessPool(made_campaigns.numbers, workers=2), tmp_path / "two")
+    good = tuple(task for task in every if task.portion.first not in (4, 8))
+    assert bits(store) == expected(good, tmp_path / "here")
+    assert (standing.done, standing.failed) == (4, 2)
+    failed = {told["first"]: told["tries"] for told in store.failed().values()}
+    assert failed == {
+        4: ["ValueError: row 4 cannot be done"] * TRIES,
+        8: ["its worker was ended by SIGKILL"] * 2,
+    }
+    assert {told["seed"] for told in store.failed().values()} == {every[2].portion.seed, every[4].portion.seed}
+
+
+def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = made_campaigns.tasks(fail=[4])
+    engine = DaskEngine(made_campaigns.numbers, workers=1)
+    monkeypatch.setattr(engine, "close", lambda: None)
+    store, _ = done(every, engine, tmp_path / "dask")
+    good = tuple(task for task in every if task.portion.first != 4)
+    assert bits(store) == expected(good, tmp_path / "here")
+    assert [told["tries"] for told in store.failed().values()] == [["ValueError: row 4 cannot be done"] * TRIES]
+    other = tuple(replace(task, program=dict(task.program) | {"numpy": "1.0"}) for task in made_campaigns.tasks(2))
+    monkeypatch.undo()
+    with pytest.raises(CampaignError, match=r"another program: numpy is \S+, expected 1\.0"):
+        done(other, engine, tmp_path / "other")
+    assert CampaignStore(tmp_path / "other").failed() == {}, "a worker of another program is no try of the task"
+
+
+def test_a_campaign_whose_first_tasks_all_fail_is_ended(tmp_path: Path) -> None:
+    every = made_campaigns.tasks(20, batch=1, fail=list(range(20)))
+    with pytest.raises(CampaignError, match=r"none of its tasks can be done; .*row \d cannot be done"):
+        done(every, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
+    assert len(CampaignStore(tmp_path).failed()) == TRIES
+
+
+def test_a_full_disk_ends_it_with_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    every, replaced = made_campaigns.tasks(), os.replace
+
+    def full(source: str | Path, target: str | Path) -> None:
+        if len(list((tmp_path / "results").glob("[0-9a-f]*.npz"))) == 3 and str(target).endswith(".npz"):
+            raise OSError(28, "No space left on device", str(source))
+        replaced(source, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", full)
+        with pytest.raises(WriteError, match=r"No space left on device\. Free some space"):
+            done(every, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
+    store = CampaignStore(tmp_path)
+    assert len(store.done()) == 3
+    assert sorted(path.suffix for path in (tmp_path / "results").iterdir()) == [".npz"] * 3
+    left = tuple(task for task in every if task.name not in store.done())
+    store, _ = done(left, made_campaigns.InProcess(made_campaigns.numbers), tmp_path)
+    assert bits(store) == expected(every, tmp_path / "here")
+
+
+def test_workers_share_out_the_cores_and_have_one_thread() -> None:
+    code = (
+        "from swashplate.api.campaigns import program; import os; core = program.prepare();"
+        "assert program.prepare() == core; print(core, sorted(os.sched_getaffinity(0)),"
+        " os.environ['OMP_NUM_THREADS'], flush=True); input()"
+    )
+    found = []
+    started = [
+        subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for _ in sorted(os.sched_getaffinity(0))[:2]
+    ]
+    for process in started:
+        assert process.stdout is not None
+        core, _, rest = process.stdout.readline().strip().partition(" ")
+        assert rest == f"[{core}] 1"
+        found.append(int(core))
+    for process in started:
+        process.communicate("\n", timeout=30)
+    assert len(set(found)) == len(found)
+
+
+@contextmanager
+def cluster(
+    *, threads: int = 1, environment: dict[str, str] | None = None
+) -> Iterator[tuple[str, subprocess.Popen[bytes], subprocess.Popen[bytes]]]:
+    """A scheduler and a worker as processes of their own; the address."""
+    import socket
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler_words = ["dask", "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker_words = ["dask", "worker", f"tcp://127.0.0.1:{port}", "--nthreads", str(threads), "--no-dashboard"]
+    here = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    scheduler = subprocess.Popen([sys.executable, "-m", *scheduler_words], env=here, **quiet)  # type: ignore[call-overload]
+    own = {**here, **(environment or {})}
+    worker = subprocess.Popen([sys.executable, "-m", *worker_words, "--no-nanny"], env=own, **quiet)  # type: ignore[call-overload]
+    try:
+        yield f"tcp://127.0.0.1:{port}", scheduler, worker
+    finally:
+        for process in (worker, scheduler):
+            process.kill()
+            process.wait()
+
+
+def waited_for(engine: TaskEngine) -> None:
+    """Half a minute of an engine."""
+    for _ in range(150):
+        list(engine.outcomes(0.2))
+
+
+@pytest.mark.proof
+def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("swashplate.api.campaigns.dask_engine._GONE", 2.0)
+    every = made_campaigns.tasks()
+    with cluster() as (address, scheduler, _):
+        store, _ = done(every, DaskEngine(made_campaigns.numbers, workers=1, scheduler=address), tmp_path / "dask")
+        assert bits(store) == expected(every, tmp_path / "here")
+        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+        engine.submit(made_campaigns.tasks(1, wait=60.0)[0])
+        scheduler.kill()
+        with pytest.raises(CampaignError, match=r"the scheduler is gone\. What is done is kept"):
+            waited_for(engine)
+        engine.close()
+
+
+@pytest.mark.proof
+def test_a_worker_of_another_program_is_refused() -> None:
+    other = {"XLA_FLAGS": "--xla_cpu_enable_fast_math=true"}
+    with cluster(environment=other) as (address, _, _), pytest.raises(CampaignError) as refused:
+        DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+    assert "it has another program: XLA flags is --xla_cpu_enable_fast_math=true" in str(refused.value)
+
+
+def test_nobody_at_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("swashplate.api.campaigns.dask_engine._CONNECT", 0.5)
+    began = time.monotonic()
+    with pytest.raises(CampaignError, match=r"tcp://127\.0\.0\.1:9: no worker answers: .*dask worker ADDRESS"):
+        DaskEngine(made_campaigns.numbers, workers=1, scheduler="tcp://127.0.0.1:9")
+    assert time.monotonic() - began < 60.0
+    with pytest.raises(CampaignError, match="is no address of a scheduler"):
+        DaskEngine(made_campaigns.numbers, workers=1, scheduler="nonsense://x")
+
+
+def test_time_left_is_counted_from_the_second_task_of_each_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([100.0, 110.0, 112.0, 114.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    standing = CampaignStanding(total=10, done=2, failed=1, workers=2)
+    told = []
+    for _ in range(4):
+        standing.count()
+        told.append(standing.seconds_left)
+    assert told == [None, None, pytest.approx(4 * 2.0), pytest.approx(3 * 2.0)]
+
+
+def test_program_says_what_differs() -> None:
+    mine = program.program()
+    assert program.differences(mine, mine) == []
+    assert program.differences(mine, {**mine, "jax": "0.0"}) == [f"jax is 0.0, expected {mine['jax']}"]
+    assert np.all([len(value) > 0 for name, value in mine.items() if name != "XLA flags"])
