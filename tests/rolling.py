@@ -9,6 +9,8 @@ import numpy as np
 
 from swashplate.flights.flight import Flight, stream
 from swashplate.models.card import Card, Parameter
+from swashplate.models.choices import PhysicalEffect
+from swashplate.models.traits import Traits
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
@@ -113,6 +115,14 @@ def biased() -> Vehicle:
     numbers = {**usual.card.parameters, "offset": Parameter(0.0, "1", "a test", "assumed")}
     card = Card("roll", "two states in roll", "nowhere", {}, numbers)
     return replace(usual, card=card, parameters=BiasedNumbers, derivatives=biased_rates)
+
+
+OFF_CENTRE = PhysicalEffect("stick that stands off centre", {"offset": 0.0})
+
+
+def biased_of(card: Card) -> Vehicle:
+    """`biased` with a card's numbers, and the effect that nested structures try: an entry of the registry of models."""
+    return replace(biased(), card=card, traits=Traits(effects=lambda card: (OFF_CENTRE,)))
 
 
 def gusty(seed: int = 11, offset: float = 0.0) -> Flight:

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from swashplate.api.plot_logs import plot_logs
     from swashplate.api.stitch import stitch
     from swashplate.api.structures import show_structure, structures
+    from swashplate.api.track import recursive_estimator, track
     from swashplate.api.validate_linear import validate_linear
     from swashplate.bench.plan import plan as plan_bench
     from swashplate.control.analysis.rate_loop_steps import rate_loop_steps
@@ -198,6 +199,7 @@ __all__ = [
     "read",
     "read_control",
     "reconstruct",
+    "recursive_estimator",
     "replay",
     "report",
     "residuals",
@@ -222,6 +224,7 @@ __all__ = [
     "structures",
     "suggest_gains",
     "synchronise",
+    "track",
     "trim",
     "trim_curve",
     "uniform_records",

@@ -123,7 +123,7 @@ def other_structures(fit: StateSpaceFit) -> dict[str, StateSpaceModel]:
             for t in fit.targets
         }
         there = [t for t in fit.targets if np.all(np.abs(h[t.name]) > 0.0)]
-        made[name] = fit_targets(model, there, starts=1, settings=fit.settings).model
+        made[name] = fit_targets(model, there, starts=1, settings=fit.settings).solution
     return made
 
 

@@ -13,13 +13,14 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.core.result_file import load
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.case_parts import CaseParts
-from swashplate.reporting.cases_of_models import Linear, compare_answers, compare_modes
+from swashplate.reporting.cases_of_models import compare_answers, compare_modes
 from swashplate.reporting.cases_of_responses import compare_responses
 from swashplate.reporting.cases_of_results import compare_estimates
-from swashplate.simulation.linearize import LinearModel, linearize
+from swashplate.simulation.linearize import LinearModel
 from swashplate.validation.compare import ModelComparison, along_flights
 from swashplate.validation.verb import fitted
 
@@ -73,7 +74,7 @@ def compare(
 
 def _of_models(named: Mapping[str, Any]) -> CaseParts:
     """Modes and responses of what can be linearised; of what cannot, why."""
-    models: dict[str, Linear] = {}
+    models: dict[str, LinearResponse] = {}
     told = []
     for name, one in named.items():
         try:
@@ -85,11 +86,10 @@ def _of_models(named: Mapping[str, Any]) -> CaseParts:
     return compare_modes(models) + compare_answers(models) + CaseParts(told=tuple(told))
 
 
-def _linear(one: Any) -> Linear:
+def _linear(one: Any) -> LinearResponse:
     made = one.model if isinstance(one, Result) else one
-    if isinstance(made, Vehicle):
-        return linearize(made) if made.structure is None else made.structure
-    if isinstance(made, LinearModel | StateSpaceModel):
+    made = made.as_linear() if isinstance(made, Vehicle) else made
+    if isinstance(made, LinearResponse):
         return made
     raise SwashError(f"is a {type(made).__name__}, expected responses, fits or models.", channel="cases")
 

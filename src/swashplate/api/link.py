@@ -83,7 +83,7 @@ def mapping_of(vehicle: Vehicle, servos: str | Path | None, *, name: str | None,
     Raises:
         SwashError: where there is none, or it is for another vehicle.
     """
-    if servos is None:
+    if servos is None and not vehicle.traits.no_link:
         servos = f"{vehicle.traits.servos or name or vehicle.name}{suffix}"
         if servos not in packaged():
             raise SwashError(
@@ -92,7 +92,7 @@ def mapping_of(vehicle: Vehicle, servos: str | Path | None, *, name: str | None,
                 channel="--servos",
                 hint="Give one of them, or a file of your own.",
             )
-    return servo_mapping(servos, vehicle)
+    return servo_mapping(servos or "", vehicle)
 
 
 def _own_process() -> None:

@@ -35,6 +35,7 @@ from swashplate.cli import (
     simulate,
     stitch,
     structures,
+    track,
     trim,
     validate,
     vehicles,
@@ -81,6 +82,7 @@ app.command("respond", short_help="Frequency responses from logs of sweeps.")(re
 app.command("fit-tf", short_help="Fit transfer functions to frequency responses.")(fit_tf.fit_tf)
 app.command("fit-ss", short_help="Fit a state-space model to frequency responses.")(fit_ss.fit_ss)
 app.command("fit-time", short_help="Fit a state-space model to records in time.")(fit_time.fit_time)
+app.command("track", short_help="Estimate along a log, sample by sample as on board.")(track.track)
 app.command("simulate", short_help="Fly a maneuver and save the flight.")(simulate.simulate)
 app.command("open", short_help="Look at any log in the browser: one page for all of it.")(open.open_)
 app.command("live", short_help="Fly a model in the browser, in real time.")(live.live)

@@ -61,11 +61,27 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
         ControllerError: where this kind of controller has no C.
         MissingLibraryError: where CasADi is not installed.
     """
-    casadi = library("casadi", what="C code")
+    library("casadi", what="C code")
     traced = kind_of(controller).traced(controller)
     function = traced.function
+    printed, calls = printed_function(function, precision)
+    size = 8 if precision == "double" else 4
+    return ControllerCode(
+        source=_heading(controller, traced, precision) + printed + _ending(traced, precision),
+        operations=operations_of(function),
+        calls=calls,
+        work_bytes=int(function.sz_w()) * size,
+        memory_bytes=len(traced.start) * size,
+        precision=precision,
+    )
+
+
+def printed_function(function: Any, precision: Precision) -> tuple[str, dict[str, int]]:
+    """A CasADi function as C without its heading, and calls of the C library by name, as they stand in it."""
+    import casadi
+
     with tempfile.TemporaryDirectory() as folder:
-        made = casadi.CodeGenerator("controller.c", {"casadi_real": precision, "casadi_int": "int"})
+        made = casadi.CodeGenerator("traced.c", {"casadi_real": precision, "casadi_int": "int"})
         made.add(function)
         printed = Path(made.generate(folder + "/")).read_text(encoding="utf-8")
     calls = {name: len(re.findall(rf"(?<![\w]){name}\(", printed)) for name in ("sin", "cos", "sqrt", "atan2")}
@@ -74,18 +90,10 @@ def controller_code(controller: Controller, *, precision: Precision = "double") 
     if precision == "float":  # no constant and no function may lift the arithmetic to double
         printed = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?)(?![\w.])", r"\1f", printed)
         printed = re.sub(r"(?<![\w])(sin|cos|sqrt|atan2)\(", r"\1f(", printed)
-    size = 8 if precision == "double" else 4
-    return ControllerCode(
-        source=_heading(controller, traced, precision) + printed + _ending(traced, precision),
-        operations=_operations(function),
-        calls={name: count for name, count in calls.items() if count},
-        work_bytes=int(function.sz_w()) * size,
-        memory_bytes=len(traced.start) * size,
-        precision=precision,
-    )
+    return printed, {name: count for name, count in calls.items() if count}
 
 
-def _operations(function: Any) -> int:
+def operations_of(function: Any) -> int:
     """Instructions of the trace but reading inputs, writing outputs and constants; loops count by their rounds."""
     import casadi
 

@@ -11,6 +11,7 @@ from swashplate.errors import ExportError
 from swashplate.export.c_text import Precision, identifier
 from swashplate.export.linear import Linear, logged_delays, of_state_space, of_vehicle
 from swashplate.models.delays import input_delays
+from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
@@ -103,7 +104,7 @@ def export_model(
         trim: where a vehicle starts, and what its linear model is about; hover where none is given.
         precision: of C ("double" or "single"); the other formats are double.
         delays: take along what an identified vehicle's motion lagged its logged inputs by; where not given, where the
-            card knows it. A linear model has its own.
+            card knows it. A linear model has its own, unless they are not to be taken along (False).
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
@@ -121,6 +122,8 @@ def export_model(
             raise ExportError("a linear model holds at the one flight that it was identified in.", channel="--speed")
         if delays:
             raise ExportError("a linear model brings its own delays.", channel="--delays", hint="Leave it out.")
+        if delays is False:
+            model, left_out = _without_delays(model, name)
     else:
         known = logged_delays(flying) if delays else input_delays(flying)
         late = None if delays is False else known or None
@@ -131,3 +134,11 @@ def export_model(
     called = identifier(name)
     made = FORMATS[form](ExportRequest(model, called, about, late, precision))
     return replace(made, notes=(*made.notes, left_out)) if left_out else made
+
+
+def _without_delays(model: Model, name: str) -> tuple[Linear, str]:
+    """A linear model's matrices alone, and what was left out."""
+    plain = model if isinstance(model, Linear) else of_state_space(structure_of(model), name=name)
+    late = {name: delay for name, delay in plain.delays.items() if delay}
+    told = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
+    return replace(plain, delays={}), f"Left out: the model's delays ({told})." if late else ""

@@ -21,7 +21,7 @@ def c(asked: ExportRequest) -> Export:
     from swashplate.export.traced import late_notes
 
     traced = _traced(asked)
-    return Export(_encoded(model_code(traced, precision=asked.precision).files()), (*traced.notes, *late_notes(traced)))
+    return Export(_encoded(model_code(traced, precision=asked.precision).files()), late_notes(traced))
 
 
 def fmu(asked: ExportRequest) -> Export:
@@ -32,7 +32,7 @@ def fmu(asked: ExportRequest) -> Export:
 
     traced = _traced(asked)
     content, message = unit.fmu(traced, version=metadata.version("swashplate"))
-    return Export({f"{asked.name}.fmu": content}, (*traced.notes, *([message] if message else [])))
+    return Export({f"{asked.name}.fmu": content}, (message,) if message else ())
 
 
 def simulink(asked: ExportRequest) -> Export:
@@ -41,7 +41,7 @@ def simulink(asked: ExportRequest) -> Export:
     from swashplate.export.traced import late_notes
 
     traced = _traced(asked)
-    return Export(_encoded(blocks.simulink(traced)), (*traced.notes, *late_notes(traced)))
+    return Export(_encoded(blocks.simulink(traced)), late_notes(traced))
 
 
 def control(asked: ExportRequest) -> Export:

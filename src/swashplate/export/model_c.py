@@ -149,7 +149,7 @@ def _heading(model: Traced) -> str:
         words(f"{model.name}: {model.title}"),
         words(f"Trust: {model.trust}") if model.trust else "",
         words(f"Starts: {model.about}"),
-        *(words(note) for note in (*model.notes, *late_notes(model))),
+        *(words(note) for note in late_notes(model)),
         "",
         "Written by swashplate from the equations that it simulates with. SI units, radians; body axes",
         "forward-right-down, local axes north-east-down. No allocation, no static variables that change.",

@@ -54,7 +54,6 @@ class Traced:
         jacobians: A and B, the rates by state and by input; of nothing where they were left out.
         looped: the rates again, with the roots in them found in loops; None where there are none.
         delays: of each input [s]; empty where there are none. The functions do not have them.
-        notes: what a user must know.
     """
 
     name: str
@@ -71,7 +70,6 @@ class Traced:
     jacobians: Any = field(repr=False)
     looped: Looped | None = field(default=None, repr=False)
     delays: tuple[float, ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 def late_notes(model: Traced) -> tuple[str, ...]:
@@ -239,7 +237,8 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
     """A linear model's dx/dt = A x + B u, y = C x + D u with its numbers as constants.
 
     Raises:
-        ExportError: without CasADi, or where two signals would have one name in C.
+        ExportError: without CasADi, where two signals would have one name in C, or an input reaches outputs after
+            different times.
     """
     casadi = require_casadi()
     x, u = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(model.inputs))
@@ -262,9 +261,18 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         )
 
     late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
-    alike = all(len(found) <= 1 for found in late.values())
-    delays = tuple(found[0] for found in late.values() if found) if alike else ()
-    waits = "Delays differ between outputs and are not in this file; see the model's own."
+    if torn := [name for name, found in late.items() if len(found) > 1]:
+        told = ", ".join(
+            f"{o}/{i} {1e3 * model.delay(o, i):.3g} ms" for i in torn for o in model.outputs if model.delay(o, i)
+        )
+        raise ExportError(
+            f"has delays that differ between outputs ({told}); equations in C and FMU hold one of each input.",
+            where=model.name,
+            channel="delays",
+            hint="Give the file one delay per input, or leave all of them out (--no-delays); --format matlab and "
+            "control hold them.",
+        )
+    delays = tuple(found[0] for found in late.values() if found)
     return Traced(
         name=name,
         title=model.title,
@@ -279,7 +287,6 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         readings=function([casadi.densify(C @ x + D @ u)]),
         jacobians=function([A, B]),
         delays=delays if any(delays) else (),
-        notes=() if alike else (waits,),
     )
 
 

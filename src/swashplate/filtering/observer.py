@@ -57,6 +57,7 @@ class ObserverPlan:
         rate: steps per second [Hz].
         delays: of each input, in samples.
         period: samples after which constant gains of the observer repeat; 0 where it finds its gains as it flies.
+        slow: parameters of the vehicle that are estimated too, as states that wander slowly; not with constant gains.
     """
 
     equations: Equations
@@ -64,6 +65,7 @@ class ObserverPlan:
     rate: float
     delays: tuple[int, ...]
     period: int = 0
+    slow: tuple[str, ...] = ()
 
     @property
     def dt(self) -> float:
@@ -72,6 +74,11 @@ class ObserverPlan:
     @property
     def n(self) -> int:
         return len(self.equations.vehicle.state_names)
+
+    @property
+    def moves(self) -> int:
+        """How many of what is estimated the equations move or are moved by: states, disturbances, slow parameters."""
+        return self.n + len(DISTURBED) + len(self.slow)
 
     @property
     def inputs(self) -> int:
@@ -104,6 +111,7 @@ class ObserverPlan:
         return (
             *self.equations.vehicle.state_names,
             *(f"disturbance {name}" for name in DISTURBED),
+            *(f"parameter {name}" for name in self.slow),
             *(f"bias {name}" for name in self.biases),
             *late,
         )
@@ -152,7 +160,7 @@ class ObserverEstimate(NamedTuple):
 
 
 def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
-    """(1 / time constants of the disturbances, variance per sample of everything estimated)."""
+    """(1 / time constants of the disturbances, variance per sample of everything estimated; slow parameters stay)."""
     u, dt = unrest, plan.dt
     fade = 1.0 / np.array(on_axes(u.force_time, u.force_time, u.moment_time, u.moment_time))
     vehicle = plan.equations.vehicle
@@ -164,9 +172,9 @@ def process_noise(plan: ObserverPlan, unrest: Unrest) -> tuple[Array, Array]:
     states = [white.get(name, u.other if name in inner else 0.0) ** 2 * dt for name in vehicle.state_names]
     spread = u.spread**2 * (1.0 - np.exp(-2.0 * fade * dt))
     wander = [BIASED[name][1] ** 2 * dt for name in plan.biases]
-    late = len(plan.names) - plan.n - len(DISTURBED) - len(wander)
+    late = len(plan.names) - plan.moves - len(wander)
     # A stored reading is not disturbed; the last digit keeps the covariance positive in rounding.
-    return fade, np.array([*states, *spread, *wander, *[0.0] * late])
+    return fade, np.array([*states, *spread, *[0.0] * len(plan.slow), *wander, *[0.0] * late])
 
 
 def measurement_noise(plan: ObserverPlan) -> Array:
@@ -174,26 +182,29 @@ def measurement_noise(plan: ObserverPlan) -> Array:
 
 
 def start_variance(plan: ObserverPlan, unrest: Unrest) -> Array:
-    """Variances before the first reading, of states, disturbances and biases."""
+    """Variances before the first reading, of states, disturbances, slow parameters (none) and biases."""
     units = dict(zip(plan.equations.vehicle.state_names, plan.equations.vehicle.state_units, strict=True))
     usual = {"m": 0.05, "m/s": 0.05, "rad": 0.01, "rad/s": 0.02}
     first = [4.0 if name.startswith("omega") else usual.get(unit, 0.01) ** 2 for name, unit in units.items()]
     spread = unrest.spread**2
-    return np.array([*first, *spread, *(BIASED[name][0] ** 2 for name in plan.biases)])
+    return np.array([*first, *spread, *[0.0] * len(plan.slow), *(BIASED[name][0] ** 2 for name in plan.biases)])
 
 
 # ---- scalar functions --------------------------------------------------------------------------------------------
-def _surrounded(plan: ObserverPlan, numbers: Any, voltage: Any) -> tuple[Any, Environment]:
+def _surrounded(plan: ObserverPlan, numbers: Any, e: Sequence[Any], voltage: Any) -> tuple[Any, Environment]:
     vehicle = plan.equations.vehicle
     count = len(vehicle.parameter_names)
-    parameters = vehicle.parameters(*(numbers[i] for i in range(count)))
+    slow = dict(zip(plan.slow, e[plan.moves - len(plan.slow) : plan.moves], strict=True))
+    parameters = vehicle.parameters(
+        *(slow[name] if name in slow else numbers[i] for i, name in enumerate(vehicle.parameter_names))
+    )
     return parameters, Environment(voltage=voltage, air_density=numbers[count], gravity=numbers[count + 1])
 
 
 def moving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
     """Rates of everything estimated; `w` is the inputs and the voltage."""
     vehicle, n = plan.equations.vehicle, plan.n
-    parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
+    parameters, around = _surrounded(plan, numbers.parameters, e, w[plan.inputs])
     rates = vehicle.rates(e[:n], w[: plan.inputs], parameters, around, xp)
     pushed = dict(zip(DISTURBED, e[n : n + 6], strict=True))
     rates = [
@@ -207,10 +218,10 @@ def shown(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[An
     """What every sensor would read now of an estimate, channel by channel."""
     vehicle, n = plan.equations.vehicle, plan.n
     body = RigidBody(*e[:_BODY])
-    bias = dict(zip(plan.biases, e[n + 6 : n + 6 + len(plan.biases)], strict=True))
+    bias = dict(zip(plan.biases, e[plan.moves : plan.moves + len(plan.biases)], strict=True))
     force = Vector(0.0, 0.0, 0.0)
     if any(sensor.kind == "imu" for sensor in plan.sensors):
-        parameters, around = _surrounded(plan, numbers.parameters, w[plan.inputs])
+        parameters, around = _surrounded(plan, numbers.parameters, e, w[plan.inputs])
         commands = vehicle.inputs(*w[: plan.inputs])
         nested = rebuild(vehicle.state, list(e[:n]))
         force = vehicle.specific_force(nested, commands, parameters, around, xp) + Vector(*e[n : n + 3])
@@ -219,7 +230,7 @@ def shown(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[An
 
 def pieces(plan: ObserverPlan) -> list[tuple[Sampling, slice, int]]:
     """Of each sensor its sampling, its channels, and where its kept readings begin."""
-    found, channel, place = [], 0, plan.n + 6 + len(plan.biases)
+    found, channel, place = [], 0, plan.moves + len(plan.biases)
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
         m = len(sensor.channels)
         found.append((at, slice(channel, channel + m), place))
@@ -318,7 +329,7 @@ def predicted(
     """
     xp, dt = M.xp, plan.dt
     begin, P = estimate
-    moves, own = plan.n + len(DISTURBED), plan.n + len(DISTURBED) + len(plan.biases)
+    moves, own = plan.moves, plan.moves + len(plan.biases)
 
     def rates(e: Sequence[Any], w: Sequence[Any]) -> list[Any]:
         return moving(plan, numbers, e, w, xp)

@@ -141,8 +141,16 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
         vehicle: whose inputs it must give.
 
     Raises:
-        LinkError: naming the file and the entry that is missing, unknown, impossible or for another vehicle.
+        LinkError: naming the file and the entry that is missing, unknown, impossible or for another vehicle; or why no
+            autopilot can fly this vehicle.
     """
+    if vehicle.traits.no_link:
+        raise LinkError(
+            f"no autopilot can be linked: {vehicle.traits.no_link}.",
+            where=vehicle.card.where,
+            channel="--servos",
+            hint="Fly it with `swash live`, or with a controller of your own.",
+        )
     text, where = _read(name_or_file)
     document = documents.parse(text, form="toml", where=where, error=LinkError)
     table = MappingTable(document, where)

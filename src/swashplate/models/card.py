@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -336,6 +337,12 @@ def read_card(path: str | Path) -> Card:
 
 def packaged_cards() -> dict[str, Card]:
     """The cards that come with swashplate, by name."""
+    return dict(_packaged())
+
+
+@lru_cache(maxsize=1)
+def _packaged() -> dict[str, Card]:
+    """They are parsed once: a card does not change, and nine of them take a tenth of a second."""
     folder = resources.files("swashplate.models") / "data"
     files = sorted((entry for entry in folder.iterdir() if entry.name.endswith(".toml")), key=lambda entry: entry.name)
     return {f.name.removesuffix(".toml"): parse_card(f.read_text(encoding="utf-8"), path=f.name) for f in files}

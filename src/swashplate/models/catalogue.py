@@ -21,6 +21,7 @@ EQUATIONS: Registry[Callable[[Card], Vehicle]] = Registry(
     what="kind of model",
     own={
         "coax": "swashplate.models.coax_vehicle:coax",
+        "coaxial": "swashplate.models.coaxial.coaxial_vehicle:coaxial",
         "conventional": "swashplate.models.conventional.helicopter_vehicle:conventional",
         "linear": "swashplate.models.linear.card_vehicle:linear",
         "multirotor": "swashplate.models.multirotor_vehicle:multirotor",
@@ -95,7 +96,7 @@ def cards_by_name() -> tuple[dict[str, Card], tuple[SwashError, ...]]:
     return cards, tuple(faults)
 
 
-_SEVERAL = ("conventional", "linear", "multirotor", "stitched")
+_SEVERAL = ("coaxial", "conventional", "linear", "multirotor", "stitched")
 """Equations of ours that have no card of their own, but one for every aircraft."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from swashplate.physics.atmosphere import SEA_LEVEL_DENSITY
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 
 if TYPE_CHECKING:
     from swashplate.models.vehicle import Vehicle
@@ -18,14 +18,17 @@ def environment_of(vehicle: Vehicle, environment: Environment | None = None, *, 
     """The surroundings of a vehicle, complete: what `environment` leaves open is the vehicle's own.
 
     Args:
-        vehicle: whose card may state `air_density` [kg/m^3], the air that its factors hold for, and `voltage_nominal`
-            [V]. Without a density it flies at sea level of the standard atmosphere, 1.225 kg/m^3 (ISO 2533:1975).
-        environment: what is known; None: calm air and gravity of 9.81 m/s^2.
+        vehicle: whose card may state `air_density` [kg/m^3], the air that its factors hold for, `gravity` [m/s^2] and
+            `voltage_nominal` [V]. Without a density it flies at sea level of the standard atmosphere, 1.225 kg/m^3 (ISO
+            2533:1975); without gravity at 9.81 m/s^2.
+        environment: what is known; None: calm air.
         parameters: numbers in place of the card's, as the equations take them (traced ones too).
     """
     given = environment or Environment()
     if given.air_density is None:
         given = given._replace(air_density=_own(vehicle, "air_density", SEA_LEVEL_DENSITY, parameters))
+    if given.gravity is None:
+        given = given._replace(gravity=_own(vehicle, "gravity", LABORATORY_GRAVITY, parameters))
     if given.voltage is None:
         given = given._replace(voltage=_own(vehicle, "voltage_nominal", _NO_BATTERY, parameters))
     return given

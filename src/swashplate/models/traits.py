@@ -77,6 +77,7 @@ class Traits:
         servos: name of its packaged servo mapping, "" where that is its card's.
         servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two motors" (and two
             cyclic servos), or "" where no autopilot can be linked.
+        no_link: why no autopilot can be linked, where there is something to say; "" where nothing is.
         choices: a card's ready choices of what a fit may free.
         effects: parts of a card's physics that numbers can leave out: what a comparison of nested structures tries.
         recording: how the live page fits it to a recording; None where only frequency responses are made.
@@ -112,6 +113,7 @@ class Traits:
     published: str = ""
     servos: str = ""
     servo_layout: str = ""
+    no_link: str = ""
     choices: Callable[[Card], Mapping[str, Choice]] = uncertain_numbers
     effects: Callable[[Card], Sequence[PhysicalEffect]] = lambda card: ()
     recording: RecordingFit | None = None

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
 from swashplate.models.card import Card
 from swashplate.models.choices import Choice
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.surroundings import environment_of
@@ -121,6 +123,28 @@ class Vehicle:
 
         write_text(path, self.card.to_toml())
 
+    def as_linear(self) -> LinearResponse:
+        """The linear model: of its structure, else about hover (about another trim: `swashplate.linearize`).
+
+        Raises:
+            SwashError: for a vehicle that has no hover.
+        """
+        made: LinearResponse = resolve("linearize")(self) if self.structure is None else self.structure
+        return made
+
+    def response(self, omega: Array) -> Complex:
+        """H(j omega) of the linear model (`as_linear`), shape (n, n_outputs, n_inputs).
+
+        Outputs are the structure's own; of a vehicle without one its states. Inputs are `input_names`.
+
+        Args:
+            omega: frequencies [rad/s].
+
+        Raises:
+            SwashError: for a vehicle that has no hover.
+        """
+        return self.as_linear().response(omega)
+
     def to_control(self, *, pade: int | None = None) -> Any:
         """The linear model as a `control.StateSpace` of python-control: of its structure, else about hover.
 
@@ -133,7 +157,7 @@ class Vehicle:
         Raises:
             SwashError: an order outside 0 to 12, or a vehicle that has no hover.
         """
-        model = resolve("linearize")(self) if self.structure is None else self.structure
+        model: Any = self.as_linear()
         return model.to_control(pade=pade)
 
     def __repr__(self) -> str:

@@ -16,15 +16,16 @@ USUAL: Any = None
 class Environment(NamedTuple):
     """Surroundings at one instant; wind is the air's velocity in local axes (north-east-down).
 
-    Air density [kg/m^3] and battery voltage [V] that are not given are the vehicle's own: the density of its card, or
-    1.225 kg/m^3 (sea level of the standard atmosphere) where the card has none, and the card's nominal voltage.
+    Air density [kg/m^3], gravity [m/s^2] and battery voltage [V] that are not given are the vehicle's own: those of its
+    card, or 1.225 kg/m^3 (sea level of the standard atmosphere) and 9.81 m/s^2 where the card has none, and the card's
+    nominal voltage.
     """
 
     wind_north: Scalar = 0.0
     wind_east: Scalar = 0.0
     wind_down: Scalar = 0.0
     air_density: Scalar = USUAL
-    gravity: Scalar = LABORATORY_GRAVITY
+    gravity: Scalar = USUAL
     voltage: Scalar = USUAL
 
     @property

@@ -69,3 +69,34 @@ def inclined_force(
         xp=xp,
     )
     return force * si, force * ci
+
+
+def stabilator_incidence(
+    along: Scalar,
+    collective: Scalar,
+    pitch_rate: Scalar,
+    *,
+    low: Scalar,
+    high: Scalar,
+    begin: Scalar,
+    end: Scalar,
+    by_collective: Scalar,
+    neutral: Scalar,
+    by_pitch_rate: Scalar,
+    xp: Backend,
+) -> Scalar:
+    """Incidence [rad] of an all-moving tail by its schedule: speed, collective and pitch rate add up.
+
+    The form of the UH-60A's (Howlett 1981, NASA CR-166309, sec. 5.6) without its lateral acceleration; its gains change
+    with speed, these do not. It stays between the ends of its schedule with speed.
+
+    Args:
+        along: air speed ahead [m/s].
+        collective: of the main rotor [rad]. pitch_rate: [rad/s].
+        low, high: incidence at speeds up to `begin` and from `end` on [rad], [m/s].
+        by_collective: per collective above `neutral` [rad]. by_pitch_rate: [s].
+    """
+    way = xp.minimum(1.0, xp.maximum(0.0, (along - begin) / (end - begin)))
+    asked = low + (high - low) * way + by_collective * (collective - neutral) + by_pitch_rate * pitch_rate
+    least, most = xp.minimum(low, high), xp.maximum(low, high)
+    return xp.maximum(least, xp.minimum(most, asked))

@@ -7,16 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from swashplate.arrays import Array, Complex
+from swashplate.arrays import Complex
 from swashplate.identification.frequency.response_cost import Target, cost_of
 from swashplate.identification.responses.frequency_response import TWO_PI
-from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.answering import LinearResponse
 from swashplate.models.usual_axes import usual_axes
 from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
 from swashplate.reporting.structure import Cell, Table
-from swashplate.simulation.linearize import LinearModel
 
-Linear = LinearModel | StateSpaceModel
 BAND = np.geomspace(0.1, 5.0, 60) * TWO_PI
 """rad/s."""
 _SAME = 0.5
@@ -25,7 +23,7 @@ _RATES = {"roll": "p", "pitch": "q", "yaw": "r", "heave": "w"}
 _ORIGIN = 1e-5
 
 
-def compare_modes(cases: Mapping[str, Linear]) -> CaseParts:
+def compare_modes(cases: Mapping[str, LinearResponse]) -> CaseParts:
     """Eigenvalues [1/s], those of the first with the nearest of the others, and the difference in per cent."""
     names = list(cases)
     found = {name: eigenvalues(model) for name, model in cases.items()}
@@ -55,10 +53,9 @@ def compare_modes(cases: Mapping[str, Linear]) -> CaseParts:
     return CaseParts((Table("Modes", head, tuple(rows), note=note),), document={"modes": entries})
 
 
-def eigenvalues(model: Linear) -> list[complex]:
+def eigenvalues(model: LinearResponse) -> list[complex]:
     """With imaginary part zero or more, slowest last; those at the origin are no modes."""
-    A = model.A if isinstance(model, LinearModel) else model.explicit()[0]
-    values = [complex(v) for v in np.linalg.eigvals(A) if v.imag >= 0.0 and abs(v) > _ORIGIN]
+    values = [complex(v) for v in model.eigenvalues() if v.imag >= 0.0 and abs(v) > _ORIGIN]
     return sorted(values, key=lambda v: (-abs(v), v.imag))
 
 
@@ -81,13 +78,13 @@ def _shown(value: complex) -> str:
     return f"{value.real:+.3f} +/- {value.imag:.3f}j ({abs(value):.2f}, {-value.real / abs(value):.2f})"
 
 
-def compare_answers(cases: Mapping[str, Linear]) -> CaseParts:
+def compare_answers(cases: Mapping[str, LinearResponse]) -> CaseParts:
     """Responses over each other from 0.1 to 5 Hz, delays included, and J of each against the first.
 
     Pairs of an axis (p over roll ...) where inputs are named as usual; otherwise all that the models share.
     """
     every = list(cases.values())
-    inputs, outputs = common([m.inputs for m in every]), common([_outputs(m) for m in every])
+    inputs, outputs = common([m.inputs for m in every]), common([m.outputs for m in every])
     axes = {axis.name: name for axis in usual_axes(inputs) for name in axis.inputs if len(axis.inputs) == 1}
     pairs = [(_RATES[axis], name) for axis, name in axes.items() if _RATES[axis] in outputs]
     pairs = pairs or [(o, i) for o in outputs for i in inputs]
@@ -116,22 +113,7 @@ def compare_answers(cases: Mapping[str, Linear]) -> CaseParts:
     return CaseParts((table,), (bode_overlay(curves),), document={"responses": document})
 
 
-def _outputs(model: Linear) -> tuple[str, ...]:
-    return model.states if isinstance(model, LinearModel) else model.outputs
-
-
-def response(model: Linear, outputs: Sequence[str], inputs: Sequence[str]) -> Complex:
+def response(model: LinearResponse, outputs: Sequence[str], inputs: Sequence[str]) -> Complex:
     """H(j omega) over BAND with delays, shape (n, n_outputs, n_inputs)."""
-    o, i = ([every.index(n) for n in names] for every, names in ((_outputs(model), outputs), (model.inputs, inputs)))
-    if isinstance(model, StateSpaceModel):
-        h: Complex = model.response(BAND)
-    else:
-        s: Complex = np.asarray(1j * BAND[:, None, None])
-        x = np.linalg.solve(s * np.eye(len(model.states)) - model.A, model.B[None] + 0j)
-        h = np.asarray((model.C @ x + model.D) * np.exp(-s * _late(model)), dtype=np.complex128)
-    return np.asarray(h[:, o][:, :, i], dtype=np.complex128)
-
-
-def _late(model: LinearModel) -> Array:
-    known = model.delays
-    return np.array([[known.get(f"{o}/{i}", known.get(i, 0.0)) for i in model.inputs] for o in model.states])
+    o, i = ([every.index(n) for n in names] for every, names in ((model.outputs, outputs), (model.inputs, inputs)))
+    return np.asarray(model.response(BAND)[:, o][:, :, i], dtype=np.complex128)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.flights.schema import channel
-from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.figures_responses import verification_figure
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import shown, unit_words
@@ -63,13 +62,8 @@ def verification_section(v: Verification, rival: Verification | None = None) -> 
         if not {t.source for t in rival.traces} & {t.source for t in v.traces}:
             blocks.append(Text(f"{rival.model.name} is not drawn: it was flown in other stretches.", tone="quiet"))
     outputs = tuple(o.output for o in v.outputs)
-    model = v.model
-    if isinstance(model, StateSpaceModel):
-        units = model.units
-    else:
-        units = dict(zip(model.input_names, model.input_units, strict=True))
     for k, trace in enumerate(v.traces[:_TRACES]):
         twins = [t for t in rival.traces if t.source == trace.source] if rival is not None else []
         other = (rival.model.name, twins[0], [o.output for o in rival.outputs]) if rival and twins else None
-        blocks.append(verification_figure(trace, outputs, v.inputs, number=k, units=units, rival=other))
+        blocks.append(verification_figure(trace, outputs, v.inputs, number=k, units=v.units, rival=other))
     return Section("verification", "Verification in time", tuple(blocks))

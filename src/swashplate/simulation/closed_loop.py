@@ -19,7 +19,7 @@ from swashplate.flights.maneuvers.series import parse as parse_maneuver
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -135,28 +135,28 @@ def simulate_closed_loop(
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
     fly = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly
     late = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
-    waiting = int(late.max())
+    waiting = 1 << (int(late.max()) - 1).bit_length() if late.any() else 0
+    longer = shared_length(n)
     first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
     states, inputs = fly(
         equations_of(vehicle),
         controller.step,
-        round(every),
         waiting,
         x0,
         jnp.asarray(controller.memory),
         jnp.asarray(controller.gains),
-        (around, wanted, added),
+        tuple(lengthened(table, longer) for table in (around, wanted, added)),
         parameter_row(vehicle, surroundings),
         np.array(vehicle.input_limits).T,
         late,
         first,
+        round(every),
         1.0 / rate,
     )
-    time, rows = np.arange(n) / rate, np.concatenate([np.asarray(inputs), around], axis=1)
-    flight = simulated_flight(
-        vehicle, time, np.asarray(states), rows, details={"rate": rate, "controller_rate": controller.rate}
-    )
-    check_divergence(vehicle, time, np.asarray(states), flight)
+    states, inputs = np.asarray(states)[:n], np.asarray(inputs)[:n]
+    time, rows = np.arange(n) / rate, np.concatenate([inputs, around], axis=1)
+    flight = simulated_flight(vehicle, time, states, rows, details={"rate": rate, "controller_rate": controller.rate})
+    check_divergence(vehicle, time, states, flight)
     return flight
 
 
@@ -168,7 +168,6 @@ def _inputs_before(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, a
 def _flying(
     equations: Equations,
     control: Step,
-    every: int,
     waiting: int,
     x0: Float[jax.Array, " states"],
     memory: Float[jax.Array, " memory"],
@@ -178,6 +177,7 @@ def _flying(
     limits: Float[jax.Array, "2 inputs"],
     late: Int[jax.Array, " inputs"],
     first: Float[jax.Array, " inputs"],
+    every: Int[jax.Array, ""],
     dt: Float[jax.Array, ""],
 ) -> tuple[Any, Any]:
     rates = row_rates(equations, padded=True)
@@ -217,9 +217,9 @@ def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " i
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3))
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2))
 # An observer's derivatives take minutes to compile as XLA usually does it.
-_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
+_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
 
 
 def told(

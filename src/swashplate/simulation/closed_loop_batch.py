@@ -19,7 +19,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -106,6 +106,7 @@ def simulate_closed_loops(
         [_series(n, (reference or {}).get(n, states.get(n, 0.0)), samples, 1)[:, 0] for n in REFERENCES], 1
     )
     added = np.stack([_series(n, (excitation or {}).get(n, 0.0), samples, 1)[:, 0] for n in vehicle.input_names], 1)
+    flown_for = _length(samples, size, keep)
     p = np.repeat(parameter_row(vehicle, surroundings)[:, None], size, axis=1)
     for name, values in (parameters or {}).items():
         if name not in vehicle.parameter_names:
@@ -138,9 +139,9 @@ def simulate_closed_loops(
             np.repeat(begin.state[:, None], count, axis=1),
             _memories(controller, seed + first + np.arange(count)),
             np.asarray(controller.gains),
-            around if around.shape[2] == 1 else around[:, :, part],
-            wanted,
-            added,
+            lengthened(around if around.shape[2] == 1 else around[:, :, part], flown_for),
+            lengthened(wanted, flown_for),
+            lengthened(added, flown_for),
             p[:, part],
             told,
             sigma[:, None],
@@ -149,7 +150,7 @@ def simulate_closed_loops(
             key,
             1.0 / rate,
         )
-        return np.asarray(found[0]), np.asarray(found[1])
+        return np.asarray(found[0])[: samples // keep], np.asarray(found[1])[: samples // keep]
 
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         parts = list(threads.map(block, range(0, size, count)))
@@ -157,6 +158,15 @@ def simulate_closed_loops(
     kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
     rows = np.concatenate([inputs, kept], axis=1)
     return Batch(vehicle, np.arange(flown.shape[0]) * keep / controller.rate, flown, rows)
+
+
+_FEW = 200_000
+"""Samples of all vehicles together that fly sooner than a loop of another length is compiled."""
+
+
+def _length(samples: int, size: int, keep: int) -> int:
+    """How many samples are flown: some more than asked where that spares compiling."""
+    return samples if samples * size > _FEW else -(-shared_length(samples) // keep) * keep
 
 
 def _memories(controller: Controller, seeds: NDArray[np.int64]) -> Array:

@@ -10,8 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import jax
+import numpy as np
 import platformdirs
 
+from swashplate.arrays import Array
 from swashplate.atomic import write_text
 from swashplate.errors import WriteError
 
@@ -20,6 +22,23 @@ QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 
 _SMALL_LOOP = "xla_cpu_small_while_loop_byte_threshold"
 _SMALL_LOOP_BYTES = 1_000_000
+
+
+_SHORTEST = 64
+
+
+def shared_length(n: int) -> int:
+    """A length of at least `n` that many series share: 64, 96, 128, 192, 256... (powers of two, and halfway).
+
+    XLA compiles a loop anew for every length, for seconds; a sample too many costs microseconds.
+    """
+    whole = max(_SHORTEST, 1 << (max(n, 1) - 1).bit_length())
+    return 3 * whole // 4 if n <= 3 * whole // 4 and whole > _SHORTEST else whole
+
+
+def lengthened(rows: Array, length: int) -> Array:
+    """Rows (n, ...) with the last one repeated up to `length` of them."""
+    return np.concatenate([rows, np.repeat(rows[-1:], length - len(rows), axis=0)])
 
 
 def compile_small_loops_whole() -> None:

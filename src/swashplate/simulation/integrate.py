@@ -17,6 +17,7 @@ from swashplate.flights.flight import Flight
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.earth import Earth
 from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import lengthened, shared_length
 from swashplate.simulation.driving import Inputs, Interpolation, driving_rows
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
@@ -94,12 +95,13 @@ def simulate(
     check_step(vehicle, np.asarray(x0), rows[0, : len(vehicle.input_names)], first, rate=rate, substeps=substeps)
     acting = acting_rows(vehicle, rows, rate=rate, delays=delays, start=start, environment=first)
     numbers = parameter_row(vehicle, surroundings)
+    acting = lengthened(acting, shared_length(len(time)))
 
     def flown(moved: Vehicle, begin: Array) -> Array:
         held = interpolation == "held"
         return np.asarray(
             trajectory(equations_of(moved), begin, acting, numbers, 1.0 / rate, substeps=substeps, held=held)
-        )
+        )[: len(time)]
 
     places: Array | None = None
     if earth is not None:

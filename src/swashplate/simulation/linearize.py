@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eig, schur, solve_sylvester
 
 from swashplate import atomic
-from swashplate.arrays import Array, largest_first
+from swashplate.arrays import Array, Complex, largest_first
 from swashplate.models.delays import known_delays
 from swashplate.models.linear import python_control
 from swashplate.models.linear.matrices_file import state_space_of_matrices
@@ -98,6 +98,23 @@ class LinearModel(Shown):
                 )
             )
         return tuple(found)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The states."""
+        return self.states
+
+    def eigenvalues(self) -> Complex:
+        """Of A [1/s], fastest first; `modes` says what they are."""
+        values = np.linalg.eigvals(self.A).astype(np.complex128)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    def response(self, omega: Array) -> Complex:
+        """H(j omega) at frequencies [rad/s] with the identified delays, shape (n, n_states, n_inputs)."""
+        s: Complex = np.asarray(1j * np.asarray(omega)[:, None, None], dtype=np.complex128)
+        x = np.linalg.solve(s * np.eye(len(self.states)) - self.A, self.B[None] + 0j)
+        late = [[self.delays.get(f"{o}/{i}", self.delays.get(i, 0.0)) for i in self.inputs] for o in self.outputs]
+        return np.asarray((self.C @ x + self.D) * np.exp(-s * np.array(late)), dtype=np.complex128)
 
     def to_control(self, *, pade: int | None = None) -> Any:
         """The model as a `control.StateSpace` of python-control with named signals.

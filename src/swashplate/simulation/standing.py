@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
 from swashplate.models.catalogue import from_card
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
@@ -108,7 +109,7 @@ def at_rest(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:
     """The state row of a vehicle from `standing` at rest on the ground: level, rotors stopped, shape (n_states,)."""
     row = np.zeros(len(vehicle.state_names))
     skids = skids_of(vehicle)
-    sink = vehicle.card.values()["mass"] * environment.gravity / (4.0 * skids.stiffness)
+    sink = vehicle.card.values()["mass"] * environment_of(vehicle, environment).gravity / (4.0 * skids.stiffness)
     row[vehicle.index("z")] = sink - skids.depth
     return row
 

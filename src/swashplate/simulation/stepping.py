@@ -96,7 +96,7 @@ class Stepping:
         around = environment_of(vehicle, environment)
         self._engine: SteppingEngine = (engine or XlaEngine)(self._moved, around)
         self._n = len(self._moved.state_names)
-        self._gravity = float(environment.gravity)
+        self._gravity = float(around.gravity)
         self._around = np.array([getattr(around, name) for name in SURROUNDINGS])
         self._low, self._high = np.array(vehicle.input_limits).T
         self.place(state)

@@ -83,10 +83,19 @@ def verify_vehicle(
         )
         for k, c in enumerate(likelihood.comparisons(optimum.row))
     )
-    units = {n: channel(n).unit for n in shared} | dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
+    names = (*vehicle.input_names, *vehicle.state_names)
+    own = dict(zip(names, (*vehicle.input_units, *vehicle.state_units), strict=True))
+    units = {n: channel(n).unit for n in shared} | own
     warnings = [*damaged(flights), *([] if optimum.converged else ["the search for the start states did not end."])]
     if not all(np.all(np.isfinite(t.model)) for t in traces):
         raise FlightError("the equations diverge along the record.", where=pieces[0].name)
     return verified(
-        vehicle, shared, traces, units=units, warnings=warnings, flights=flights, settings={"shifts": shifts}
+        vehicle,
+        shared,
+        traces,
+        inputs=vehicle.input_names,
+        units=units,
+        warnings=warnings,
+        flights=flights,
+        settings={"shifts": shifts},
     )

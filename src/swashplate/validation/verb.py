@@ -8,7 +8,6 @@ from typing import Any, overload
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.result import Result
-from swashplate.identification.frequency.transfer_function_fit import TransferFunctionDetails, as_state_space
 from swashplate.identification.time.flight_details import FlightDetails
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -126,11 +125,9 @@ def along_inputs(
         FlightError: an input that the flights lack, or no output that both have.
     """
     model = fitted(model)
-    held = model.solution if isinstance(model, Result) else model
+    held = model.model if isinstance(model, Result) else model
     if isinstance(held, Vehicle) and held.structure is None:
         from swashplate.validation.vehicle_verification import verify_vehicle
 
         return verify_vehicle(held, flights, outputs=outputs)
-    if isinstance(held, tuple) and isinstance(model, Result) and isinstance(model.details, TransferFunctionDetails):
-        held = as_state_space(model)
     return verify(held, flights, outputs=outputs)

@@ -63,6 +63,7 @@ class Verification(Shown):
         judgement: whether the records refute the model, and why. rivals: J_rms of the naive predictors.
         constants, samples: numbers solved for, and numbers compared.
         floors: what the fits stand beside, by output.
+        inputs: names of the model's inputs, in the order of the traces'. units: of inputs and outputs, by name.
     """
 
     model: StateSpaceModel | Vehicle
@@ -78,6 +79,8 @@ class Verification(Shown):
     constants: int = 0
     samples: int = 0
     floors: tuple[Floor, ...] = ()
+    inputs: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def good(self) -> bool:
@@ -110,11 +113,6 @@ class Verification(Shown):
             f"{self.constants} constants solved for, {self.samples} samples compared, {stretches} stretches of up to "
             f"{length:.3g} s.",
         )
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the model's inputs, in the order of the traces'."""
-        return self.model.input_names if isinstance(self.model, Vehicle) else self.model.inputs
 
     def __getitem__(self, output: str) -> OutputVerification:
         return next(o for o in self.outputs if o.output == output)

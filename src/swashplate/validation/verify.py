@@ -131,6 +131,7 @@ def verify(
         model,
         shared,
         traces,
+        inputs=model.inputs,
         units=model.units,
         warnings=warnings,
         flights=flights,
@@ -146,6 +147,7 @@ def verified(
     outputs: tuple[str, ...],
     traces: Sequence[Trace],
     *,
+    inputs: tuple[str, ...],
     units: Mapping[str, str],
     warnings: Sequence[str],
     flights: tuple[Flight, ...],
@@ -157,7 +159,7 @@ def verified(
     """What a model did along records, with its figures.
 
     Args:
-        model: what was flown. outputs: compared. traces: the records. units: by output.
+        model: what was flown. outputs: compared. traces: the records. inputs: of the model. units: of both.
         warnings, flights, settings, judgement, rivals, constants: see `Verification`.
     """
     rows, told = _judged(units, outputs, traces), list(warnings)
@@ -189,6 +191,8 @@ def verified(
         constants=constants,
         samples=sum(t.flight.size for t in traces),
         floors=_beside(outputs, traces, banded=bool(settings.get("band_hz"))),
+        inputs=inputs,
+        units=dict(units),
     )
 
 

@@ -44,6 +44,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "simulate": ("fly_maneuver", "monte_carlo"),
     "structures list": ("structures",),
     "structures show": ("show_structure", "structure"),
+    "track": ("track", "recursive_estimator"),
     "trim": ("trim", "trim_curve"),
     "validate": ("validate", "validate_linear"),
     "vehicles list": ("vehicles",),
@@ -55,7 +56,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 STUDIES = (
     "check_controller", "compare", "decouple", "decouple_axes", "derivatives", "demo", "design_controller",
     "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver", "identify_and_validate", "monte_carlo",
-    "observability", "respond", "trim_curve", "validate_linear",
+    "observability", "respond", "track", "trim_curve", "validate_linear",
 )  # fmt: skip
 """Verbs whose result is worth a page."""
 UNSAVED = ("derivatives", "observability", "trim_curve", "check_controller")

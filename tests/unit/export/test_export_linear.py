@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from swashplate.export.control_json import read_control, read_linear
 from swashplate.export.formats import export_model
 from swashplate.export.linear import Linear, of_state_space, of_vehicle
 from swashplate.export.matlab import read_matlab
+from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space_file import structure
 
 
@@ -189,3 +191,16 @@ def test_ardupilot_refuses_what_has_no_cyclic_of_a_single_rotor() -> None:
     raptor = sp.vehicle("raptor50")
     with pytest.raises(ExportError, match="about hover"):
         export_model(raptor, "ardupilot-statespace", name="r", trim=sp.trim(raptor, speed=5.0))
+
+
+def test_c_and_fmu_refuse_delays_that_differ_between_outputs_or_leave_them_out_with_words() -> None:
+    model = replace(structure("hybrid"), delays={})
+    first, second = (f"{output}/{model.inputs[0]}" for output in model.outputs[:2])
+    torn = replace(model, delays={first: Expression("0.02"), second: Expression("0.04")})
+    for form in ("c", "fmu"):
+        with pytest.raises(ExportError, match=rf"differ between outputs \({first} 20 ms.*--no-delays"):
+            export_model(torn, form, name="torn")
+    made = export_model(torn, "c", name="torn", delays=False)
+    assert f"{first} 20 ms, {second} 40 ms" in " ".join(made.notes)
+    assert made.files["torn.c"] == export_model(model, "c", name="torn").files["torn.c"]
+    assert not export_model(model, "c", name="torn", delays=False).notes

@@ -15,7 +15,7 @@ from swashplate.models.conventional.helicopter import HelicopterLoads, loads
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from swashplate.simulation.trim_curve import TrimCurve
 
 XP = FloatBackend()
@@ -120,7 +120,7 @@ def test_autorotation_holds_the_rotor_speed_without_an_engine() -> None:
     found = sp.trim_curve(vehicle("raptor50"), (0.0, 8.0), autorotation=True)
     engine = vehicle("raptor50", rotor_speed="throttle")
     p = engine.values()
-    hover = math.sqrt(p.mass * CALM.gravity / (2.0 * CALM.air_density * math.pi * p.rotor_radius**2))
+    hover = math.sqrt(p.mass * LABORATORY_GRAVITY / (2.0 * CALM.air_density * math.pi * p.rotor_radius**2))
     for at in found.trims:
         assert abs(found.power(at) or 0.0) < 1e-2
         row = [*at.state, p.rotor_speed, 0.0]

@@ -107,7 +107,7 @@ def test_the_airs_forces_take_the_power_that_they_cost() -> None:
     par, env, u = vehicle.values(), Environment(voltage=3.7), (0.5, 0.6, 0.4, 0.7)
     x = np.array([*STATE, 1500.0, 1700.0, 1600.0, 1800.0])
     dx = rates(vehicle, x, u, env)
-    energy = par.mass * x[3:6] @ dx[3:6] - par.mass * env.gravity * dx[2]
+    energy = par.mass * x[3:6] @ dx[3:6] - par.mass * LABORATORY_GRAVITY * dx[2]
     energy += par.inertia_xx * x[9] * dx[9] + par.inertia_yy * x[10] * dx[10] + par.inertia_zz * x[11] * dx[11]
     expected = 0.0
     for i, (omega, sense) in enumerate(zip(x[12:16], vehicle.card.options["senses"], strict=True), start=1):

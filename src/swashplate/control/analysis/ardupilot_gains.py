@@ -25,6 +25,8 @@ from swashplate.control.analysis.rate_loop import (
     short,
 )
 from swashplate.control.analysis.rate_loop_steps import RateSteps, rate_loop_steps
+from swashplate.errors import IdentificationError
+from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling import ResponseMargins
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.models.linear.linear_vehicle import structure_of
@@ -186,26 +188,26 @@ def suggest_gains(
             the gyro filter, which the loop has.
     """
     known, behind = dict(autopilot or {}), dict(sources or {})
-    model = structure_of(model) if isinstance(model, Vehicle) else model
-    outputs, inputs = _channels(model)
+    fit, answering = (model, model.solution) if isinstance(model, Result) else (None, structure_of(model))
     made = []
     for axis, (rate, command) in AXES.items():
-        rates = [o for o in outputs if behind.get(o, o) in (rate, f"{rate}_sid")]
-        commands = [i for i in inputs if behind.get(i, i) == command]
+        rates = [o for o in answering.outputs if behind.get(o, o) in (rate, f"{rate}_sid")]
+        commands = [i for i in answering.inputs if behind.get(i, i) == command]
         if rates and commands:
             raw = behind.get(rates[0], rates[0]) != rate
             gyro = known.get("INS_GYRO_FILTER", 0.0) if raw else 0.0
             error = known.get(f"ATC_RAT_{axis}_FLTE", _FILTER)
-            made.append(_suggest(RateLoop(model, axis, rates[0], commands[0], error, gyro), known))
+            loop = RateLoop(answering, axis, rates[0], commands[0], error, gyro, _in_time(model), fit)
+            made.append(_suggest(loop, known))
     return tuple(_with_words(s) for s in _with_coupling(made))
 
 
-def _channels(model: StateSpaceModel | Fitted) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Outputs and inputs."""
-    held = model if isinstance(model, StateSpaceModel) else model.solution
-    if isinstance(held, StateSpaceModel):
-        return held.outputs, held.inputs
-    return tuple(m.output for m in held), (held[0].input,)
+def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | None:
+    """What can be stepped; None for transfer functions with more zeros than poles."""
+    try:
+        return structure_of(model.model if isinstance(model, Result) else model)
+    except IdentificationError:
+        return None
 
 
 def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:

@@ -15,11 +15,10 @@ from scipy.linalg import expm
 
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.rate_loop_steps import stepped
-from swashplate.errors import IdentificationError
 from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import model_margins
-from swashplate.identification.frequency.reading_accuracy import Fitted, response_of
-from swashplate.identification.frequency.transfer_function_fit import as_state_space
+from swashplate.identification.frequency.reading_accuracy import Fitted
+from swashplate.models.linear.answering import LinearResponse, pair_response
 from swashplate.models.linear.state_space import StateSpaceModel
 
 LOWEST = 2.0 * np.pi * 0.05
@@ -61,39 +60,32 @@ NO_FIGURES = LoopFigures(ResponseMargins(*[ReadNumber(NAN)] * 5), NAN, NAN, NAN,
 
 @dataclass(frozen=True)
 class RateLoop:
-    """A rate loop without its gains: what the model answers, and what filters stand beside it [Hz]."""
+    """A rate loop without its gains: what the model answers, and what filters stand beside it [Hz].
 
-    model: StateSpaceModel | Fitted
+    Attributes:
+        model: what answers the command. axis, rate, command: names.
+        error_filter, gyro_filter: corners [Hz].
+        structure: the model in time; None for transfer functions that cannot be stepped.
+        fit: where the model comes from one, for the bounds of margins.
+    """
+
+    model: LinearResponse
     axis: str
     rate: str
     command: str
     error_filter: float
     gyro_filter: float
-
-    @cached_property
-    def structure(self) -> StateSpaceModel | None:
-        """The model in time; None for a transfer function that cannot be stepped."""
-        if isinstance(self.model, StateSpaceModel):
-            return self.model
-        if isinstance(self.model.solution, StateSpaceModel):
-            return self.model.solution
-        try:
-            return as_state_space(self.model)
-        except IdentificationError:
-            return None
+    structure: StateSpaceModel | None = None
+    fit: Fitted | None = None
 
     def plant(self, omega: Array) -> Complex:
-        if isinstance(self.model, StateSpaceModel):
-            return np.asarray(self._responses(omega)[:, 0, 0])
-        return response_of(self.model, self.rate, self.command, omega)
+        return pair_response(self.model, self.rate, self.command, omega)
 
-    def _responses(self, omega: Array, axes: tuple[RateLoop, ...] = ()) -> Complex:
-        """From the commands of some axes (this one alone) to their rates, shape (n, axes, axes)."""
-        assert self.structure is not None
-        loops = axes or (self,)
-        rows = [self.structure.outputs.index(loop.rate) for loop in loops]
-        columns = [self.structure.inputs.index(loop.command) for loop in loops]
-        return np.asarray(self.structure.response(omega)[:, rows][:, :, columns])
+    def _responses(self, omega: Array, axes: tuple[RateLoop, ...]) -> Complex:
+        """From the commands of some axes to their rates, shape (n, axes, axes)."""
+        rows = [self.model.outputs.index(loop.rate) for loop in axes]
+        columns = [self.model.inputs.index(loop.command) for loop in axes]
+        return np.asarray(self.model.response(omega)[:, rows][:, :, columns])
 
     def controller(self, gains: Mapping[str, float], omega: Array) -> Complex:
         """From the rate to the command with its sign turned, gyro filter included where the model lacks it."""
@@ -115,10 +107,10 @@ class RateLoop:
         controller, plant = self.controller(gains, omega), self.plant(omega)
         loop = np.asarray(controller * plant, dtype=np.complex128)
         sensitivity = np.abs(1.0 / (1.0 + loop))
-        if isinstance(self.model, StateSpaceModel):
+        if self.fit is None:
             read = margins(omega, loop)
         else:
-            read = model_margins(self.model, self.rate, self.command, omega, controller)
+            read = model_margins(self.fit, self.rate, self.command, omega, controller)
         follows = np.abs(plant * self.ahead(gains, omega) / (1.0 + loop))
         overshoot = self.overshoots({name: np.array([value]) for name, value in short(gains).items()})
         return LoopFigures(
@@ -159,14 +151,13 @@ class RateLoop:
     @property
     def unstable(self) -> float:
         """Size of the fastest growing mode [rad/s], zero for none."""
-        m = self.model if isinstance(self.model, StateSpaceModel) else self.model.solution
-        modes = m.eigenvalues() if isinstance(m, StateSpaceModel) else m[0].poles
+        modes = self.model.eigenvalues()
         return float(np.max(np.abs(modes[modes.real > 1e-6]), initial=0.0))
 
 
 def couplings(loops: tuple[RateLoop, ...], gains: tuple[Mapping[str, float], ...], omega: Array) -> tuple[float, ...]:
     """Per axis, the largest answer of another axis' rate to its demand with all loops closed (NaN: one axis alone)."""
-    if len(loops) < 2 or loops[0].structure is None:
+    if len(loops) < 2:
         return (NAN,) * len(loops)
     H = loops[0]._responses(omega, loops)
     back, ahead = (

@@ -30,6 +30,9 @@ _MAD_TO_SIGMA = 1.4826  # normal distribution
 _MINIMUM_LENGTH = 0.5  # a quaternion shorter than this means that tracking was lost
 
 
+_NORMAL = np.add.outer(np.arange(3), np.arange(3))  # which moment stands where in a parabola's normal equations
+
+
 @dataclass(frozen=True)
 class OutlierRule:
     """How far off is too far.
@@ -57,14 +60,16 @@ def _two_sided(time: Array, values: Array, passes: int = 5) -> Array:
     offset = time[window] - time[:, None]
     offset /= np.max(np.abs(offset), axis=1, keepdims=True)
     near = values[window]
-    basis = np.stack([np.ones_like(offset), offset, offset**2], axis=-1)
+    powers = offset[..., None] ** np.arange(5)
     others = (window != np.arange(n)[:, None]).astype(np.float64)
     weight = others.copy()
     fit = np.zeros((n, 3))
     for _ in range(passes):
-        normal = np.einsum("nw,nwi,nwj->nij", weight, basis, basis) + 1e-9 * np.eye(3)
-        fit = np.linalg.solve(normal, np.einsum("nw,nwi,nw->ni", weight, basis, near)[..., None])[..., 0]
-        residual = np.abs(near - np.einsum("nwi,ni->nw", basis, fit))
+        moments = (weight[:, None, :] @ powers)[:, 0]  # of the neighbours' offsets: the normal equations' entries
+        normal = moments[:, _NORMAL] + 1e-9 * np.eye(3)
+        right = (weight * near)[:, None, :] @ powers[..., :3]
+        fit = np.linalg.solve(normal, right.transpose(0, 2, 1))[..., 0]
+        residual = np.abs(near - (powers[..., :3] @ fit[..., None])[..., 0])
         scale = np.median(residual, axis=1, keepdims=True) * 6.0 + np.finfo(float).tiny
         weight = others * np.maximum(0.0, 1.0 - (residual / scale) ** 2) ** 2 + 1e-6 * others
     return values - fit[:, 0]

@@ -23,7 +23,7 @@ from swashplate.models.card import card_from
 from swashplate.models.catalogue import from_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.models.linear.transfer_function import TransferFunction
+from swashplate.models.linear.transfer_function import TransferFunction, TransferFunctions
 from swashplate.models.vehicle import Vehicle
 
 KIND, SCHEMA = "result", 1
@@ -147,7 +147,8 @@ def _model_of(found: Any, *, where: str, at: str, equations: Vehicle | None) -> 
             raise DocumentError("has an entry that is nothing.", where=where, channel=at) from None
         return state_space_file.parse(text, path=where)
     if kind == "transfer-functions":
-        return decode(tuple[TransferFunction, ...], found.get("functions"), where=where, at=f"{at}.functions")
+        functions = decode(tuple[TransferFunction, ...], found.get("functions"), where=where, at=f"{at}.functions")
+        return TransferFunctions(functions)
     raise DocumentError(f"is {kind!r}, expected a kind of model.", where=where, channel=f"{at}.kind")
 
 

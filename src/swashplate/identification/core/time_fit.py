@@ -93,6 +93,7 @@ def solve(
     progress: Progress | None,
     start: Array | None = None,
     horizon: Horizon | None = None,
+    around: bool = False,
 ) -> Solved:
     """The optimum of a likelihood whose first entries are the model's parameters.
 
@@ -102,11 +103,12 @@ def solve(
         progress: told about every iteration.
         start: scaled row to begin with (None: the entries' starts).
         horizon: of the errors ahead that are minimised afterwards, None: none.
+        around: see `minimise`.
 
     Raises:
         IdentificationError: where the model diverges, at the first guess or ahead.
     """
-    optimum = minimise(likelihood, start=start, iterations=iterations, tolerance=0.02, progress=progress)
+    optimum = minimise(likelihood, start=start, iterations=iterations, tolerance=0.02, around=around, progress=progress)
     if horizon is not None:
         return _solved_ahead(likelihood, optimum, horizon, iterations=iterations, progress=progress)
     row = likelihood.row

@@ -98,7 +98,8 @@ class TimeErrors(ABC):
 
     @abstractmethod
     def _moved(self, row: Array) -> Iterator[Moved]:
-        """Of each record: places of the entries that move its errors, the errors, their slopes by those entries."""
+        """Of samples that follow each other, never of two records: places of the entries that move their errors, the
+        errors, their slopes by those entries."""
 
     @abstractmethod
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
@@ -124,6 +125,10 @@ class TimeErrors(ABC):
         """Negative log-likelihood at its own covariance, without constants: n/2 log det S."""
         with np.errstate(over="ignore", invalid="ignore"):
             errors = self._plain(row)
+        return self._cost_of(errors)
+
+    def _cost_of(self, errors: Array) -> float:
+        """Infinite for errors of a model that diverges."""
         if not np.all(np.isfinite(errors)) or np.max(np.abs(errors)) > _DIVERGED:
             return float("inf")
         return self._cost(errors)
@@ -150,12 +155,17 @@ class TimeErrors(ABC):
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
         """Per record: whitened errors (n, outputs) and their sensitivities (p, n, outputs); no other information."""
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        plain, moved = [], []
+        lengths = [record.time.size for record in self.records]
+        plain = [np.zeros((length, len(self.outputs))) for length in lengths]
+        moved = [np.zeros((len(self._row), length, len(self.outputs))) for length in lengths]
+        number, at = 0, 0
         for places, errors, slopes in self._moved(row):
-            whole = np.zeros((len(self._row), *errors.shape))
-            whole[places] = (slopes.reshape(-1, errors.shape[1]) @ inverse.T).reshape(slopes.shape)
-            plain.append(errors @ inverse.T)
-            moved.append(whole)
+            if at == lengths[number]:
+                number, at = number + 1, 0
+            here = slice(at, at + len(errors))
+            plain[number][here] = errors @ inverse.T
+            moved[number][places, here] = (slopes.reshape(-1, errors.shape[1]) @ inverse.T).reshape(slopes.shape)
+            at += len(errors)
         return plain, moved, np.zeros((len(self._row), len(self._row)))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:

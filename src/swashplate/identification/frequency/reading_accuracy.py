@@ -11,12 +11,12 @@ import numpy as np
 from swashplate.arrays import Array, Complex
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.models.linear.state_space import StateSpaceModel
-from swashplate.models.linear.transfer_function import TransferFunction
+from swashplate.models.linear.transfer_function import TransferFunctions
 
 _STEP = 0.1
 """Of a bound, to either side: small enough for a straight line, large enough for a crossing between two lines."""
 
-Fitted = Result[StateSpaceModel, Any] | Result[tuple[TransferFunction, ...], Any]
+Fitted = Result[StateSpaceModel, Any] | Result[TransferFunctions, Any]
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,7 @@ class Answers:
 
 def has_pair(fit: Fitted, output: str, input: str) -> bool:
     """Whether the fitted model joins these channels."""
-    if isinstance(fit.solution, StateSpaceModel):
-        return output in fit.solution.outputs and input in fit.solution.inputs
-    return any((m.output, m.input) == (output, input) for m in fit.solution)
-
-
-def response_of(fit: Fitted, output: str, input: str, omega: Array) -> Complex:
-    """One response of a fitted model, shape (n,)."""
-    return _with_slopes(fit, output, input, omega)[0]
+    return output in fit.solution.outputs and input in fit.solution.inputs
 
 
 def answers(fit: Fitted, output: str, input: str, omega: Array) -> Answers:
@@ -89,21 +82,7 @@ def _free(fit: Fitted) -> list[Estimate]:
 
 def _with_slopes(fit: Fitted, output: str, input: str, omega: Array) -> tuple[Complex, Complex]:
     """H(j omega) (n,) and the derivatives of its logarithm by each free parameter (n, n_free)."""
-    free = [p.name for p in _free(fit)]
-    if isinstance(fit.solution, StateSpaceModel):
-        model = fit.solution
-        pair = (model.outputs.index(output), model.inputs.index(input), omega)
-        at = np.array([model.parameters[name].value for name in free])
-        (h,), (slopes,) = model.sensitivities(tuple(free), at, [pair])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return h, slopes / h[:, None]
-    model_of = next(m for m in fit.solution if (m.output, m.input) == (output, input))
-    h, own = model_of.with_slopes(omega)
-    several = len(fit.solution) > 1
-    by_name = {f"{n} {output}" if several and n in model_of.form.own_names else n: slope for n, slope in own.items()}
-    zero = np.zeros(omega.size, dtype=np.complex128)
-    columns = [by_name.get(name, zero) for name in free]
-    return h, np.stack(columns, axis=1) if columns else np.zeros((omega.size, 0), dtype=np.complex128)
+    return fit.solution.log_slopes(output, input, omega, [p.name for p in _free(fit)])
 
 
 def _root(free: Sequence[Estimate], correlation: Array) -> Array:

@@ -32,7 +32,7 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse
-from swashplate.models.linear.transfer_function import Form, TransferFunction
+from swashplate.models.linear.transfer_function import Form, TransferFunction, TransferFunctions
 from swashplate.models.vehicle import Vehicle
 
 _ROUGH, _FOLLOWED = 12, 3
@@ -61,7 +61,7 @@ class TransferFunctionDetails:
         return [f"  {model!r}   J = {cost:.1f}" for model, cost in zip(result.solution, result.costs, strict=True)]
 
 
-TransferFunctionFit = Result[tuple[TransferFunction, ...], TransferFunctionDetails]
+TransferFunctionFit = Result[TransferFunctions, TransferFunctionDetails]
 """What `fit_transfer_function` returns: one function per output, poles shared."""
 
 
@@ -178,8 +178,8 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
             f"every parameter of the form {form.text} is held: there is nothing to fit.", hint="Let one move."
         )
 
-    def models(values: Mapping[str, float]) -> list[TransferFunction]:
-        return [
+    def models(values: Mapping[str, float]) -> TransferFunctions:
+        return TransferFunctions(
             TransferFunction(
                 form,
                 {n: float(values[own[n]]) for n in form.own_names} | {n: float(values[n]) for n in shared},
@@ -187,7 +187,7 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
                 t.input,
             )
             for t, own in zip(targets, owner, strict=True)
-        ]
+        )
 
     def evaluate(numbers: Array) -> tuple[list[Complex], list[Complex]]:
         values = spread | dict(zip(free, numbers, strict=True))
@@ -234,7 +234,7 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
         )
         for name in names
     )
-    made = tuple(models(values))
+    made = models(values)
     responses = [model.response(t.omega) for model, t in zip(made, targets, strict=True)]
     costs = tuple(cost_of(h, t) for h, t in zip(responses, targets, strict=True))
     first = {n: cost.row.entries[place[n]].start for n in free}
@@ -243,7 +243,7 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     return Result(
         method="frequency responses",
         solution=made,
-        start=tuple(models({**spread, **first})),
+        start=models({**spread, **first}),
         estimates=estimates,
         names=tuple(free),
         covariance=covariance,

@@ -28,6 +28,7 @@ class EquationError:
     Attributes:
         names: regressors in the model, "bias" last where there is one. values, sigmas: coefficients, standard errors.
         determination: R^2. noise: standard deviation of the residual. history: what came and went, in order.
+        covariance: of the values, where it was worked out.
     """
 
     names: tuple[str, ...]
@@ -36,6 +37,7 @@ class EquationError:
     determination: float
     noise: float
     history: tuple[str, ...] = ()
+    covariance: Array | None = None
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])

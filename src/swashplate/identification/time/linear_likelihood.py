@@ -19,8 +19,10 @@ from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.time_likelihood import Moved, TimeErrors, gain_entries
+from swashplate.identification.time.first_gain import first_gain, kalman_gains
+from swashplate.identification.time.linear_slopes import Coefficients, slopes_along
 from swashplate.models.linear.expressions import Expression
-from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.simulation.discretisation import first_order_hold
 from swashplate.simulation.dynamics import enable_double_precision
 
@@ -30,8 +32,8 @@ Batch = NDArray[np.float64] | NDArray[np.complex128]
 STEP = 1e-30
 """Of the complex steps."""
 
-_BLOCK = 128
-"""Samples that are turned over together."""
+_FIRST_GUSTS = (0.3, 0.1, 0.03)
+"""Shares of the states' sizes by which their rates are disturbed, in filters to begin with."""
 
 
 class OutputErrors(TimeErrors):
@@ -59,13 +61,42 @@ class OutputErrors(TimeErrors):
         self.model, self._gained = model, gain
         self.rows_of = [model.outputs.index(o) for o in outputs]
         entries = [
-            Entry(n, "parameter", p.value, abs(p.value) or 1.0, p.lower, p.upper)
+            Entry(n, "parameter", p.value, _size(p), p.lower, p.upper)
             for n in model.free
             for p in (model.parameters[n],)
         ]
         super().__init__(
             entries, states=model.states, outputs=outputs, records=records, rest={}, shifts=shifts, biases=biases
         )
+
+    def begun(self) -> Array:
+        """A scaled row to begin with: the starts, with a free gain made better while all else is held."""
+        row = self.row.starts()
+        names = [f"gain {s}/{o}" for s in self.model.states for o in self.outputs]
+        places = [self._place[name] for name in names if name in self._place]
+        if not places:
+            return row
+        none = np.array([], dtype=np.intp)
+        batch = self._stepped(row, none)
+        made = self._coefficients(0, batch, self._systems(batch))
+        phi, c = (np.ascontiguousarray(part[0].real) for part in (made.phi, made.c))
+
+        def with_gain(gain: Array) -> Array:
+            changed = row.copy()
+            changed[places] = gain.ravel() / self.row.scale[places]
+            return changed
+
+        def run(gain: Array) -> tuple[float, list[Array]]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                errors = self._plain(with_gain(gain))
+            return self._cost_of(errors), self._by_record(errors)
+
+        sizes = 10.0 * np.sqrt(np.diag(self.covariance))
+        size = np.array([dict(zip(self.outputs, sizes, strict=True)).get(s, 1.0) for s in self.model.states])
+        gusts = [np.diag((share * size) ** 2 * self.records[0].dt) for share in _FIRST_GUSTS]
+        given = (row * self.row.scale)[places].reshape(phi.shape[0], -1)
+        cost, gain = first_gain(phi, c, [given, *kalman_gains(phi, c, gusts, self.covariance)], run)
+        return with_gain(gain) if np.isfinite(cost) else row
 
     def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
         return gain_entries(self.model.states, size, spread) if self._gained else []
@@ -74,17 +105,17 @@ class OutputErrors(TimeErrors):
         return np.asarray(self._errors(np.asarray(row * self.row.scale)[None])[0].real)
 
     def _moved(self, row: Array) -> Iterator[Moved]:
-        """By a recursion of the slopes alone, which all entries share: x' = (Phi - K C) x + what an entry adds."""
         for number in range(len(self.records)):
             places, noises = self._own(number)
-            base, added = self._tangents(number, row, places, noises)
-            x, phi, c, gain, measured, drive = (part[None] for part in base)
-            errors = np.asarray(_recursion()(x, phi, c, gain, measured[0][:, None], drive[0][:, None]))[0]
-            after = np.asarray(_states()(x, phi, c, gain, measured[0][:, None], drive[0][:, None]))[0]
-            slopes = _slopes(base, added, errors, np.concatenate([x, after[:-1]]))
-            every = np.concatenate([places, noises])
-            slopes *= self.row.scale[every][:, None, None]
-            yield every, errors, slopes
+            base, moved = self._tangents(number, row, places, noises)
+            late, later = self._later(number, base.lag)
+            inputs = np.real(late)
+            one = [part[None] for part in (*base[:4], *self._driven(number, base, inputs))]
+            one = [*one[:4], *(np.moveaxis(part, 0, 1) for part in one[4:])]
+            errors, after = (np.asarray(run()(*one))[0] for run in (_recursion, _states))
+            every, states = np.concatenate([places, noises]), np.concatenate([base.x[None], after[:-1]])
+            for part, slopes in slopes_along(base, moved, inputs, later, errors, states):
+                yield every, part, slopes
 
     def _own(self, number: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Places of the entries that move a record's errors: by more than the gain, and by the gain alone."""
@@ -95,22 +126,23 @@ class OutputErrors(TimeErrors):
 
     def _tangents(
         self, number: int, row: Array, places: NDArray[np.intp], noises: NDArray[np.intp]
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """What `_recursion` takes for one record, and its slopes by the numbers at places and noises, those first."""
+    ) -> tuple[Coefficients, Coefficients]:
+        """What makes one record's errors, and its slopes by the scaled row at places and noises, those first."""
+        scale = self.row.scale
         batch = self._stepped(row, places)
         systems = self._systems(batch)
-        loop = self._loop(number, batch, systems)
-        base = tuple(np.ascontiguousarray(part[0].real) for part in loop[:4])
-        base += tuple(np.ascontiguousarray(part[:, 0].real) for part in loop[4:])
-        x, phi, c, gain = (part[1:].imag / STEP for part in loop[:4])
-        measured, drive = (part[:, 1:].imag / STEP for part in loop[4:])
-        if noises.size:
-            noisy = self._stepped(row, noises)
-            still = (systems[0], systems[2], loop[1])
-            a0, c0, phi0 = (np.broadcast_to(part[:1], (len(noisy), *part.shape[1:])) for part in still)
-            moved = self._gain(noisy, a0, c0, phi0, self.records[number].dt)[1:].imag / STEP
-            gain = np.concatenate([gain, moved])
-        return base, (x, phi, c, gain, measured, drive)
+        whole = self._coefficients(number, batch, systems)
+        base = Coefficients(*(np.ascontiguousarray(part[0].real) for part in whole))
+        moved = Coefficients(
+            *((scale[places] * part[1:].imag.T / STEP).T for part in whole)  # the batch is the first axis
+        )
+        if not noises.size:
+            return base, moved
+        noisy = self._stepped(row, noises)
+        still = (systems[0], systems[2], whole.phi)
+        a, c, phi = (np.broadcast_to(part[:1], (len(noisy), *part.shape[1:])) for part in still)
+        gain = (scale[noises] * self._gain(noisy, a, c, phi, self.records[number].dt)[1:].imag.T / STEP).T
+        return base, moved._replace(gain=np.concatenate([moved.gain, gain]))
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
@@ -171,39 +203,57 @@ class OutputErrors(TimeErrors):
 
     def _loop(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> tuple[Any, ...]:
         """The same of one record."""
+        made = self._coefficients(number, batch, systems)
+        lags, turns = np.unique(made.lag, axis=0, return_inverse=True)
+        inputs = np.stack([self._later(number, lag)[0] for lag in lags])[np.ravel(turns)]
+        parts = [
+            self._driven(number, Coefficients(*one), u) for one, u in zip(zip(*made, strict=True), inputs, strict=True)
+        ]
+        measured, drive = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
+        return *made[:4], measured, drive
+
+    def _coefficients(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> Coefficients:
+        """What makes one record's errors, for a batch of rows."""
         n, m = len(self.model.states), len(self.model.inputs)
         a, b, c, d, h1 = systems
-        record = self.records[number]
-        dt, measured = record.dt, record.outputs[:, None, :]
+        dt = self.records[number].dt
         shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
-        bias = self._column(batch, f"bias {{}}[{number}]", self.outputs) + np.einsum("poi,pi->po", h1, shift)
-        x = self._column(batch, f"start {{}}[{number}]", self.model.states)
         held = np.concatenate([b, np.broadcast_to(np.eye(n), (len(batch), n, n))], axis=2)
         phi, g0, g1 = first_order_hold(a, held, dt)
-        gain = self._gain(batch, a, c, phi, dt)
-        u = self._late(batch, record.inputs, dt)
-        drive = _times(g0[:, :, :m], u[:-1]) + _times(g1[:, :, :m], np.diff(u, axis=0))
-        drive = drive + np.einsum("pij,pj->pi", g0[:, :, m:], shift)
-        through = _times(d, u) + bias
-        drive = np.concatenate([drive, np.zeros_like(drive[:1])])
-        return x, phi, c, gain, measured - through, drive
+        return Coefficients(
+            x=self._column(batch, f"start {{}}[{number}]", self.model.states),
+            phi=phi,
+            c=c,
+            gain=self._gain(batch, a, c, phi, dt),
+            g0=g0[:, :, :m],
+            g1=g1[:, :, :m],
+            push=np.einsum("pij,pj->pi", g0[:, :, m:], shift),
+            d=d,
+            bias=self._column(batch, f"bias {{}}[{number}]", self.outputs) + np.einsum("poi,pi->po", h1, shift),
+            lag=np.array([self._lags(numbers) for numbers in batch]) / dt,
+        )
 
-    def _late(self, batch: Batch, u: Array, dt: float) -> Any:
-        """Inputs later by their delays, straight between samples, (n_t, n_batch, n_inputs)."""
-        late = np.broadcast_to(u[:, None, :], (len(u), len(batch), u.shape[1]))
+    def _lags(self, numbers: Any) -> list[Any]:
+        """Delay of every input [s]."""
         if not any(self.delays):
-            return late
-        late = late.astype(np.complex128)
-        count = np.arange(len(u))
-        for p, numbers in enumerate(batch):
-            values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
-            for i, delay in enumerate(self.delays):
-                if delay is not None:
-                    lag = delay(values) / dt
-                    whole = int(np.floor(np.real(lag)))
-                    near, far = (u[np.clip(count - k, 0, len(u) - 1), i] for k in (whole, whole + 1))
-                    late[:, p, i] = near + (lag - whole) * (far - near)
-        return late
+            return [0.0] * len(self.delays)
+        values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
+        return [0.0 if delay is None else delay(values) for delay in self.delays]
+
+    def _driven(self, number: int, made: Coefficients, u: Batch) -> tuple[Any, Any]:
+        """Of one model along one record: what is measured less what goes through, and what drives the states."""
+        drive = u @ made.g0.T + made.push
+        drive[:-1] += np.diff(u, axis=0) @ made.g1.T
+        drive[-1] = 0.0
+        return self.records[number].outputs - u @ made.d.T - made.bias, drive
+
+    def _later(self, number: int, lags: Batch) -> tuple[Batch, Array]:
+        """A record's inputs later by their lags [samples], straight between samples, and their slopes by the lags."""
+        u = self.records[number].inputs
+        whole = np.floor(np.real(lags)).astype(int)
+        at = np.arange(len(u))[:, None] - whole
+        near, far = (np.take_along_axis(u, np.clip(at - k, 0, len(u) - 1), axis=0) for k in (0, 1))
+        return near + (lags - whole) * (far - near), far - near
 
     def _gain(self, batch: Batch, a: Any, c: Any, phi: Any, dt: float) -> Any:
         """Gains from innovations to the next states, (n_batch, n_states, n_outputs); zero for output error."""
@@ -219,43 +269,9 @@ class OutputErrors(TimeErrors):
         return found
 
 
-def _slopes(base: Sequence[Array], added: Sequence[Array], errors: Array, states: Array) -> Array:
-    """Of a record's errors, (n_entries, n_t, n_outputs).
-
-    Args:
-        base, added: what `_recursion` takes, and its slopes; those by the gain alone come last, and only in the gains.
-        errors, states: along the record, (n_t, n_outputs) and (n_t, n_states).
-    """
-    _, phi, c, gain, _, _ = base
-    dx, dphi, dc, dgain, dmeasured, ddrive = added
-    (n_t, k), n, few, many = errors.shape, phi.shape[0], len(dx), len(dgain)
-    direct = np.moveaxis(dmeasured, 1, 0) - states @ np.swapaxes(dc, 1, 2)
-    pushed = (errors @ dgain.reshape(-1, k).T).reshape(n_t, many, n)
-    pushed[:, :few] += ddrive + np.moveaxis(states @ np.swapaxes(dphi, 1, 2) + direct @ gain.T, 1, 0)
-    begin = np.concatenate([dx, np.zeros((many - few, n))])
-    moved = np.asarray(_linear()(begin, phi - gain @ c, pushed))
-    slopes = np.empty((many, n_t, k))
-    for at in range(0, n_t, _BLOCK):  # few samples at a time stay in the processor's cache
-        some = moved[at : at + _BLOCK]
-        slopes[:, at : at + _BLOCK] = np.moveaxis((some.reshape(-1, n) @ -c.T).reshape(len(some), many, k), 1, 0)
-    slopes[:few] += direct
-    return slopes
-
-
-def _times(matrices: Batch, rows: Batch) -> Batch:
-    """Matrices (n_batch, i, j) times rows (n_t, n_batch, j)."""
-    return np.moveaxis(np.moveaxis(rows, 1, 0) @ np.swapaxes(matrices, 1, 2), 0, 1)
-
-
-@cache
-def _linear() -> Any:
-    """x of every sample, (n_t, n_entries, n_states), where the next is x Phi' + push; compiled for its shapes."""
-    enable_double_precision()
-
-    def run(x: jax.Array, phi: jax.Array, pushed: jax.Array) -> jax.Array:
-        return jax.lax.scan(lambda x, push: (x @ phi.T + push, x), x, pushed)[1]
-
-    return jax.jit(run)
+def _size(p: ModelParameter) -> float:
+    """By which a parameter may move: its value, or its bound where an earlier fit hardly told it."""
+    return max(abs(p.value), p.cramer_rao if np.isfinite(p.cramer_rao) else 0.0) or 1.0
 
 
 @cache

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from swashplate.errors import IdentificationError
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.low_passed import refuse_lowpassed
 from swashplate.identification.core.records import Record, uniform_table
-from swashplate.identification.core.result import Result
+from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
@@ -33,6 +33,9 @@ from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
+
+_TORN = 5.0
+"""Standard deviations of the difference: an earlier fit's bounds are some times too narrow themselves."""
 
 
 def fit_in_time(
@@ -75,9 +78,18 @@ def fit_in_time(
     pieces, delays = linear_records(model, flights, names, biases=biases)
     kind = FilterErrors if method == "filter-error" else OutputErrors
     likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
+    # Of a model that no fit has brought near, the errors would be taken for gusts and the gain led astray.
+    near = method == "prediction-error" and all(np.isfinite(model.parameters[n].cramer_rao) for n in model.free)
     return linear_result(
         model,
-        solve(likelihood, iterations=iterations, progress=progress, horizon=ahead),
+        solve(
+            likelihood,
+            iterations=iterations,
+            progress=progress,
+            start=likelihood.begun() if near else None,
+            horizon=ahead,
+            around=near,
+        ),
         method=method,
         data=sources_of(flights),
         settings={"outputs": list(names), "shifts": shifts, "biases": list(biases)},
@@ -129,7 +141,7 @@ def linear_result(
     seconds: float,
 ) -> Result[StateSpaceModel, TimeDetails]:
     """A solved likelihood of a model's records as a result; arguments as `vehicle_result` has them."""
-    return result_of(
+    found = result_of(
         solved,
         model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}),
         start=model,
@@ -140,6 +152,25 @@ def linear_result(
         settings={**settings, "records": [piece.name for piece in solved.likelihood.records]},
         seconds=seconds,
     )
+    return replace(found, warnings=(*found.warnings, *torn(found.estimates, model)))
+
+
+def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
+    """Where the records say something else than the fit which the start comes from, by more than both allow."""
+    apart = {}
+    for e in estimates:
+        known = start.parameters[e.name].cramer_rao
+        spread = np.hypot(known, e.best_sigma)
+        if not e.fixed and np.isfinite(spread) and abs(e.value - e.start) > _TORN * spread:
+            apart[f"{e.name} {e.start:.3g} before, {e.value:.3g} now"] = abs(e.value - e.start) / spread
+    if not apart:
+        return []
+    worst = sorted(apart, key=lambda words: -apart[words])
+    return [
+        f"{len(apart)} of the model's parameters are more than {_TORN:g} bounds away from the fit that it comes from "
+        f"({'; '.join(worst[:3])}): both cannot be right. Gusts that last, in a loop, bias a fit in time whose noise "
+        "is white; validate both models on another flight."
+    ]
 
 
 def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:

@@ -31,6 +31,7 @@ def airframe(
     density: Scalar,
     xp: Backend,
     sense: float,
+    collective: Scalar | None = None,
 ) -> Airframe:
     """Tail rotor, horizontal tail, fin and fuselage in the wakes of the two rotors.
 
@@ -43,6 +44,7 @@ def airframe(
         awake: shares of the tail rotor's wake and thrust that are there while it starts; (1, 1) when it turns.
         par, density: the card's numbers, the air.
         sense: +1 for a counter-clockwise main rotor.
+        collective: of the main rotor [rad], which an all-moving tail follows; None where the tail stands still.
     """
     blowing, fading = awake
     p, q, r = rates
@@ -80,10 +82,25 @@ def airframe(
         most=par.tailplane_wake,
         xp=xp,
     )
+    incidence = par.tailplane_incidence
+    if collective is not None:
+        incidence = tail_surfaces.stabilator_incidence(
+            air.x,
+            collective,
+            q,
+            low=par.stabilator_low,
+            high=par.stabilator_high,
+            begin=par.stabilator_from,
+            end=par.stabilator_to,
+            by_collective=par.stabilator_collective,
+            neutral=par.stabilator_neutral,
+            by_pitch_rate=par.stabilator_pitch_rate,
+            xp=xp,
+        )
     tailplane = tail_surfaces.inclined_force(
         air.x,
         air.z + par.tailplane_arm * q - downwash,
-        par.tailplane_incidence,
+        incidence,
         area=par.tailplane_area,
         lift_slope=par.tailplane_lift_slope,
         density=density,

@@ -59,6 +59,12 @@ def build_up(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> 
             where=vehicle.name,
             hint="Use inflow 'glauert' or 'uniform', or automatic differentiation.",
         )
+    if options.delta3 or options.stabilator:
+        raise SwashError(
+            "delta3 or stabilator have no closed-form build-up.",
+            where=vehicle.name,
+            hint="Leave these options out, or use automatic differentiation.",
+        )
     if options.tip_loss or options.induced_factor or options.ground_effect != "none":
         raise SwashError(
             "tip_loss, induced_factor or ground_effect have no closed-form build-up.",

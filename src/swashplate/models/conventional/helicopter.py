@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from swashplate.models.conventional import drive
 from swashplate.models.conventional.airframe import airframe
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.models.conventional.main_rotor import Contribution, main_rotor
-from swashplate.physics import actuators, bell_hiller, engine, ground_contact
+from swashplate.physics import bell_hiller, ground_contact
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.bell_hiller import Bar
 from swashplate.physics.engine import EngineLag, RotorSpeed
@@ -132,7 +133,7 @@ def loads(
     sticks = Controls(inputs.theta0, inputs.B1, inputs.A1, inputs.theta0T)
     servo_rates, late = None, None
     if state.delays is not None:
-        late, sticks = _late(state.delays, sticks, par.servo_delay)
+        late, sticks = drive.late(state.delays, sticks, par.servo_delay)
     if state.servos is not None:
         stops = (
             (par.collective_low, par.collective_high),
@@ -140,14 +141,7 @@ def loads(
             (-par.cyclic_limit, par.cyclic_limit),
             (par.tail_low, par.tail_high),
         )
-        servo_rates = ServoPositions(
-            *(
-                actuators.servo_rate(
-                    at, to, time_constant=par.servo_time, fastest=par.servo_speed, low=low, high=high, xp=xp
-                )
-                for at, to, (low, high) in zip(state.servos, sticks, stops, strict=True)
-            )
-        )
+        servo_rates = drive.servo_rates(state.servos, sticks, stops, par, xp)
         sticks = Controls(*state.servos)
     tail_pitch, gyro_rates = sticks.theta0T, None
     if state.gyro is not None:
@@ -192,6 +186,7 @@ def loads(
         density,
         xp,
         sense,
+        sticks.theta0 if options.stabilator else None,
     )
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.
@@ -199,22 +194,7 @@ def loads(
     rotor_rates, lag = None, None
     if state.rotor is not None:
         throttle = inputs.throttle if options.throttle else 1.0
-        share = throttle * engine.wanted_share(state.rotor, wanted=par.rotor_speed, gain=par.governor_gain, xp=xp)
-        if state.engine is not None:
-            lag = EngineLag((share - state.engine.share) / par.engine_time)
-            share = state.engine.share
-        torque = engine.engine_torque(state.rotor, share, wanted=par.rotor_speed, power=par.engine_power, xp=xp)
-        rotor_rates = engine.rotor_speed_rates(
-            state.rotor,
-            torque,
-            load,
-            throttle,
-            wanted=par.rotor_speed,
-            inertia=par.rotor_inertia,
-            gain=par.governor_gain,
-            integral_gain=par.governor_integral,
-            xp=xp,
-        )
+        rotor_rates, lag = drive.shaft_rates(state.rotor, state.engine, load, throttle, par, xp)
         # Spinning up pushes back on the fuselage, as the drag torque does; yaw follows the engine's torque.
         back = sense * par.rotor_inertia * rotor_rates.omega
         tilt = Vector(-xp.sin(par.shaft_tilt) * back, 0.0, xp.cos(par.shaft_tilt) * back)
@@ -245,14 +225,6 @@ def loads(
         rotor.induced,
         load * turning,
     )
-
-
-def _late(states: Delays, sticks: Controls, delay: Scalar) -> tuple[Delays, Controls]:
-    """Rates of the delays' states, and what comes out of them."""
-    places, moving = states[:4], states[4:]
-    rates = [actuators.delay_rates(*each, delay=delay) for each in zip(places, moving, sticks, strict=True)]
-    out = Controls(*(actuators.delayed(*each, delay=delay) for each in zip(places, moving, strict=True)))
-    return Delays(*(rate for rate, _ in rates), *(change for _, change in rates)), out
 
 
 def _sum(acting: HelicopterLoads) -> Contribution:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from swashplate.errors import CardError
@@ -18,7 +19,9 @@ from swashplate.models.conventional.helicopter_parameters import (
     USUAL,
 )
 
-_LARGEST_ANGLE = 1.0
+LARGEST_ANGLE = 1.0
+"""rad, of what is an angle of much less on every helicopter."""
+Refuse = Callable[..., None]
 
 
 def with_added(card: Card, options: HelicopterOptions) -> Card:
@@ -69,6 +72,31 @@ def check_numbers(card: Card) -> None:
     for name in NOT_NEGATIVE:
         if value[name] < 0.0:
             refuse(name, f"is {value[name]:g}, expected 0 or more.")
+    check_inertia(value, refuse)
+    check_blades(value, refuse, rotors=("rotor", "tail"))
+    disc = math.pi * value["tail_radius"] ** 2
+    if value["fin_blockage"] * value["fin_area"] >= disc:
+        refuse(
+            "fin_blockage", f"of a fin of {value['fin_area']:g} m^2 leaves nothing of the tail rotor's {disc:.3g} m^2."
+        )
+    for low, high in (("collective_low", "collective_high"), ("tail_low", "tail_high"), ("bar_inner", "bar_outer")):
+        if not value[low] < value[high]:
+            refuse(low, f"is {value[low]:g}, not below {high} = {value[high]:g}.")
+    if not value["stabilator_from"] < value["stabilator_to"]:
+        refuse(
+            "stabilator_from", f"is {value['stabilator_from']:g}, not below stabilator_to = {value['stabilator_to']:g}."
+        )
+    for name in ANGLES:
+        if abs(value[name]) > LARGEST_ANGLE:
+            refuse(
+                name,
+                f"is {value[name]:g} rad, more than {math.degrees(LARGEST_ANGLE):.0f} deg.",
+                "Angles in cards are in radians.",
+            )
+
+
+def check_inertia(value: Mapping[str, float], refuse: Refuse) -> None:
+    """Refuse moments of inertia that no body has."""
     inertia = {axis: value[f"inertia_{axis}"] for axis in ("xx", "yy", "zz")}
     for axis, own in inertia.items():
         others = sum(inertia.values()) - own
@@ -86,17 +114,16 @@ def check_numbers(card: Card) -> None:
             f"is {value['inertia_xz']:g}: with it the principal moments differ by {apart:g}, more than inertia_yy.",
             "No body has such moments of inertia: check the units and the sign convention.",
         )
-    for rotor in ("rotor", "tail"):
+
+
+def check_blades(value: Mapping[str, float], refuse: Refuse, *, rotors: Sequence[str]) -> None:
+    """Refuse blades and hinges that no rotor has."""
+    for rotor in rotors:
         chord, radius, blades = (value[f"{rotor}_{name}"] for name in ("chord", "radius", "blades"))
         if chord >= radius:
             refuse(f"{rotor}_chord", f"is {chord:g}, longer than its rotor's radius {radius:g}.", "Lengths are in m.")
         if blades != round(blades) or blades < 2.0:
             refuse(f"{rotor}_blades", f"is {blades:g}, expected a whole number of at least 2.")
-    disc = math.pi * value["tail_radius"] ** 2
-    if value["fin_blockage"] * value["fin_area"] >= disc:
-        refuse(
-            "fin_blockage", f"of a fin of {value['fin_area']:g} m^2 leaves nothing of the tail rotor's {disc:.3g} m^2."
-        )
     if not 0.0 <= value["hinge_offset"] < 0.5:
         refuse("hinge_offset", f"is {value['hinge_offset']:g}, expected 0 to 0.5 of the radius.")
     if not value["rotor_root_cutout"] + 0.2 < value["rotor_tip_loss"] <= 1.0 or value["rotor_root_cutout"] < 0.0:
@@ -108,13 +135,3 @@ def check_numbers(card: Card) -> None:
         )
     if not 1.0 <= value["rotor_induced_factor"] <= 2.0:
         refuse("rotor_induced_factor", f"is {value['rotor_induced_factor']:g}, expected 1 to 2.")
-    for low, high in (("collective_low", "collective_high"), ("tail_low", "tail_high"), ("bar_inner", "bar_outer")):
-        if not value[low] < value[high]:
-            refuse(low, f"is {value[low]:g}, not below {high} = {value[high]:g}.")
-    for name in ANGLES:
-        if abs(value[name]) > _LARGEST_ANGLE:
-            refuse(
-                name,
-                f"is {value[name]:g} rad, more than {math.degrees(_LARGEST_ANGLE):.0f} deg.",
-                "Angles in cards are in radians.",
-            )

@@ -12,7 +12,8 @@ from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
-from swashplate.physics.frames import local_to_body
+from swashplate.physics.flapping import Flapping
+from swashplate.physics.frames import Vector, local_to_body
 
 _TURNING = 0.5
 """Share of the governed speed below which a rotor carries nothing that could be doubted."""
@@ -37,21 +38,36 @@ def _loads(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> He
 
 
 def doubts_by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
-    """What of the equations does not hold at a state, in words by kind; empty where they may be trusted.
-
-    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large angles of inflow and flapping.
-    """
+    """What of the equations does not hold at a state, in words by kind; empty where they may be trusted."""
     acting = _loads(vehicle, x, u, environment)
     xp, par = FloatBackend(), vehicle.values()
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
+    return rotor_doubts(acting.main_rotor.force, air, float(acting.induced), omega, state.disc, par, environment)
+
+
+def rotor_doubts(
+    force: Vector, air: Vector, induced: float, omega: float, disc: Flapping, par: Any, environment: Environment
+) -> dict[str, str]:
+    """What of a rotor's equations does not hold, in words by kind; nothing of a rotor that hardly turns.
+
+    Vortex ring (Leishman 2006, sec. 2.13), reversed flow, blade stall, large angles of inflow and flapping.
+
+    Args:
+        force: of the rotor [N].
+        air: velocity through the air, body axes [m/s].
+        induced: velocity through the disc beyond that of the flight [m/s].
+        omega: rotor speed [rad/s].
+        disc: its tip-path plane.
+        par: the card's numbers.
+        environment: for the air's density.
+    """
     if omega < _TURNING * par.rotor_speed:
         return {}
     tip = omega * par.rotor_radius
     solidity = par.rotor_blades * par.rotor_chord / (np.pi * par.rotor_radius)
-    force = acting.main_rotor.force
     thrust = float(np.sqrt(force.x**2 + force.y**2 + force.z**2))
     loading = thrust / (environment.air_density * np.pi * par.rotor_radius**2 * tip**2) / solidity
     hover = float(np.sqrt(thrust / (2.0 * environment.air_density * np.pi * par.rotor_radius**2)))
@@ -68,13 +84,13 @@ def doubts_by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environmen
         )
     if loading > _LOADING:
         found["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
-    through = (float(acting.induced) - float(air.z)) / tip
+    through = (induced - float(air.z)) / tip
     if abs(through) > _THROUGH:
         found["inflow"] = (
             f"air comes through the disc at {abs(through):.2f} of the tip speed, above {_THROUGH}: its angles at the "
             "blades are taken as small"
         )
-    flap = max(abs(float(state.disc.a1)), abs(float(state.disc.b1)))
+    flap = max(abs(float(disc.a1)), abs(float(disc.b1)))
     if flap > _FLAPPING:
         found["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"
     return found

@@ -35,6 +35,9 @@ class HelicopterOptions(NamedTuple):
             (`flapping.precession_torque`); the packaged cards, whose tables leave it out, do too.
         tip_loss: the main blades lift from `rotor_root_cutout` to `rotor_tip_loss` of the radius, not over all of it.
         induced_factor: the main rotor's induced power is `rotor_induced_factor` times that of an even inflow.
+        delta3: flapping changes the main blades' pitch by `rotor_delta3` times the flapping angle.
+        stabilator: the horizontal tail's incidence follows air speed, collective and pitch rate (`stabilator_*`), in
+            place of `tailplane_incidence`.
         ground_effect: "cheeseman-bennett" or "hayden" over ground at z = 0 (`ground_effect.induced_share`), or "none".
     """
 
@@ -56,6 +59,8 @@ class HelicopterOptions(NamedTuple):
     precession_torque: bool = False
     tip_loss: bool = False
     induced_factor: bool = False
+    delta3: bool = False
+    stabilator: bool = False
     ground_effect: str = "none"
 
     @property
@@ -90,6 +95,8 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "precession_torque",
             "tip_loss",
             "induced_factor",
+            "delta3",
+            "stabilator",
         ),
         (True, False),
     ),

@@ -111,6 +111,14 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("rotor_tip_loss", "1", "share of the radius to which the main blades lift: 0.95 to 0.98; option tip_loss"),
     ("rotor_root_cutout", "1", "radius of the first profile over the rotor's: 0.1 to 0.25; option tip_loss"),
     ("rotor_induced_factor", "1", "induced power over that of an even inflow: 1.1 to 1.2; option induced_factor"),
+    ("rotor_delta3", "1", "tangent of the main rotor's pitch-flap angle, negative takes pitch off; option delta3"),
+    ("stabilator_low", "rad", "incidence of an all-moving horizontal tail in slow flight; option stabilator"),
+    ("stabilator_high", "rad", "the same in fast flight"),
+    ("stabilator_from", "m/s", "air speed ahead up to which it stands at stabilator_low"),
+    ("stabilator_to", "m/s", "air speed from which it stands at stabilator_high; in between it turns evenly"),
+    ("stabilator_collective", "1", "incidence per main rotor collective above stabilator_neutral; 0 for none"),
+    ("stabilator_neutral", "rad", "main rotor collective at which its schedule is that of speed alone"),
+    ("stabilator_pitch_rate", "s", "incidence per pitch rate; 0 for none"),
 )
 
 UNITS: Mapping[str, str] = {name: unit for name, unit, _ in _TABLE}
@@ -137,6 +145,14 @@ ADDED: Mapping[str, tuple[str | None, float | str]] = {
     "rotor_tip_loss": ("tip_loss", 0.97),
     "rotor_root_cutout": ("tip_loss", 0.15),
     "rotor_induced_factor": ("induced_factor", 1.15),
+    "rotor_delta3": ("delta3", 0.0),
+    "stabilator_low": ("stabilator", 0.0),
+    "stabilator_high": ("stabilator", 0.0),
+    "stabilator_from": ("stabilator", 15.0),
+    "stabilator_to": ("stabilator", 40.0),
+    "stabilator_collective": (None, 0.0),
+    "stabilator_neutral": (None, 0.0),
+    "stabilator_pitch_rate": (None, 0.0),
 }
 """What the first cards lack: the option that needs it, and the number or parameter that stood for it before."""
 
@@ -226,5 +242,7 @@ ANGLES = (
     "tail_cant",
     "tailplane_incidence",
     "fin_incidence",
+    "stabilator_low",
+    "stabilator_high",
 )
 """What is an angle of much less than a radian on every helicopter."""

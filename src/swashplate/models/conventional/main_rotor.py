@@ -84,11 +84,31 @@ def main_rotor(
         mu_x, mu_y, mu_z, 0.0, 0.0, 0.0, p / omega, q / omega, theta0, par.rotor_twist, A1, B1, 0.0, own.a1, own.b1
     )
 
+    held = flapping.hinge(
+        blade_inertia=par.blade_inertia,
+        blades=par.rotor_blades,
+        hub_stiffness=par.hub_stiffness,
+        hinge_offset=par.hinge_offset,
+        omega=omega,
+        density=density,
+        lift_slope=flap_slope,
+        chord=par.rotor_chord,
+        radius=par.rotor_radius,
+    )
+    flaps = None  # by which flapping changes the blades' pitch
+    if options.delta3:
+        flaps = par.rotor_delta3
+        seen = seen._replace(A1=A1 + flaps * own.a1, B1=B1 + flaps * own.b1)
+
     # Inflow: mean, gradient, and what a static gradient takes from the flap moments.
     deficiency = None
     if induced is None:
         free = blade_element.thrust_coefficient(seen, solidity, slope, blade)
         loss = 0.5 * slope * solidity * blade.m1
+        if flaps is not None:  # pitch by coning, which falls with the inflow: C_T stays linear in it
+            still_air, more = (_coned(seen._replace(lam0=lam), blade, held, par, flaps, options) for lam in (0.0, 1.0))
+            free = blade_element.thrust_coefficient(still_air, solidity, slope, blade)
+            loss = free - blade_element.thrust_coefficient(more, solidity, slope, blade)
         lam0 = inflow.momentum_inflow(free, loss, mu_z, mu2, xp)
         if options.ground_effect != "none":
             loss = loss * _near_ground(height, mu2, lam0, par, options, xp)
@@ -112,21 +132,7 @@ def main_rotor(
     seen = seen._replace(lam0=flow.lam0, lam_c=flow.lam_c, lam_s=flow.lam_s)
 
     # Flapping: coning, then the tip-path plane's rates in space.
-    held = flapping.hinge(
-        blade_inertia=par.blade_inertia,
-        blades=par.rotor_blades,
-        hub_stiffness=par.hub_stiffness,
-        hinge_offset=par.hinge_offset,
-        omega=omega,
-        density=density,
-        lift_slope=flap_slope,
-        chord=par.rotor_chord,
-        radius=par.rotor_radius,
-    )
-    cone = par.precone
-    if options.coning:
-        cone = flapping.coning(_moments(seen, blade).mean, held, par.precone, free=1.0)
-    seen = seen._replace(a0=cone)
+    seen = _coned(seen, blade, held, par, flaps, options)
     still = _moments(seen._replace(p=0.0, q=0.0, a1=held.damping * own.a1, b1=held.damping * own.b1), blade)
     bending = flapping.faded_wake_distortion(par.wake_distortion, mu2, par.wake_distortion_fade, xp)
     # Dynamic inflow has the wake's lag in its states.
@@ -184,6 +190,27 @@ def _moments(seen: blade_element.Disc, blade: blade_element.Span) -> blade_eleme
     if blade is blade_element.WHOLE:
         return moments
     return blade_element.FlapMoments(*(0.25 * part / blade.m3 for part in moments))
+
+
+def _coned(
+    seen: blade_element.Disc,
+    blade: blade_element.Span,
+    held: flapping.Hinge,
+    par: Any,
+    flaps: Scalar | None,
+    options: HelicopterOptions,
+) -> blade_element.Disc:
+    """The disc with its coning, and with the pitch that coning adds or takes where flapping changes pitch."""
+    if not options.coning:
+        return seen._replace(a0=par.precone)
+    moment = _moments(seen, blade).mean
+    if flaps is None:
+        return seen._replace(a0=flapping.coning(moment, held, par.precone, free=1.0))
+    # The moment is linear in the collective: a0 = g (M + M' k (a0 - precone)), coning beyond the precone moves pitch.
+    gain = 0.5 * held.lock / (1.0 + held.excess)
+    slope = _moments(seen._replace(theta0=seen.theta0 + 1.0), blade).mean - moment
+    a0 = gain * (moment - slope * flaps * par.precone) / (1.0 - gain * slope * flaps)
+    return seen._replace(a0=a0, theta0=seen.theta0 + flaps * (a0 - par.precone))
 
 
 def _near_ground(

@@ -9,7 +9,7 @@ which are exact to rounding for a grammar of arithmetic (Squire and Trapp 1998).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -292,6 +292,18 @@ class StateSpaceModel:
             answers.append(hi)
             slopes.append(total)
         return answers, slopes
+
+    def log_slopes(self, output: str, input: str, omega: Array, free: Sequence[str]) -> tuple[Complex, Complex]:
+        """One response (n,) and the derivatives of its logarithm by named parameters, shape (n, n_free).
+
+        Args:
+            output, input: the pair. omega: [rad/s]. free: names of parameters.
+        """
+        pair = (self.outputs.index(output), self.inputs.index(input), omega)
+        at = np.array([self.parameters[name].value for name in free])
+        (h,), (slopes,) = self.sensitivities(tuple(free), at, [pair])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return h, slopes / h[:, None]
 
     def _element_slopes(
         self, free: tuple[str, ...], stepped: Mapping[str, Mapping[str, Any]]

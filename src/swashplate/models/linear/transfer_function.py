@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -202,6 +202,50 @@ class TransferFunction:
         above = " ".join(part for part in (("s " * -k).strip(), side(self.form.zero_names)) if part)
         delay = f" e^(-{self.values['tau']:.4g} s)" if self.form.delay else ""
         return f"{self.output}/{self.input} = {self.values['K']:.4g} {above}{delay}" + (f" / {below}" if below else "")
+
+
+class TransferFunctions(tuple[TransferFunction, ...]):
+    """Functions of one input to several outputs, with the same poles."""
+
+    __slots__ = ()
+
+    def __new__(cls, functions: Iterable[TransferFunction]) -> Self:
+        return super().__new__(cls, functions)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The one input."""
+        return tuple(dict.fromkeys(one.input for one in self))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """One a function."""
+        return tuple(one.output for one in self)
+
+    def response(self, omega: Array) -> Complex:
+        """H(j omega) at frequencies [rad/s] with their delays, shape (n, n_outputs, 1)."""
+        return np.stack([one.response(omega) for one in self], axis=1)[:, :, None]
+
+    def eigenvalues(self) -> Complex:
+        """The poles that they share [1/s], fastest first."""
+        found = self[0].poles
+        return found[np.argsort(-np.abs(found), kind="stable")]
+
+    def log_slopes(self, output: str, input: str, omega: Array, free: Sequence[str]) -> tuple[Complex, Complex]:
+        """One response (n,) and the derivatives of its logarithm by named parameters, shape (n, n_free).
+
+        Args:
+            output, input: the pair. omega: [rad/s].
+            free: parameters as a fit names them: what is of one response of several has its output behind ("K p").
+        """
+        function = next(one for one in self if (one.output, one.input) == (output, input))
+        h, own = function.with_slopes(omega)
+        mine = function.form.own_names if len(self) > 1 else ()
+        by_name = {f"{name} {output}" if name in mine else name: slope for name, slope in own.items()}
+        slopes = np.zeros((np.size(omega), len(free)), dtype=np.complex128)
+        for k, name in enumerate(free):
+            slopes[:, k] = by_name.get(name, 0.0)
+        return h, slopes
 
 
 def _roots(names: Sequence[str], values: Mapping[str, float]) -> Complex:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.flights.schema import channel
-from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.structure import Cell, Figure, Key, Section, Table, Text
 from swashplate.reporting.theme import (
@@ -44,19 +43,11 @@ def section_of_comparison(found: ModelComparison) -> Section:
     return Section("comparison", "Models along the flight", (*told, _lines(found), table))
 
 
-def _units(v: Verification) -> dict[str, str]:
-    model = v.model
-    if isinstance(model, StateSpaceModel):
-        return dict(model.units)
-    names, units = (*model.input_names, *model.state_names), (*model.input_units, *model.state_units)
-    return dict(zip(names, units, strict=True))
-
-
 def _lines(found: ModelComparison) -> Figure:
     """Inputs, then flight and models of every output."""
     first = next(iter(found.found.values()))
     names = list(found.fits())
-    units = _units(first)
+    units = first.units
     titles = [quantity(n, channel(n).shown_unit or units.get(n, "")) for n in names]
     layout = stacked([inputs_title(first.inputs, units), *titles], height=112)
     traces, keys = [], [Key("flight", FLIGHT)]

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rolling import OFF_CENTRE as EFFECT
 from rolling import OUTPUTS_OF_ROLL as OUTPUTS
 from rolling import biased, gusty
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.nested import EffectTest, chance_of, holm
 from swashplate.identification.nested import fit_nested
-from swashplate.models.choices import PhysicalEffect
 
-EFFECT = PhysicalEffect("stick that stands off centre", {"offset": 0.0})
 HOW = {"outputs": list(OUTPUTS), "method": "filter-error"}
 
 

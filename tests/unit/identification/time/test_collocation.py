@@ -16,7 +16,7 @@ from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.collocation import vehicle_errors
 from swashplate.identification.time.collocation_likelihood import CollocationErrors
 from swashplate.models.linear.state_space_file import parse
-from swashplate.physics.environment import Environment
+from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
 from tipping import Tilt, tipped, tipping
 
 OUTPUTS = ("p", "pdot", "ay")
@@ -35,7 +35,7 @@ def kalman(record: Record, row: np.ndarray) -> float:
     h, eye = record.dt, np.eye(2)
     A, B = np.array([[0.0, lb], [-1.0, -1.0 / tau]]), np.array([0.0, a / tau])
     left, right = eye - h / 2 * A + h**2 / 12 * A @ A, eye + h / 2 * A + h**2 / 12 * A @ A
-    C = np.array([[1.0, 0.0], [0.0, lb], [0.0, Environment().gravity]])
+    C = np.array([[1.0, 0.0], [0.0, lb], [0.0, LABORATORY_GRAVITY]])
     x, P, total = np.zeros(2), 100.0 * eye, 0.0
     u = record.inputs[:, 0]
     for k in range(len(u)):

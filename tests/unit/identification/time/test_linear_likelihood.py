@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import Provenance
+from swashplate.identification.core.result import Estimate
 from swashplate.identification.time.linear_filter import FilterErrors
 from swashplate.identification.time.linear_likelihood import OutputErrors
-from swashplate.identification.time.linear_time_fit import linear_records
+from swashplate.identification.time.linear_time_fit import linear_records, torn
 from swashplate.models.linear.state_space_file import structure
 
 MODEL = structure("rotor_body").with_values(
@@ -43,3 +46,25 @@ def test_the_gradient_is_the_slope_of_the_cost_by_every_entry(method: str) -> No
     np.testing.assert_allclose(gradient, slopes, rtol=1e-4, atol=1e-5 * np.max(np.abs(gradient)))
     groups = {entry.group for entry in likelihood.row.entries}
     assert groups >= {"parameter", "initial", "nuisance"} | (set() if method == "output-error" else {"noise"})
+
+
+def test_a_first_gain_is_likelier_and_moves_nothing_else() -> None:
+    pieces, delays = linear_records(MODEL, [_flight(1, 3.0), _flight(2, 2.4)], MODEL.outputs, biases=())
+    likelihood = OutputErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=True)
+    plain, begun = likelihood.row.starts(), likelihood.begun()
+    assert likelihood.cost(begun) < likelihood.cost(plain)
+    noise = np.array([entry.group == "noise" for entry in likelihood.row.entries])
+    np.testing.assert_array_equal(begun[~noise], plain[~noise])
+    still = OutputErrors(MODEL, MODEL.outputs, pieces, True, (), delays=delays, gain=False)
+    np.testing.assert_array_equal(still.begun(), still.row.starts())
+
+
+def test_a_fit_far_from_the_one_that_it_comes_from_says_so() -> None:
+    known = replace(MODEL.parameters["Lb"], cramer_rao=3.0)
+    start = replace(MODEL, parameters={**MODEL.parameters, "Lb": known})
+    far, near = (Estimate("Lb", "1/s^2", 300.0, value, sigma=4.0) for value in (270.0, 280.0))
+    unknown = Estimate("Ma", "1/s^2", 80.0, 8.0, sigma=0.1)  # its start comes from no fit
+    (words,) = torn([far, unknown], start)
+    assert "1 of the model's parameters" in words
+    assert "Lb 300 before, 270 now" in words
+    assert torn([near, unknown], start) == []

@@ -1,0 +1,113 @@
+"""`swash track`: a log replayed as a stream, and what an estimator on board would have known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swashplate.cli import flying, options
+from swashplate.errors import SwashError
+
+
+def track(
+    log: options.FlightName,
+    equation: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--equation", metavar="TEXT", help="As 'p_dot = Lp*p + La*aileron - 9.81*theta + bias'. Repeatable."
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="A linear model, its rows in place of --equation; or a vehicle, with --unknown."),
+    ] = None,
+    out: options.OutFolder = None,
+    rate: Annotated[
+        float | None, typer.Option("--rate", help="Samples a second [Hz]; the log's own if not given.", min=1.0)
+    ] = None,
+    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Frequencies looked at [Hz].")] = "0.1-2.5",
+    spacing: Annotated[
+        float | None, typer.Option("--spacing", help="Between them [Hz]; a 25th of HIGH if not given.", min=1e-4)
+    ] = None,
+    memory: Annotated[
+        float | None, typer.Option("--memory", help="Forget with this time constant [s]; never if not given.")
+    ] = None,
+    held: Annotated[
+        str | None, typer.Option("--held", help="Channels held between samples (commands), by commas.")
+    ] = None,
+    delay: Annotated[
+        list[str] | None, typer.Option("--delay", metavar="NAME=SECONDS", help="A channel acts this late. Repeatable.")
+    ] = None,
+    unknown: Annotated[
+        str | None, typer.Option("--unknown", metavar="NAMES", help="Parameters of the vehicle, by commas: mass.")
+    ] = None,
+    spread: Annotated[float, typer.Option("--spread", help="What they may be off at the start, as a share.")] = 0.2,
+    wander: Annotated[float, typer.Option("--wander", help="Share that they may wander in a second.")] = 0.02,
+    every: Annotated[float, typer.Option("--every", help="Between looks at the estimate [s].", min=0.001)] = 0.2,
+    c_code: Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write the estimators as C99 here.")] = None,
+    rename: flying.Rename = "",
+    mapping: options.Mapping = None,
+    unit: options.Units = None,
+    drop_bad_stamps: options.BadStamps = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Estimate coefficients of equations of motion along a log, sample by sample as on board, with bounds over time.
+
+    Equations go through recursive Fourier regression (no derivative is taken, nothing is filtered), parameters of a
+    vehicle through an extended Kalman filter. Gaps, values that are no numbers and clocks that jump freeze the
+    estimate, and are told. Writes report.html and track.json to --out. Examples:
+
+    swash track flight.csv --equation "q_dot = Mq*q + Md*servo_pitch + bias" --held servo_pitch --out tracked
+
+    swash track flight.nc --model coax --unknown mass --out tracked
+    """
+    import swashplate as sp
+    from swashplate.api.track import Tracking
+    from swashplate.cli.console import as_json, progress
+    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.reading import asked, read
+
+    names = flying.names(unknown)
+    if names and model is None:
+        raise SwashError("is of a vehicle: give --model too.", channel="--unknown")
+    if (model is None) == (not equation):
+        raise SwashError("is wanted, or --model: one of the two.", channel="--equation")
+    limits = flying.band(band)
+    assert limits is not None
+    with (
+        progress(quiet=quiet or json) as line,
+        folder_when_complete(out, ours=Tracking.files) as folder,
+    ):
+        found = sp.track(
+            read(log, how=asked(mapping, unit, drop_bad_stamps)),
+            (sp.vehicle(model) if names else sp.structure(model)) if model is not None else equation or (),
+            rate=rate,
+            band=limits,
+            spacing=spacing,
+            memory=memory,
+            held=flying.names(held),
+            delays=options.numbers_by_name(delay, option="--delay"),
+            unknown=names,
+            spread=spread,
+            wander=wander,
+            every=every,
+            names=flying.renamed(rename, option="--rename"),
+            say=line.say,
+        )
+        if folder is not None:
+            found.write(folder)
+    code = None if c_code is None else found.code()
+    written = [] if code is None or c_code is None else code.save(c_code)
+    if json:
+        typer.echo(as_json(found.to_document()))
+    elif not quiet:
+        typer.echo(repr(found))
+        for note in code.notes if code is not None else ():
+            typer.echo(f"\n{note}")
+        files = [*map(str, written), *([f"{out / 'report.html'}"] if out is not None else [])]
+        if files:
+            typer.echo(f"\nWritten: {', '.join(files)}")
+    flying.end_with(found.problems)

@@ -1,0 +1,219 @@
+"""A recursive Fourier regression as C99: one file with its constants in front, for a small processor.
+
+Memory is two structures of the caller's; nothing is allocated. The loops stand in `runtime/recursive_regression.c`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+
+from swashplate.export.c_text import REAL, Precision, identifier, literal, words
+from swashplate.identification.recursive import fourier_regression
+from swashplate.identification.recursive.equation import BIAS
+from swashplate.identification.recursive.fourier_regression import EARLY, LATE, RegressionPlan
+
+CYCLES = 5
+"""Of a Cortex-M7's clock that an operation is taken to cost, its loads and stores included: an assumption."""
+
+
+@dataclass(frozen=True)
+class RegressionCode:
+    """C of a recursive regression, and what it costs.
+
+    Attributes:
+        name: what its functions begin with.
+        header, source: the texts of the .h and .c files.
+        memory_bytes: kept between steps. work_bytes: of an estimate, free between estimates. table_bytes: constants.
+        step_operations, estimate_operations: additions, multiplications, divisions and roots of the longest step and
+            of an estimate, counted from the loops.
+    """
+
+    name: str
+    header: str
+    source: str
+    memory_bytes: int
+    work_bytes: int
+    table_bytes: int
+    step_operations: int
+    estimate_operations: int
+
+    def files(self) -> dict[str, str]:
+        """Texts by file name."""
+        return {f"{self.name}.h": self.header, f"{self.name}.c": self.source}
+
+    def load(self, *, rate: float, megahertz: float, every: int = 1) -> float:
+        """Share of a processor's time, at `CYCLES` an operation.
+
+        Args:
+            rate: steps per second [Hz]. megahertz: of the processor's clock.
+            every: steps per estimate.
+        """
+        return CYCLES * rate * (self.step_operations + self.estimate_operations / every) / (1e6 * megahertz)
+
+
+def regression_code(
+    plan: RegressionPlan, *, name: str = "regression", precision: Precision = "double"
+) -> RegressionCode:
+    """The C of a recursive regression.
+
+    Args:
+        plan: what it works with.
+        name: what files, types and functions begin with.
+        precision: of every number in it.
+
+    Raises:
+        ExportError: a name or a number that C cannot hold.
+    """
+    e, called, real = plan.equation, identifier(name), REAL[precision]
+    channels, unknowns, lines = len(e.channels), len(e.names), plan.last - plan.first + 1
+    sizes = {
+        "CHANNELS": channels,
+        "UNKNOWNS": unknowns,
+        "LINES": lines,
+        "SUMS": channels + 2,
+        "WINDOW": 2 * plan.last + 1,
+    }
+    turned = np.exp(-2j * np.pi * plan.spacing * plan.dt)
+    constants = {
+        "ZERO": 0.0,
+        "ONE": 1.0,
+        "TWO": 2.0,
+        "HALF": 0.5,
+        "THREE_HALVES": 1.5,
+        "TURN_RE": float(turned.real),
+        "TURN_IM": float(turned.imag),
+        "KEEP": plan.keep,
+        "KEEP_SQUARED": plan.keep**2,
+        "HALF_STEP": 0.5 * plan.dt,
+        "SHORTEST": EARLY * plan.dt,
+        "LONGEST": LATE * plan.dt,
+        "LEAST_PIVOT": fourier_regression.LEAST_PIVOT,
+        "LEAST_LEFT": fourier_regression.LEAST_LEFT,
+        "LEAST_FREEDOM": fourier_regression.LEAST_FREEDOM,
+    }
+    upper = called.upper()
+    header = _header(plan, called, real, {key: sizes[key] for key in sizes})
+    defines = [f"#define {key} {upper}_{key}" for key in sizes]
+    defines += [f"#define {key} {literal(value, precision)}" for key, value in constants.items()]
+    defines += [
+        f"#define FIRST {plan.first}",
+        f"#define AROUND {plan.around}",
+        f"#define DERIVATIVE {int(e.derivative)}",
+    ]
+    defines += [f"#define REAL {real}", f"#define SQRT {'sqrt' if precision == 'double' else 'sqrtf'}"]
+    body = (resources.files("swashplate.export") / "runtime" / "recursive_regression.c").read_text(encoding="utf-8")
+    text = "\n".join([f'#include "{called}.h"', "#include <math.h>", "", *defines, "", _tables(plan, precision), body])
+    size = 8 if precision == "double" else 4
+    numbers = 2 * (channels + 2) * lines + 2 * (2 * plan.last + 1) + 2 + channels
+    work = 2 * lines * (unknowns + 2) + 4 * unknowns**2 + 4 * unknowns
+    return RegressionCode(
+        name=called,
+        header=header,
+        source=re.sub(r"\bNAME_", f"{called}_", text),
+        memory_bytes=numbers * size + 8,
+        work_bytes=work * size,
+        table_bytes=(2 * (channels + 1) * lines + lines + channels) * size + 4 * (channels + unknowns),
+        step_operations=_step_operations(plan),
+        estimate_operations=_estimate_operations(plan),
+    )
+
+
+def _header(plan: RegressionPlan, name: str, real: str, sizes: dict[str, int]) -> str:
+    e, upper = plan.equation, name.upper()
+    forgets = "nothing" if np.isinf(plan.memory) else f"what is {plan.memory:g} s old counts e times less"
+    counts = "\n".join(f"#define {upper}_{key} {value}" for key, value in sizes.items())
+    return f"""/* {words(e.text)}
+ *
+ * samples    {1.0 / plan.dt:g} per second: {words(", ".join(e.channels))}
+ * unknowns   {words(", ".join(e.names))}
+ * lines      {plan.hertz[0]:g} to {plan.hertz[-1]:g} Hz, {plan.spacing:g} Hz apart
+ * forgets    {forgets}
+ *
+ * Call NAME_begin once, NAME_step with every sample and the seconds since the one before, and NAME_estimate whenever
+ * numbers are wanted. NAME_step returns 0 while it is frozen (no number, a gap, a clock that jumped); NAME_estimate
+ * returns 0, and leaves values and covariance as they may be, while the stream does not tell the unknowns apart.
+ */
+#ifndef {upper}_H
+#define {upper}_H
+
+{counts}
+
+typedef struct {{
+  {real} sums[{upper}_SUMS][{upper}_LINES][2], window[{upper}_WINDOW][2], turned[2], last[{upper}_CHANNELS];
+  int begun;
+}} {name}_memory;
+
+typedef struct {{
+  {real} right[{upper}_LINES][{upper}_UNKNOWNS][2], left[{upper}_LINES][2];
+  {real} power[{upper}_LINES], spare[{upper}_LINES];
+  {real} normal[{upper}_UNKNOWNS][{upper}_UNKNOWNS], lower[{upper}_UNKNOWNS][{upper}_UNKNOWNS];
+  {real} inverse[{upper}_UNKNOWNS][{upper}_UNKNOWNS], middle[{upper}_UNKNOWNS][{upper}_UNKNOWNS];
+  {real} moment[{upper}_UNKNOWNS], size[{upper}_UNKNOWNS], row[{upper}_UNKNOWNS][2];
+}} {name}_work;
+
+void {name}_begin({name}_memory *e);
+int {name}_step({name}_memory *e, {real} elapsed, const {real} sample[{upper}_CHANNELS]);
+int {name}_estimate(const {name}_memory *e, {name}_work *w, {real} values[{upper}_UNKNOWNS],
+  {real} covariance[{upper}_UNKNOWNS][{upper}_UNKNOWNS]);
+
+#endif
+""".replace("NAME_", f"{name}_")
+
+
+def _tables(plan: RegressionPlan, precision: Precision) -> str:
+    e, real = plan.equation, REAL[precision]
+
+    def row(values: object) -> str:
+        return ", ".join(literal(float(value), precision) for value in np.ravel(np.asarray(values)))
+
+    places = [e.channels.index(name) for name in e.regressors.values()]
+    column = [*places, *([len(e.channels)] if BIAS in e.names else [])]
+    factors = ",\n  ".join(
+        "{" + ", ".join(f"{{{row([f.real, f.imag])}}}" for f in channel) + "}" for channel in (*plan.factors, plan.hold)
+    )
+    return f"""static const int held[CHANNELS] = {{{", ".join(str(int(name in plan.held)) for name in e.channels)}}};
+static const int column[UNKNOWNS] = {{{", ".join(map(str, column))}}};
+static const {real} known[CHANNELS] = {{{row([e.known.get(name, 0.0) for name in e.channels])}}};
+static const {real} omega[LINES] = {{{row(2.0 * np.pi * plan.hertz)}}};
+static const {real} factors[CHANNELS + 1][LINES][2] = {{
+  {factors}}};
+"""
+
+
+# ---- what it costs: the loops of runtime/recursive_regression.c, read line by line ----------------------------------
+_TURN = 6
+"""Operations of a complex product."""
+
+
+def _step_operations(plan: RegressionPlan) -> int:
+    e = plan.equation
+    held = sum(name in plan.held for name in e.channels)
+    smooth, lines, window = len(e.channels) - held, plan.last - plan.first + 1, 2 * plan.last + 1
+    a_line = 2 * (3 * held + 6 * smooth + 2 + 5)
+    return len(e.channels) + _TURN + 7 + window * (8 + 2 * _TURN) + lines * a_line
+
+
+def _estimate_operations(plan: RegressionPlan) -> int:
+    e = plan.equation
+    n, k = plan.last - plan.first + 1, len(e.names)
+    columns = len(e.names)
+    known = sum(factor != 0.0 for factor in e.known.values())
+    rows = n * (_TURN + 4 * e.derivative + known * (_TURN + 4) + columns * _TURN)
+    gram = n * 4 * (k * (k + 1) // 2 + k) + k + k * (k + 1)
+    below = sum(2 * j + 1 for i in range(k) for j in range(i + 1))
+    inverse = sum(2 * (i - j) + 1 for j in range(k) for i in range(j, k)) + sum(
+        2 * (i - j) for j in range(k) for i in range(j) if i > j
+    )
+    product = sum(2 * (k - max(i, j)) for i in range(k) for j in range(k))
+    freedom = 6 * n + 6
+    values = k * (3 * k + 1)
+    residual = n * (4 * k + 3)
+    near = sum(min(n - 1, at + plan.around) - max(0, at - plan.around) + 1 for at in range(n))
+    taken = n * (5 * k * k + 5 * k + 4)
+    spectrum = near * 6 + n * (6 + 4 * k)
+    sandwich = n * n * (4 + 8 * k) + n * 5 * k * k + 4 * k**3 + 2 * k * k
+    return rows + gram + below + inverse + product + freedom + values + residual + taken + spectrum + sandwich

@@ -1,0 +1,1 @@
+"""Estimates that are carried along a stream of samples: regressions in flight."""

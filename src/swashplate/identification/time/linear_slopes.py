@@ -1,0 +1,94 @@
+"""How a linear model's errors along a record move with its numbers: one filter for the slopes of all of them.
+
+    x+ = phi x + g0 u + g1 (u+ - u) + push + gain e,    e = y - c x - d u - bias
+
+The slopes of x run through phi - gain c, whatever number moves; what drives them is, for every number, a constant
+matrix times the same few signals (states, inputs, their steps, errors). It is done for a block of samples at a time,
+which stays in the processor's cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.simulation.dynamics import enable_double_precision
+
+_BLOCK = 256
+"""Samples."""
+
+
+class Coefficients(NamedTuple):
+    """What makes a record's errors, for a batch of models (first axis).
+
+    Attributes:
+        x: at the start. phi, c, gain, g0, g1, push, d, bias: as above.
+        lag: of the inputs, in samples.
+    """
+
+    x: Any
+    phi: Any
+    c: Any
+    gain: Any
+    g0: Any
+    g1: Any
+    push: Any
+    d: Any
+    bias: Any
+    lag: Any
+
+
+def slopes_along(
+    base: Coefficients, moved: Coefficients, inputs: Array, later: Array, errors: Array, states: Array
+) -> Iterator[tuple[Array, Array]]:
+    """Block by block the errors (n, n_outputs) and their slopes (n_entries, n, n_outputs).
+
+    Args:
+        base: of one model, without a batch.
+        moved: their slopes by the entries; entries that move the gain alone stand last, and are missing in the others.
+        inputs: later by their lags, (n_t, n_inputs). later: their slopes by the lag.
+        errors, states: along the record, (n_t, n_outputs) and (n_t, n_states).
+    """
+    (n_t, k), n, few, many = errors.shape, base.phi.shape[0], len(moved.x), len(moved.gain)
+    still = np.zeros((1, inputs.shape[1]))
+    signals = [states, inputs, np.diff(inputs, axis=0, append=still), later, np.diff(later, axis=0, append=still)]
+    signals += [np.ones((n_t, 1)), errors]
+    lag = moved.lag[:, None, :]
+    none = np.zeros_like(moved.d)
+    seen = -np.concatenate(
+        [moved.c, moved.d, none, base.d * lag, none, moved.bias[:, :, None], np.zeros((few, k, k))], axis=2
+    )
+    driven = np.concatenate(
+        [moved.phi, moved.g0, moved.g1, base.g0 * lag, base.g1 * lag, moved.push[:, :, None], moved.gain[:few]], axis=2
+    )
+    pushing = np.zeros((many, n, seen.shape[2]))
+    pushing[:few] = driven + base.gain @ seen
+    pushing[few:, :, -k:] = moved.gain[few:]
+    by_signal, through = pushing.reshape(many * n, -1).T, seen.reshape(few * k, -1).T
+    whole = -(-n_t // _BLOCK) * _BLOCK
+    table = np.concatenate([np.hstack(signals), np.zeros((whole - n_t, seen.shape[2]))])
+    x = np.concatenate([moved.x, np.zeros((many - few, n))])
+    loop = base.phi - base.gain @ base.c
+    for at in range(0, n_t, _BLOCK):
+        block = table[at : at + _BLOCK]
+        x, ran = _linear()(x, loop, (block @ by_signal).reshape(_BLOCK, many, n))
+        slopes = (np.asarray(ran).reshape(-1, n) @ -base.c.T).reshape(_BLOCK, many, k)
+        slopes[:, :few] += (block @ through).reshape(_BLOCK, few, k)
+        count = min(_BLOCK, n_t - at)
+        yield errors[at : at + count], np.ascontiguousarray(np.moveaxis(slopes[:count], 1, 0))
+
+
+@cache
+def _linear() -> Any:
+    """The last x, and x of every sample (n_t, n_entries, n_states), where the next is x Phi' + push."""
+    enable_double_precision()
+
+    def run(x: jax.Array, phi: jax.Array, pushed: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return jax.lax.scan(lambda x, push: (x @ phi.T + push, x), x, pushed)
+
+    return jax.jit(run)

@@ -1,0 +1,123 @@
+"""Estimates along a stream, as a page: each over time in its band, the last ones in a table, and where they stood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from swashplate.identification.recursive.tracked import Tracked
+from swashplate.reporting.structure import Cell, Figure, Key, Points, Report, Section, Table, Text
+from swashplate.reporting.theme import BAND, MODEL, VERMILION, line, numbers, quantity, stacked
+from swashplate.reporting.versions import date, versions
+
+_MOST = 12
+"""Stretches that are listed one by one."""
+_HEIGHT = 130
+
+
+def compose_tracking(
+    source: str, found: Sequence[Tracked], notes: Sequence[str], *, simulated: bool, title: str | None
+) -> Report:
+    """The report's structure, a section for each equation."""
+    told = sum(one.final is not None for one in found)
+    banners = (("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),) if simulated else ()
+    missing = [one.text for one in found if one.final is None]
+    if missing:
+        banners = (("bad", f"Not told apart by this stream: {'; '.join(missing)}."), *banners)
+    return Report(
+        title=title or f"Identification in flight: {source}",
+        banners=banners,
+        summary=(
+            ("Estimated", f"{told} of {len(found)} at the end", "plain" if told == len(found) else "bad"),
+            ("Stood still", _stood(found), "caution" if any(one.frozen for one in found) else "plain"),
+        ),
+        picture=None,
+        sections=tuple(Section(f"equation-{k}", one.text, _blocks(one, k, source)) for k, one in enumerate(found))
+        + ((Section("notes", "Notes", (Points(tuple(notes)),)),) if notes else ()),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def _stood(found: Sequence[Tracked]) -> str:
+    times = max((len(one.frozen) for one in found), default=0)
+    return f"{times} times, see below" if times else "never: no gap, no value that is no number"
+
+
+def _blocks(one: Tracked, k: int, source: str) -> tuple[Text | Points | Table | Figure, ...]:
+    final = one.final
+    rows = tuple(
+        (
+            Cell(name),
+            Cell("-" if final is None else f"{final.values[i]:.5g}", True),
+            Cell("-" if final is None else f"{final.sigmas[i]:.2g}", True),
+            Cell(one.units[i] or "unknown"),
+        )
+        for i, name in enumerate(one.names)
+    )
+    caption = f"At the end, after {one.counted:.1f} s that counted."
+    note = "Standard errors count residuals that are not independent; see the how-to."
+    blocks: list[Text | Points | Table | Figure] = [
+        *(Text(words, tone="caution") for words in one.notes),
+        _figure(one, k, source),
+        Table(caption, ("unknown", "value", "standard error", "unit"), rows, note=note),
+    ]
+    if one.frozen:
+        items = [f"{s.start:.2f} to {s.stop:.2f} s: {s.why}" for s in one.frozen[:_MOST]]
+        more = len(one.frozen) - len(items)
+        blocks.append(Points((*items, *([f"and {more} more"] if more else [])), "Where the estimate stood still"))
+    return tuple(blocks)
+
+
+def _figure(one: Tracked, k: int, source: str) -> Figure:
+    layout = stacked([quantity(name, unit) for name, unit in zip(one.names, one.units, strict=True)], height=_HEIGHT)
+    traces = []
+    for i, name in enumerate(one.names):
+        number = "" if i == 0 else str(i + 1)
+        value, sigma = one.values[:, i], one.sigmas[:, i]
+        known = np.isfinite(value)
+        ends = (value + 2.0 * sigma)[known], (value - 2.0 * sigma)[known]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": numbers(np.concatenate([one.time[known], one.time[known][::-1]])),
+                "y": numbers(np.concatenate([ends[0], ends[1][::-1]])),
+                "fill": "toself",
+                "fillcolor": BAND,
+                "line": {"width": 0},
+                "hoverinfo": "skip",
+                "xaxis": f"x{number}",
+                "yaxis": f"y{number}",
+            }
+        )
+        traces.append(line(one.time, value, name=name, color=MODEL, axis=number))
+        late = known & (one.time > one.time[0] + 0.25 * np.ptp(one.time))
+        if np.any(late):  # the first seconds' bounds would hide all the rest
+            low, high = (value - 3.0 * sigma)[late].min(), (value + 3.0 * sigma)[late].max()
+            layout[f"yaxis{number}"]["range"] = [float(low), float(high)]
+    layout["shapes"] = [
+        {
+            "type": "rect",
+            "xref": "x",
+            "yref": "paper",
+            "x0": s.start,
+            "x1": s.stop,
+            "y0": 0,
+            "y1": 1,
+            "fillcolor": VERMILION,
+            "opacity": 0.25,
+            "line": {"width": 0},
+        }
+        for s in one.frozen
+    ]
+    keys = (Key("estimate", MODEL), Key("±2 standard errors", BAND, "band"))
+    stood = (Key("stood still", VERMILION, "band"),) if one.frozen else ()
+    return Figure(
+        f"track-{k}",
+        {"data": traces, "layout": layout},
+        int(layout["height"]),
+        f"Estimates of '{one.text}' over time, {source}.",
+        f"Coefficients {', '.join(one.names)} over time with two standard errors to each side.",
+        keys=(*keys, *stood),
+    )
