@@ -69,13 +69,14 @@ def _quickly(answer: bytes) -> dict[str, list[float]]:
 
 @dataclass
 class Gains:
-    """ArduPilot's parameters by what they do (ATC_ANG_*_P, ATC_RAT_*; `kept`: ILMI)."""
+    """ArduPilot's parameters by what they do (ATC_ANG_*_P, ATC_RAT_*; `kept`: ILMI, `slope`: D behind FLTD)."""
 
     angle: tuple[float, float, float] = (4.5, 4.5, 4.5)
     forward: tuple[float, float, float] = (0.18, 0.18, 0.0)
     proportional: tuple[float, float, float] = (0.05, 0.05, 0.25)
     integral: tuple[float, float, float] = (0.1, 0.1, 0.3)
     kept: tuple[float, float] = (0.1, 0.1)
+    slope: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 FILTER = 20.0
@@ -161,6 +162,7 @@ class HeliAutopilot:
         outputs: 16 or 32.
         sweep: (axis 0 roll to 3 collective, function of time since it began) added after the rate controllers.
         sticks: roll, pitch, yaw and collective that reach the servos while it does not fly.
+        keep: lean per m and m/s. lifting: collective per m, and per m/s.
         log: rows of time, p, q, r, mixer roll, pitch, yaw, collective, sweep, and p, q, r behind the gyro filter.
     """
 
@@ -179,6 +181,8 @@ class HeliAutopilot:
     answers: list[dict[str, list[float]]] = field(default_factory=list)
     place: tuple[float, float] = (0.0, 0.0)
     collective: float = 0.0
+    keep: tuple[float, float] = (0.04, 0.08)
+    lifting: tuple[float, float] = (0.06, 0.08)
     ekf: Ekf = field(default_factory=Ekf)
     _sums: np.ndarray = field(default_factory=lambda: np.zeros(3))
     _lift: float = 0.0
@@ -187,6 +191,8 @@ class HeliAutopilot:
     _ramp: float = 0.0
     _filters: tuple[LowPass, ...] = field(default_factory=lambda: (LowPass(2), LowPass(1), LowPass(1)))
     _heading: float = 0.0
+    _slope: LowPass = field(default_factory=lambda: LowPass(1))
+    _missed: np.ndarray | None = None
 
     def exchange(self) -> dict[str, list[float]]:
         """One frame: send, wait for the answer, control."""
@@ -283,7 +289,10 @@ class HeliAutopilot:
             kept = np.clip(self._sums[:2], np.negative(g.kept), g.kept)
             self._sums[:2] += LEAK * (kept - self._sums[:2])
             self._sums = np.clip(self._sums + np.array(g.integral) * miss * dt, np.negative(IMAX), IMAX)
+            slope = self._slope((miss - (miss if self._missed is None else self._missed)) / dt, dt)
+            self._missed = miss
             mixer = np.array(g.forward) * target + np.array(g.proportional) * miss + self._sums
+            mixer += np.array(g.slope) * slope
             collective = self._climb(state)
             if self.sweep is not None:
                 axis, signal = self.sweep
@@ -304,15 +313,17 @@ class HeliAutopilot:
 
     def _lean(self, state: dict[str, list[float]]) -> tuple[float, float]:
         c, s = math.cos(state["attitude"][2]), math.sin(state["attitude"][2])
-        north = 0.04 * (self.place[0] - state["position"][0]) - 0.08 * state["velocity"][0]
-        east = 0.04 * (self.place[1] - state["position"][1]) - 0.08 * state["velocity"][1]
+        place, speed = self.keep
+        north = place * (self.place[0] - state["position"][0]) - speed * state["velocity"][0]
+        east = place * (self.place[1] - state["position"][1]) - speed * state["velocity"][1]
         return float(np.clip(-s * north + c * east, -0.2, 0.2)), float(np.clip(-c * north - s * east, -0.2, 0.2))
 
     def _climb(self, state: dict[str, list[float]]) -> float:
         climb = float(np.clip(0.8 * (self.height + state["position"][2]), -0.5, 0.8))
         miss = climb + state["velocity"][2]
-        self._lift = float(np.clip(self._lift + 0.06 * miss * self.every / self.rate, 0.0, 0.8))
-        return float(np.clip(self._lift + 0.08 * miss, 0.0, 1.0))
+        integral, proportional = self.lifting
+        self._lift = float(np.clip(self._lift + integral * miss * self.every / self.rate, 0.0, 0.8))
+        return float(np.clip(self._lift + proportional * miss, 0.0, 1.0))
 
     def _mixed(self, mixer: np.ndarray, collective: float) -> list[int]:
         """H3-120 with H_COL_MIN 1460 and H_COL_MAX 1740; tail on 4, rotor speed on 8."""

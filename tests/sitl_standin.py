@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A stand-in for the SITL binary of an ArduPilot helicopter, as a program: `sitl_standin.py --model JSON:127.0.0.1`.
+"""A stand-in for ArduCopter's SITL binary, of a helicopter or coaxial: `sitl_standin.py --model JSON:127.0.0.1`.
 
 From the documents of the other side: the command line and ports of SITL_cmdline.cpp, servo packets of SIM_JSON.cpp, 16
 pulses of a radio on UDP 5501, MAVLink on TCP 5760 (which it waits for), ArduCopter's modes and texts, a DataFlash log
@@ -27,6 +27,9 @@ from heli_autopilot import Gains, HeliAutopilot
 from made_autopilot_logs import Row, dataflash
 from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 
+COAXIAL = 9
+SPIN_ARM, SPIN_MIN, SPIN_MAX, EXPO, HEADROOM = 0.1, 0.15, 0.95, 0.65, 0.2
+"""MOT_ parameters of a multicopter, with their defaults."""
 STABILIZE, ALT_HOLD, LOITER, LAND, SYSTEM_ID = 0, 2, 5, 9, 25
 SLOW, FAST, CRAWL = 100, 200, 50
 """Frames per second on the ground with a rotor that turns, in the air, and before arming (real SITL: 1200)."""
@@ -87,9 +90,15 @@ class Firmware(HeliAutopilot):
         g = parameters
         self.gains = Gains(
             tuple(g[f"ATC_ANG_{a}_P"] for a in ("RLL", "PIT", "YAW")),
-            *(tuple(g[f"ATC_RAT_{a}_{k}"] for a in ("RLL", "PIT", "YAW")) for k in ("FF", "P", "I")),
-            tuple(g[f"ATC_RAT_{a}_ILMI"] for a in ("RLL", "PIT")),
+            *(tuple(g.get(f"ATC_RAT_{a}_{k}", 0.0) for a in ("RLL", "PIT", "YAW")) for k in ("FF", "P", "I")),
+            tuple(g.get(f"ATC_RAT_{a}_ILMI", 1.0) for a in ("RLL", "PIT")),  # 1: a multicopter's do not leak
+            tuple(g.get(f"ATC_RAT_{a}_D", 0.0) for a in ("RLL", "PIT", "YAW")),
         )
+        self.coaxial = g["FRAME_CLASS"] == COAXIAL
+        self.keep = (0.04, 0.08) if not self.coaxial else (
+            g["PSC_POSXY_P"] * g["PSC_VELXY_P"] / 9.81, g["PSC_VELXY_P"] / 9.81
+        )  # fmt: skip
+        self.lifting = (0.06, 0.08) if not self.coaxial else (0.1, 0.15)
 
     def over_udp(self, packet: bytes) -> bytes | None:
         if "frozen" in self.faults and self.lift_off:
@@ -223,6 +232,36 @@ class Firmware(HeliAutopilot):
             return min(1.0, max(0.0, (self.pwm[2] - 1000) / 1000.0))
         return super()._climb(state)
 
+    def _mixed(self, mixer, collective: float) -> list[int]:
+        """A helicopter's, or from AP_MotorsCoax: flaps 1 to 4 over the thrust, motors 5 and 6 by thrust and yaw."""
+        if not self.coaxial:
+            return super()._mixed(mixer, collective)
+        roll, pitch, yaw = map(float, mixer)
+        if not self.lift_off:
+            idle = SPIN_ARM if self.armed else 0.0
+            flaps, motors = (roll, pitch), (idle, idle)
+        else:
+            hover = self.parameters.get("MOT_THST_HOVER", 0.35)
+            largest = max(abs(roll), abs(pitch))
+            scale = 1.0 if largest == 0.0 else min(1.0, max(0.0, (1.0 - min(abs(yaw), 0.5 * HEADROOM)) / largest))
+            allowed = 2.0 * (1.0 - scale * largest)
+            yaw = min(allowed, max(-allowed, yaw))
+            average = max(collective, 0.5 * collective + 0.5 * hover)  # throttle and hover are mixed half and half
+            thrust = max(collective, min(max(scale * largest, abs(yaw)), average))
+            yaw = min(thrust, max(-thrust, yaw))
+            over = min(1.0, max(0.5, 0.5 * hover, thrust))
+            flaps = tuple(min(1.0, max(-1.0, each / over)) for each in (roll, pitch))
+            motors = tuple(self._motor(thrust + half * yaw) for half in (0.5, -0.5))
+        right, up = (500.0 * flap for flap in flaps)
+        servos = [round(1500.0 + x) for x in (right, up, -right, -up)]
+        return [*servos, *(round(1000.0 + 1000.0 * motor) for motor in motors), 0, 0]
+
+    @staticmethod
+    def _motor(thrust: float) -> float:
+        thrust = min(1.0, max(0.0, thrust))
+        curve = (EXPO - 1.0 + math.sqrt((1.0 - EXPO) ** 2 + 4.0 * EXPO * thrust)) / (2.0 * EXPO)
+        return SPIN_MIN + (SPIN_MAX - SPIN_MIN) * curve
+
     def log_row(self, name: str, *values) -> None:
         if self.armed or name == "EV":
             self.rows.append((name, (round(1e6 * self.now), *values)))
@@ -235,10 +274,10 @@ class Firmware(HeliAutopilot):
         with contextlib.suppress(BlockingIOError):
             while True:
                 self.pwm = list(struct.unpack("<16H", self.radio.recv(32)))
-        self.interlock = self.armed and self.pwm[7] > 1800
+        self.interlock = self.armed and (self.coaxial or self.pwm[7] > 1800)  # motors need none
         if not self.interlock:
             self.running_since = self.now
-        up = self.now - self.running_since >= self.parameters["H_RSC_RUNUP_TIME"]
+        up = self.now - self.running_since >= self.parameters.get("H_RSC_RUNUP_TIME", 0.0)
         wanted = self.mode not in (STABILIZE, SYSTEM_ID) or self.pwm[2] > 1050
         if self.armed and self.interlock and up and wanted:
             if self.mode not in (ALT_HOLD, LOITER, LAND):

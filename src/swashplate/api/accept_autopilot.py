@@ -7,6 +7,7 @@ import shutil
 import socket
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +18,22 @@ from swashplate.api.saying import Say, silent
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
+from swashplate.control.laws.ardupilot.law import GRAVITY
+from swashplate.control.laws.ardupilot.parameters import known
 from swashplate.errors import LinkError, SwashError
 from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.readers.read import read
-from swashplate.links.ardupilot.gains import read_parameter_file
-from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, hover_stick, mixed, mixer_response
+from swashplate.links.ardupilot.gains import ardupilot_law, read_parameter_file
+from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
 from swashplate.links.ardupilot.parameters import Parameters, as_written, parameter_file, parameters
 from swashplate.links.ardupilot.runner import serve
 from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.ardupilot.sitl import Sitl
 from swashplate.links.ardupilot.trial import Background, Piloted, Trial, TrialEndedError, TrialLine, TrialPlan
 from swashplate.links.ardupilot.trial_parameters import trial_parameters
-from swashplate.links.ardupilot.trial_pilot import TrialPilot
+from swashplate.links.ardupilot.trial_pilot import PLACE, SPEED, TrialPilot
 from swashplate.links.mavlink.commanding import Commanding
 from swashplate.links.mavlink.comparison import compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
@@ -42,6 +45,7 @@ from swashplate.links.sensing import Sensing
 from swashplate.links.sockets import listen_udp
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.atmosphere import standard_altitude
 from swashplate.physics.environment import Environment
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.standing import airborne, standing
@@ -53,10 +57,16 @@ _RATE = 100.0
 """Hz of the records: what the System ID mode logs by default."""
 _LOOP = 400.0
 """Hz of ArduCopter's loops, where it does not say."""
-_GENTLE: Mapping[str, tuple[float, float]] = {"p": (0.4, 0.1), "q": (0.4, 0.1), "r": (0.6, 0.3), "az": (2.5, 0.7)}
+_GENTLE: Mapping[str, tuple[float, float]] = {"p": (0.4, 0.1), "q": (0.4, 0.1), "r": (1.2, 0.4), "az": (2.5, 0.7)}
 """Most rate [rad/s] and angle [rad] that a sweep may make, or acceleration [m/s^2] and speed [m/s]."""
 _MOST = 0.2
 """Of a mixer's command."""
+
+
+_MIXING = ("MOT_", "H_C")
+"""What a mixer's parameters begin with."""
+_COMPENSATED = ("MOT_BAT_VOLT_MAX", "MOT_BAT_V_MAX")
+"""Multicopters' motors and flaps get more where the battery has less."""
 
 
 def accept_autopilot(
@@ -87,7 +97,7 @@ def accept_autopilot(
 
     Args:
         vehicle: in free flight; what flies.
-        binary: of ArduCopter for SITL (`arducopter-heli`).
+        binary: of ArduCopter for SITL (`arducopter-heli`; `arducopter` for a coaxial).
         out: folder where it runs and where its log stays; its `sitl` must not be there yet.
         name, servos: as of `link_ardupilot`.
         truth: whose linearisation the estimates are held against; the vehicle's own where None.
@@ -117,74 +127,101 @@ def accept_autopilot(
     for file in defaults:
         if not Path(file).is_file():
             raise SwashError("there is no such file.", where=file, channel="--defaults")
-    sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup)
-    listen_udp("127.0.0.1", sitl.physics_port).close()
     called, around = name or vehicle.card.called, environment_of(vehicle, environment)
+    above = standard_altitude(float(around.air_density))
+    sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup, altitude=above)
+    listen_udp("127.0.0.1", sitl.physics_port).close()
     aircraft, flying = standing(vehicle), airborne(vehicle)
     mapping = mapping_of(aircraft, servos, name=name, suffix="")
     say("trimming and linearising the vehicle")
     level = trim(flying, environment=environment)
     model = linearize(flying, level)
     other = model if truth is None else _linear(airborne(truth), environment)
-    moves, expected = mixed(mapping, model), parameters(mapping, flying, level)
-    chirps = {axis: _chirp(model, moves[axis], axis, band, seconds, float(around.gravity)) for axis in axes}
-    first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
+    yours = {key: value for file in defaults for key, value in read_parameter_file(file).items()}
+    mixing = {key: value for key, value in yours.items() if key.startswith(_MIXING)}
+    law, expected = ardupilot_law(mapping, flying, level, given=mixing), parameters(mapping, flying, level)
+    mixer, names = law.mixer, flying.input_names
+    moves = mixed(mixer, level, law.parameters, inputs=names)
     gains: Parameters = {}
+    if not any(key.startswith("ATC_RAT_") for key in yours):
+        say("searching gains with margins")
+        gains = gains_to_write(mapping, flying, level, notice=lambda text: say(text))
+    used, pull = {**law.parameters, **gains, **yours}, float(around.gravity)
+    chirps = {axis: _chirp(model, moves[axis], axis, used, band, seconds, pull) for axis in axes}
+    first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
     with listen_udp("127.0.0.1", sitl.physics_port) as bound:
         say("compiling the vehicle")
         plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
         plant.prepare()
         session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
-        if not any(name.startswith("ATC_RAT_") for file in defaults for name in read_parameter_file(file)):
-            say("searching gains with margins")
-            gains = gains_to_write(mapping, flying, level, notice=lambda text: say(text))
         _write_files(folder, files, expected | gains, first, defaults, called)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
             pilot = TrialPilot(
                 lambda pulses: radio.sendto(pulses, ("127.0.0.1", sitl.rc_port)),
-                heave=_heave(model, moves["heave"]),
-                hover_stick=hover_stick(mapping, model),
+                heave=_heave(model, moves["heave"], float(around.gravity)),
+                hover_stick=law.hover,
                 depth=plant.standing_depth,
             )
             run_up = float(expected.get("H_RSC_RUNUP_TIME", -1.0)) + 1.0
             plan = TrialPlan(chirps, run_up, height=height, hover=hover, ekf=ekf)
             piloted = Piloted(session, pilot)
             with Background(lambda go_on: serve(bound, piloted, go_on=go_on)) as physics, sitl:
-                lines, version, flown, speed, loop = _flown(
+                lines, version, flown, speed, values = _flown(
                     sitl, session, pilot, plan, expected, timeout=timeout, say=say, physics=physics
                 )
     say("reading the log")
     logs = sitl.logs()
     found: TruthBeside | None = None
     if flown:
+        late = 0.5 / values.get("SCHED_LOOP_RATE", _LOOP)
+        moved = mixed(mixer, other.trim, _mixing(values, law.parameters, law.frame), inputs=names)
 
-        def true(axis: str, output: str, omega: Array) -> Complex:
-            late, gravity = 0.5 / loop, float(around.gravity)
-            return mixer_response(other, mixed(mapping, other)[axis], output, omega, late=late, gravity=gravity)
+        def response(linear: LinearModel, axis: str, output: str, omega: Array) -> Complex:
+            return mixer_response(linear, moved[axis], output, omega, late=late, gravity=float(around.gravity))
 
-        found = _judged(logs, {axis: chirps[axis] for axis in flown}, true, pilot, lines)
+        swept = {axis: chirps[axis] for axis in flown}
+        found = _judged(logs, swept, partial(response, other), partial(response, model), pilot, lines)
     log = logs[-1] if logs else None
     return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), found, log, folder, speed)
 
 
 def _chirp(
-    model: LinearModel, moved: Array, axis: str, band: tuple[float, float], seconds: float, gravity: float
+    model: LinearModel,
+    moved: Array,
+    axis: str,
+    gains: Mapping[str, float],
+    band: tuple[float, float],
+    seconds: float,
+    gravity: float,
 ) -> Chirp:
-    """The largest sweep that stays gentle, by the linear model."""
+    """The largest sweep that stays gentle, by the linear model under the autopilot's loops without their filters."""
     a = MIXER_AXES[axis]
     omega = 2.0 * np.pi * np.geomspace(*band, 60)
-    answer = np.abs(mixer_response(model, moved, a.output, omega, late=0.0, gravity=gravity))
+    answer = mixer_response(model, moved, a.output, omega, late=0.0, gravity=gravity)
+    answer = np.abs(answer / (1.0 + answer * _feedback(axis, gains, omega)))
     quick, far = _GENTLE[a.output]
     most = min(_MOST, quick / float(answer.max()), far / float((answer / omega).max()))
     return Chirp.planned(a.number, float(f"{most:.2g}"), band, record=seconds, fade=1.0)
+
+
+def _feedback(axis: str, gains: Mapping[str, float], omega: Array) -> Complex:
+    """What the loops add to the mixer's command against a rate, per rad/s; none against heave in STABILIZE."""
+    if axis == "heave":
+        return np.zeros(omega.size, dtype=complex)
+    name, s = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}[axis], 1j * omega
+    p, i, forward = (gains[f"ATC_RAT_{name}_{end}"] for end in ("P", "I", "FF"))
+    angle = gains[f"ATC_ANG_{name}_P"] / s
+    return np.asarray((p + i / s) * (1.0 + angle) + forward * angle)
 
 
 def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
     return linearize(vehicle, trim(vehicle, environment=environment))
 
 
-def _heave(model: LinearModel, moved: Array) -> float:
-    return float((model.B @ moved)[model.states.index("w")])
+def _heave(model: LinearModel, moved: Array, gravity: float) -> float:
+    """The most acceleration per unit of the collective from 1 to 10 rad/s [m/s^2]: motors come in between."""
+    answer = mixer_response(model, moved, "az", np.geomspace(1.0, 10.0, 10), late=0.0, gravity=gravity)
+    return float(np.abs(answer).max())
 
 
 def _write_files(
@@ -209,8 +246,8 @@ def _flown(
     timeout: float,
     say: Say,
     physics: Background,
-) -> tuple[list[TrialLine], str, list[str], float, float]:
-    """Lines, version, axes flown, simulated seconds a second, and the loop rate [Hz].
+) -> tuple[list[TrialLine], str, list[str], float, Mapping[str, float]]:
+    """Lines, version, axes flown, simulated seconds a second, and the parameters that it has.
 
     Raises:
         LinkError: who answers is no ArduCopter that can be tried, or nobody does.
@@ -220,7 +257,7 @@ def _flown(
     with Connection(f"tcp:127.0.0.1:{sitl.mavlink_port}", timeout=timeout) as connection:
         autopilot = Commanding(connection)
         trial = Trial(session, pilot, autopilot, sitl, plan)
-        version, loop, begun = "version not known", _LOOP, time.monotonic()
+        version, values, begun = "version not known", dict[str, float](), time.monotonic()
         try:
             try:
                 kind = greet(connection, ARDUPILOT, timeout)
@@ -234,8 +271,8 @@ def _flown(
                 raise error
             said = f"{version}, MAVLink type {kind}"
             trial.lines.append(TrialLine("binary", said, f"ArduCopter {_dotted(OLDEST)} or later", True))
-            loop = reading.values.get("SCHED_LOOP_RATE", _LOOP)
-            pilot.lean_max = _lean_max(reading)
+            values = reading.values
+            pilot.lean_max, pilot.keep = _lean_max(reading), _keep(values)
             if _parameters_right(reading, expected, trial.lines):
                 trial.fly(say)
         except TrialEndedError as error:
@@ -243,7 +280,7 @@ def _flown(
         if physics.failed:
             trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
         wall = time.monotonic() - begun
-    return trial.lines, version, trial.flown, session.plant.time / max(wall, 1e-9), loop
+    return trial.lines, version, trial.flown, session.plant.time / max(wall, 1e-9), values
 
 
 def _dotted(numbers: Sequence[int]) -> str:
@@ -274,9 +311,27 @@ def _lean_max(reading: ParameterReading) -> float:
     return math.radians(degrees)
 
 
+def _keep(values: Mapping[str, float]) -> tuple[float, float]:
+    """Lean per m and m/s of the pilot [rad]: no more than the autopilot's own, which are slow where a vehicle is."""
+    own = known({name: value for name, value in values.items() if name.startswith("PSC_")}, frame="swashplate")
+    speed = min(SPEED, own["PSC_VELXY_P"] / GRAVITY)
+    return min(PLACE, own["PSC_POSXY_P"] * speed), speed
+
+
+def _mixing(values: Mapping[str, float], planned: Parameters, frame: str) -> Parameters:
+    """The parameters that the mixer reads, as the autopilot had them; the others as planned."""
+    told = {name: value for name, value in values.items() if name.startswith(_MIXING)}
+    return {**planned, **{name: known(told, frame=frame)[name] for name in told if name in planned}}
+
+
 def _parameters_right(reading: ParameterReading, expected: Parameters, lines: list[TrialLine]) -> bool:
     rows = compared(as_written(expected), reading)
     bad = [row.problem for row in rows if row.problem] + rate_problems(reading.values)
+    bad += [
+        f"{name} is {reading.values[name]:g}, expected 0: the truth beside the estimate knows no such compensation."
+        for name in _COMPENSATED
+        if reading.values.get(name, 0.0) > 0.0
+    ]
     if not reading.complete:
         bad.append(f"{len(reading.missing)} of {reading.count} never came")
     words = " ".join(bad) or f"{len(rows)} as the vehicle needs them"
@@ -285,7 +340,12 @@ def _parameters_right(reading: ParameterReading, expected: Parameters, lines: li
 
 
 def _judged(
-    logs: Sequence[Path], flown: Mapping[str, Chirp], true: Truth, pilot: TrialPilot, lines: list[TrialLine]
+    logs: Sequence[Path],
+    flown: Mapping[str, Chirp],
+    true: Truth,
+    own: Truth,
+    pilot: TrialPilot,
+    lines: list[TrialLine],
 ) -> TruthBeside | None:
     """The estimates of the newest log; lines are added for the log and for each of them."""
     if not logs:
@@ -296,7 +356,7 @@ def _judged(
         damage = "; ".join(flight.provenance.damage)
         lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
         lines.append(_rotor_line(flight, pilot))
-        found = beside_truth(flight, flown, true, rate=_RATE)
+        found = beside_truth(flight, flown, true, own, rate=_RATE)
     except SwashError as error:
         lines.append(TrialLine("log", str(error), "read", False))
         return None

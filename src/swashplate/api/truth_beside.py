@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +20,30 @@ from swashplate.identification.responses.frequency_response import TWO_PI, Frequ
 from swashplate.identification.responses.respond import respond
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
 from swashplate.links.ardupilot.trial import TrialLine
+from swashplate.models.linear.transfer_function import TransferFunction
 
 GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0
 """dB and degrees that an estimate may be off the truth, or so many random errors where those are more."""
 COHERENT = 0.8
 """Coherence from which on a line is judged."""
+_SWEPT = "sid_target"
+"""What System ID adds to the mixer: no loop feeds it back, so that the loops do not bias the estimate."""
+_SURE = 0.01
+"""Random error that an exact response is given."""
 _LEAST_SHARE = 0.7
 """Share of the band that must be coherent, else the sweep has told too little."""
 STRUCTURES: Mapping[tuple[str, ...], str] = {("roll", "pitch"): "rotor_body", ("yaw",): "yaw", ("heave",): "heave"}
 """Ready structures by the axes that they describe."""
-FORMS: Mapping[str, str] = {"roll": "0/2", "pitch": "0/2", "yaw": "0/1", "heave": "1/1"}
-"""Zeros over poles of an axis in hover: a rotor that tilts, and a body that is damped; az of one that climbs."""
+FORMS: Mapping[str, tuple[str, ...]] = {
+    "roll": ("0/2", "1/3"),
+    "pitch": ("0/2", "1/3"),
+    "yaw": ("0/1", "1/2"),
+    "heave": ("1/1", "1/2"),
+}
+"""Zeros over poles of an axis in hover: a rotor that tilts, and a body that is damped; az of one that climbs. With one
+pole more: motors behind the rotors."""
+_FOLLOWS = 0.5
+"""Of what an estimate may be off, how far a form may be off the vehicle that flew when it is fitted to just that."""
 
 Truth = Callable[[str, str, Array], Complex]
 """Response of an axis' command to a channel ("p") over frequency [rad/s]."""
@@ -53,13 +66,16 @@ class TruthBeside:
     remarks: list[str] = field(default_factory=list)
 
 
-def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, *, rate: float) -> TruthBeside:
+def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, own: Truth, *, rate: float) -> TruthBeside:
     """Take a log through `respond`, `fit_tf` and `fit_ss`, and judge each against the truth.
+
+    A form or structure that cannot follow the vehicle that flew, fitted to its own linearisation, is told and not
+    judged: it would speak of itself. What `respond` gives is always judged.
 
     Args:
         flight: as logged, with a System ID sweep for each axis.
         flown: the sweeps by axis.
-        truth: of the vehicle.
+        truth: what the estimates are held against. own: of the vehicle that flew.
         rate: of the records [Hz].
     """
     found = TruthBeside()
@@ -67,7 +83,7 @@ def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, *, ra
     axes = [axis for axis in MIXER_AXES if axis in by_axis]
     for together in _grouped(axes):
         try:
-            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, rate, found)
+            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, found)
         except SwashError as error:
             found.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
     return found
@@ -99,6 +115,7 @@ def _judge(
     axes: Sequence[str],
     flown: Mapping[str, Chirp],
     truth: Truth,
+    own: Truth,
     rate: float,
     found: TruthBeside,
 ) -> None:
@@ -109,16 +126,17 @@ def _judge(
     if missing := [name for name in (*inputs, *logged.values()) if name not in flight]:
         raise FlightError("is not in the log.", channel=", ".join(missing))
     pieces = [flight.between(part.start, part.stop) for part in parts]
-    records = uniform_records(pieces, (*inputs, *outputs), rate=rate, names=logged)
+    swept = (_SWEPT,) if _SWEPT in flight else ()
+    records = uniform_records(pieces, (*inputs, *outputs, *swept), rate=rate, names=logged)
     low, high = max(flown[a].start_hz for a in axes), min(flown[a].stop_hz for a in axes)
-    responses = respond(records, inputs=inputs, outputs=outputs, band=(1.25 * low, 0.75 * high))
+    band = (1.25 * low, 0.75 * high)
+    responses = respond(records, inputs=inputs, outputs=outputs, references=swept, band=band)
     words = f"{' and '.join(axes)}: "
     found.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
-    simple = []
-    for axis, a in zip(axes, named, strict=True):
-        fit = fit_tf(responses, input=a.input, outputs=[a.output], form=FORMS[axis])
-        simple.append(fit.material.transfer_functions[0].solution[0])
-        found.models.append(f"{axis}, fit-tf: {simple[-1]!r}")
+    exact = _exact(responses, axes, own)
+    forms = [_form(exact, axis) for axis in axes]
+    simple = [_fitted(responses, axis, form) for axis, form in zip(axes, forms, strict=True)]
+    found.models += [f"{axis}, fit-tf: {each!r}" for axis, each in zip(axes, simple, strict=True)]
     name = STRUCTURES.get(tuple(axes))
     fitted = None if name is None else fit_ss(name, responses).structure
     if fitted is not None:
@@ -133,23 +151,73 @@ def _judge(
         found.lines.append(
             TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
         )
-        models = {"fit-tf": np.asarray(simple[place].response(responses.omega))}
+        found.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good))
+        estimate = np.asarray(simple[place].response(responses.omega))
+        curves["fit-tf"] = (responses.omega, estimate)
+        line = _verdict(f"{axis}: fit-tf beside truth", estimate, true, error, good)
+        follows = _follows(exact, axis, np.asarray(_fitted(exact, axis, forms[place]).response(responses.omega)))
+        found.lines.append(line if follows else _told(line, f"no form of {', '.join(FORMS[axis])} follows"))
         if fitted is not None:
             o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
-            models["fit-ss"] = fitted.response(responses.omega)[:, o, i]
-        curves |= {verb: (responses.omega, estimate) for verb, estimate in models.items()}
-        for verb, estimate in {"respond": h, **models}.items():
-            found.lines.append(_verdict(f"{axis}: {verb} beside truth", estimate, true, error, good))
+            estimate = fitted.response(responses.omega)[:, o, i]
+            curves["fit-ss"] = (responses.omega, estimate)
+            line = _verdict(f"{axis}: fit-ss beside truth", estimate, true, error, good)
+            if not line.passed:  # only then is it asked whether the structure could have done it
+                assert name is not None
+                best = fit_ss(name, exact).structure
+                assert best is not None
+                follows = _follows(exact, axis, best.response(responses.omega)[:, o, i])
+                line = line if follows else _told(line, f"the structure {name} does not follow")
+            found.lines.append(line)
         found.curves[(a.output, a.input)] = curves
         found.lines.append(_lateness(axis, h, true, responses, good))
+
+
+def _exact(responses: FrequencyResponse, axes: Sequence[str], own: Truth) -> FrequencyResponse:
+    """The vehicle's own responses at the same frequencies, all of them as coherent and as sure."""
+    columns = [[own(axis, output, responses.omega) for axis in axes] for output in responses.outputs]
+    h = np.moveaxis(np.array(columns), -1, 0)
+    ones = np.ones(h.shape)
+    multiple = np.ones(h.shape[:2])
+    return replace(responses, response=h, coherence=ones, error=_SURE * ones, multiple=multiple, direct=None)
+
+
+def _fitted(responses: FrequencyResponse, axis: str, form: str) -> TransferFunction:
+    a = MIXER_AXES[axis]
+    fit = fit_tf(responses, input=a.input, outputs=[a.output], form=form)
+    return fit.material.transfer_functions[0].solution[0]
+
+
+def _form(exact: FrequencyResponse, axis: str) -> str:
+    """The first form that follows the vehicle's own response; the first of all where none does."""
+    for form in FORMS[axis]:
+        if _follows(exact, axis, np.asarray(_fitted(exact, axis, form).response(exact.omega))):
+            return form
+    return FORMS[axis][0]
+
+
+def _follows(exact: FrequencyResponse, axis: str, estimate: Complex) -> bool:
+    a = MIXER_AXES[axis]
+    gain, phase = _distance(estimate, exact.pair(a.output, a.input)[0])
+    return bool(gain.max() <= _FOLLOWS * GAIN and phase.max() <= _FOLLOWS * PHASE)
+
+
+def _told(line: TrialLine, who: str) -> TrialLine:
+    words = f"not judged: {who} the vehicle's own linearisation within {_FOLLOWS * GAIN:g} dB"
+    return line._replace(expected=words, passed=None)
+
+
+def _distance(estimate: Complex, true: Complex) -> tuple[Array, Array]:
+    """Gain [dB] and phase [deg] between two responses, both positive."""
+    ratio = estimate / true
+    return 20.0 * np.abs(np.log10(np.abs(ratio))), np.degrees(np.abs(np.angle(ratio)))
 
 
 def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_]) -> TrialLine:
     """The largest distance over the coherent lines; the random errors there widen what is allowed."""
     if not good.any():
         return TrialLine(what, "nothing coherent", f"within {GAIN:g} dB and {PHASE:g} deg", False)
-    ratio = estimate[good] / true[good]
-    gain, phase = 20.0 * np.abs(np.log10(np.abs(ratio))), np.degrees(np.abs(np.angle(ratio)))
+    gain, phase = _distance(estimate[good], true[good])
     sigma = np.nan_to_num(error[good])
     allowed = np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma), np.maximum(PHASE, SIGMAS * np.degrees(sigma))
     passed = bool(np.all(gain <= allowed[0]) and np.all(phase <= allowed[1]))

@@ -19,9 +19,10 @@ pytest.importorskip("pymavlink")
 
 import swashplate as sp
 from swashplate.api.acceptance import Acceptance
-from swashplate.api.truth_beside import TruthBeside, beside_truth
+from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.links.ardupilot import sitl, trial
+from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
 from swashplate.links.servos import servo_mapping
 from swashplate.models.vehicle import Vehicle
@@ -44,6 +45,18 @@ GAINS = {
     "ATC_RAT_YAW_I": 0.32,
 }
 """Of the Raptor 50, given as a user's file: to search them takes longer than the flights here."""
+COAX = sp.vehicle("coax")
+COAX_GAINS = {
+    **{f"ATC_ANG_{axis}_P": value for axis, value in (("RLL", 6.0), ("PIT", 6.0), ("YAW", 4.5))},
+    **{f"ATC_RAT_{axis}_{name}": value for axis in ("RLL", "PIT") for name, value in (("P", 0.075), ("I", 0.112))},
+    "ATC_RAT_RLL_D": 0.015,
+    "ATC_RAT_PIT_D": 0.015,
+    "ATC_RAT_YAW_P": 0.03,
+    "ATC_RAT_YAW_I": 0.045,
+    "PSC_POSXY_P": 0.058,
+    "PSC_VELXY_P": 0.39,
+}
+"""What `autopilot_gains` finds for it."""
 QUICK: dict[str, Any] = {"seconds": 12.0, "hover": 1.5, "height": 2.0, "timeout": 30.0, "speedup": 100.0}
 
 
@@ -137,16 +150,29 @@ def test_what_it_found_is_shown_and_saved(accepted: tuple[Acceptance, Path]) -> 
     assert "r / mixer_yaw" in repr(found)
 
 
-def judged_against(vehicle: Vehicle, log: Path) -> TruthBeside:
+def truth_of(vehicle: Vehicle, *, name: str, rate: float = 200.0) -> Truth:
+    """What a vehicle answers to the mixer's commands, with a stand-in's loop rate."""
     flying = airborne(vehicle)
-    model = sp.linearize(flying, sp.trim(flying))
-    moves = mixed(servo_mapping("raptor50", flying), model)
+    hover = sp.trim(flying)
+    model = sp.linearize(flying, hover)
+    law = ardupilot_law(servo_mapping(name, flying), flying, hover, given={})
+    moves = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)
 
     def truth(axis: str, output: str, omega: np.ndarray) -> np.ndarray:
-        return mixer_response(model, moves[axis], output, omega, late=0.5 / 200.0, gravity=9.80665)
+        return mixer_response(model, moves[axis], output, omega, late=0.5 / rate, gravity=9.80665)
 
-    chirp = Chirp.planned(MIXER_AXES["yaw"].number, 0.1, (0.4, 8.0), record=QUICK["seconds"], fade=1.0)
-    return beside_truth(sp.read(log), {"yaw": chirp}, truth, rate=100.0)
+    return truth
+
+
+def judged_against(
+    vehicle: Vehicle, log: Path, *, own: Vehicle = RAPTOR, name: str = "raptor50", **swept: float
+) -> TruthBeside:
+    """By axis so many seconds of sweep."""
+    chirps = {
+        axis: Chirp.planned(MIXER_AXES[axis].number, 0.1, (0.4, 8.0), record=seconds, fade=1.0)
+        for axis, seconds in (swept or {"yaw": QUICK["seconds"]}).items()
+    }
+    return beside_truth(sp.read(log), chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0)
 
 
 @pytest.mark.parametrize("share", [0.75, 1.0, 1.3])
@@ -255,8 +281,6 @@ def test_ports_and_folders_that_are_taken(tmp_path: Path) -> None:
     (tmp_path / "there" / "sitl").mkdir(parents=True)
     with pytest.raises(sp.SwashError, match="is there already"):
         accept(tmp_path / "there")
-    with pytest.raises(sp.SwashError, match="knows single rotors only"):
-        sp.accept_autopilot(sp.vehicle("coax"), BINARY, out=tmp_path / "coax", name="coax")
     with pytest.raises(sp.SwashError, match="'rol' is none of roll"):
         accept(tmp_path / "axis", axes=("rol",))
 
@@ -266,7 +290,8 @@ def test_the_truth_of_an_axis_has_its_sign_and_size() -> None:
     flying = airborne(RAPTOR)
     model = sp.linearize(flying, sp.trim(flying))
     mapping = servo_mapping("raptor50", flying)
-    moves = mixed(mapping, model)
+    law = ardupilot_law(mapping, flying, model.trim, given={})
+    moves = mixed(law.mixer, model.trim, law.parameters, inputs=flying.input_names)
     mapping.restart()
 
     def inputs(roll: float, pitch: float, yaw: float, throttle: float) -> np.ndarray:
@@ -298,3 +323,49 @@ def test_all_axes_and_a_changed_vehicle(tmp_path: Path) -> None:
     failed = [line.what for line in other.lines if line.passed is False]
     assert "roll: respond beside truth" in failed
     assert "pitch: respond beside truth" in failed
+
+
+def test_a_coaxial_s_mixer_moves_motors_by_its_thrust_curve_and_flaps_over_its_thrust() -> None:
+    """The Jacobian, against the stand-in's own mixing from ArduPilot's documents and the mapping behind it."""
+    flying = airborne(COAX)
+    hover = sp.trim(flying)
+    mapping = servo_mapping("coax", flying)
+    law = ardupilot_law(mapping, flying, hover, given={})
+    moves = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)
+    at = law.mixer.unmixed(hover.inputs, law.parameters)
+
+    def motor(thrust: float) -> float:
+        return 0.15 + 0.8 * (-0.35 + math.sqrt(0.35**2 + 2.6 * thrust)) / 1.3
+
+    def inputs(roll: float, pitch: float, yaw: float, throttle: float) -> np.ndarray:
+        over = min(1.0, max(0.5, throttle))
+        motors = [1000.0 + 1000.0 * motor(throttle + half * yaw) for half in (0.5, -0.5)]
+        flaps = [1500.0 + 500.0 * roll / over, 1500.0 + 500.0 * pitch / over]
+        return np.array(mapping.inputs([*flaps, 1500.0, 1500.0, *motors, 0, 0], 0.01))
+
+    for k, axis in enumerate(("roll", "pitch", "yaw", "heave")):
+        step = np.eye(4)[k] * 1e-4
+        moved = (inputs(*(at + step)) - inputs(*(at - step))) / 2e-4
+        np.testing.assert_allclose(moves[axis], moved, atol=1e-5)
+
+
+def test_a_coaxial_with_another_frame_is_not_flown(tmp_path: Path) -> None:
+    out = tmp_path / "t"
+    os.environ["SWASH_STANDIN"] = "frame"
+    try:
+        found = coaxial(out, axes=("yaw",))
+    finally:
+        del os.environ["SWASH_STANDIN"]
+    assert found.problems == (
+        "parameters read back: FRAME_CLASS is 8, expected 9. (expected as the vehicle needs them).",
+    )
+    assert is_gone(out)
+
+
+def coaxial(out: Path, *, axes: tuple[str, ...], seconds: float = 40.0) -> Acceptance:
+    gains = out.parent / "coax-gains.parm"
+    gains.write_text("".join(f"{name},{value}\n" for name, value in COAX_GAINS.items()))
+    return sp.accept_autopilot(
+        COAX, BINARY, out=out, name="coax", axes=axes, instance=instance(), defaults=[gains],
+        seconds=seconds, hover=3.0, height=3.0, timeout=60.0, speedup=100.0,
+    )  # fmt: skip

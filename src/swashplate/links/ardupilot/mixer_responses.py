@@ -1,23 +1,22 @@
 """What a unit of ArduPilot's mixer commands does to a vehicle's inputs, and the responses that follow: the truth.
 
-Sources: AP_MotorsHeli_Single and AP_MotorsHeli_Swash (roll and pitch are 0.45 of each servo's whole travel either way,
-yaw the whole tail servo, throttle the way from H_COL_MIN to H_COL_MAX); AP_MotorsCoax (flaps by roll or pitch over the
-thrust, at least 0.5; motors by the thrust and half of yaw either way, through the thrust curve).
+The mixing itself and its sources are in `swashplate.control.laws.ardupilot.mixers`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array, Complex
-from swashplate.errors import LinkError
-from swashplate.links.ardupilot.mixing import CYCLIC
-from swashplate.links.servos import CoaxialMapping, ServoMapping
+from swashplate.control.laws.ardupilot.mixers import Mixer
 from swashplate.simulation.linearize import LinearModel
+from swashplate.simulation.trim import Trim
 
 
 class MixedAxis(NamedTuple):
@@ -38,32 +37,21 @@ MIXER_AXES: Mapping[str, MixedAxis] = {
 """By name."""
 
 
-def mixed(mapping: ServoMapping, model: LinearModel) -> dict[str, Array]:
-    """By axis, how far a unit of the mixer's command moves the vehicle's inputs, shape (n_inputs,).
+def mixed(mixer: Mixer, hover: Trim, parameters: Mapping[str, float], *, inputs: Sequence[str]) -> dict[str, Array]:
+    """By axis, how far a unit of the mixer's command moves the vehicle's inputs, shape (n_inputs,): the Jacobian.
 
-    Raises:
-        LinkError: for a frame whose mixing is not known here.
+    About the commands that hold the hover, because a coaxial's motors go through a thrust curve, and its flaps are
+    divided by the thrust.
+
+    Args:
+        mixer: from `mixer_of`.
+        hover: the trim.
+        parameters: of the autopilot, by ArduPilot's names (`known`).
+        inputs: names of the vehicle's inputs.
     """
-    if isinstance(mapping, CoaxialMapping):
-        raise LinkError(
-            "the mixing of ArduPilot's coaxial frame depends on the thrust; a trial knows single rotors only.",
-            channel="--vehicle",
-            hint="Fly a coaxial by hand as the how-to says.",
-        )
-    side, ahead = (CYCLIC * math.radians(angle) for angle in mapping.cyclic_deg)
-    least, most = (math.radians(angle) for angle in mapping.collective_deg)
-    low, high = (math.radians(angle) for angle in mapping.tail_deg)
-    tail = 0.5 * (high - low)
-    turn = tail * model.B[model.states.index("r"), model.inputs.index("theta0T")]
-    moves = {"roll": ("A1", side), "pitch": ("B1", -ahead), "heave": ("theta0", most - least)}
-    moves["yaw"] = ("theta0T", math.copysign(tail, tail * turn))  # SERVOn_REVERSED has the nose go right
-    return {axis: _column(model, *moves[axis]) for axis in MIXER_AXES}
-
-
-def _column(model: LinearModel, name: str, by: float) -> Array:
-    column = np.zeros(len(model.inputs))
-    column[model.inputs.index(name)] = by
-    return column
+    at = jnp.asarray(mixer.unmixed(hover.inputs, parameters))
+    columns = np.asarray(jax.jacfwd(lambda commands: mixer.mix(commands, parameters).inputs)(at))
+    return {axis: columns[: len(inputs), place] for place, axis in enumerate(MIXER_AXES)}
 
 
 def mixer_response(
@@ -89,10 +77,3 @@ def mixer_response(
     else:
         answer = states[:, place(output)]
     return np.asarray(answer * np.exp(-1j * omega * late))
-
-
-def hover_stick(mapping: ServoMapping, model: LinearModel) -> float:
-    """Where the collective stick is in hover, 0 to 1."""
-    assert not isinstance(mapping, CoaxialMapping), "refused by `mixed`"
-    least, most = (math.radians(angle) for angle in mapping.collective_deg)
-    return float((model.trim.commands()["theta0"] - least) / (most - least))

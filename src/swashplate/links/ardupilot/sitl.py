@@ -23,8 +23,9 @@ MAVLINK_PORT, RC_PORT, PHYSICS_PORT = 5760, 5501, 9002
 _PER_INSTANCE = 10
 _OTHERS = (2, 3)
 """SERIAL1 and SERIAL2, from SERIAL0's port."""
-_HOME = "-35.363261,149.165230,584,0"
-"""Where ArduPilot's own tests fly."""
+_HOME = "-35.363261,149.165230"
+"""Where ArduPilot's own tests fly; the altitude is the vehicle's, because multicopters divide commands by the air's
+density there (Thrust_Linearization::get_compensation_gain): 0.5 dB at the 584 m of that place."""
 _PATIENCE = 3.0
 """s that it has to end by itself."""
 
@@ -38,13 +39,21 @@ class Sitl:
         defaults: parameter files in that folder, the last one counts.
         instance: which of several on this machine.
         speedup: most simulated seconds a second.
+        altitude: of the ground above the sea [m].
 
     Raises:
         LinkError: where the binary is missing or cannot be run, or one of its ports is taken.
     """
 
     def __init__(
-        self, binary: str | Path, folder: Path, defaults: Sequence[str], *, instance: int = 0, speedup: float = 10.0
+        self,
+        binary: str | Path,
+        folder: Path,
+        defaults: Sequence[str],
+        *,
+        instance: int = 0,
+        speedup: float = 10.0,
+        altitude: float = 0.0,
     ) -> None:
         self.binary, self.folder = _runnable(Path(binary)), folder
         shift = _PER_INSTANCE * instance
@@ -52,7 +61,7 @@ class Sitl:
         self.physics_port = PHYSICS_PORT + shift
         self.command = [
             str(self.binary), "--model", "JSON:127.0.0.1", "--defaults", ",".join(defaults), "-I", str(instance),
-            "--home", _HOME, "--speedup", f"{speedup:g}",
+            "--home", f"{_HOME},{altitude:.0f},0", "--speedup", f"{speedup:g}",
         ]  # fmt: skip
         for port in (self.mavlink_port, *(self.mavlink_port + k for k in _OTHERS)):
             _check_free(socket.SOCK_STREAM, port)

@@ -16,7 +16,7 @@ from swashplate.simulation.stepping import Motion
 
 PERIOD = 0.02
 """s of simulated time between two looks."""
-_PLACE, _SPEED, _MOST_LEAN = 0.04, 0.08, 0.15
+PLACE, SPEED, _MOST_LEAN = 0.04, 0.08, 0.15
 """Lean [rad] per m and per m/s, and the most: 0.6 rad/s and well damped with gravity alone."""
 _CLIMB, _SINK, _UP = 0.8, -0.5, 0.8
 """m/s per m of height, and the limits."""
@@ -50,6 +50,7 @@ class TrialPilot:
         heave: climb acceleration per unit of the collective stick [m/s^2], about hover.
         hover_stick: about where it hovers (0 to 1).
         lean_max: lean at a full stick [rad].
+        keep: lean per m off its place and per m/s [rad].
         depth: of the ground below the origin of the motion [m].
         hands: what they do. interlock: whether the switch on channel 8 is up.
         height: to keep [m]. place: to keep, north and east [m].
@@ -60,6 +61,7 @@ class TrialPilot:
     heave: float
     hover_stick: float
     lean_max: float = math.radians(30.0)
+    keep: tuple[float, float] = (PLACE, SPEED)
     depth: float = 0.0
     hands: Hands = "down"
     interlock: bool = False
@@ -94,8 +96,9 @@ class TrialPilot:
 
     def _lean(self, now: Seen, north_speed: float, east_speed: float) -> tuple[float, float]:
         """Roll and pitch sticks (-1 to 1; nose up is positive) that bring it back."""
-        north = _PLACE * (self.place[0] - now.north) - _SPEED * north_speed
-        east = _PLACE * (self.place[1] - now.east) - _SPEED * east_speed
+        place, speed = self.keep
+        north = place * (self.place[0] - now.north) - speed * north_speed
+        east = place * (self.place[1] - now.east) - speed * east_speed
         c, s = math.cos(now.yaw), math.sin(now.yaw)
         ahead, right = _within(c * north + s * east, _MOST_LEAN), _within(c * east - s * north, _MOST_LEAN)
         return right / self.lean_max, -ahead / self.lean_max
