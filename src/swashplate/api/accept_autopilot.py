@@ -318,7 +318,7 @@ def _keep(values: Mapping[str, float]) -> tuple[float, float]:
     return min(PLACE, own["PSC_POSXY_P"] * speed), speed
 
 
-def _mixing(values: Mapping[str, float], planned: Parameters, frame: str) -> Parameters:
+def _mixing(values: Mapping[str, float], planned: Mapping[str, float], frame: str) -> Parameters:
     """The parameters that the mixer reads, as the autopilot had them; the others as planned."""
     told = {name: value for name, value in values.items() if name.startswith(_MIXING)}
     return {**planned, **{name: known(told, frame=frame)[name] for name in told if name in planned}}

@@ -25,7 +25,7 @@ def air_density(altitude: float, *, warmer: float = 0.0) -> float:
 
 def standard_altitude(density: float) -> float:
     """Altitude [m] of the standard day where the air has a density [kg/m^3]: the inverse of `air_density`."""
-    return _KELVIN / _LAPSE * (1.0 - (density / SEA_LEVEL_DENSITY) ** (1.0 / (_EXPONENT - 1.0)))
+    return float(_KELVIN / _LAPSE * (1.0 - (density / SEA_LEVEL_DENSITY) ** (1.0 / (_EXPONENT - 1.0))))
 
 
 def density_at(height: Scalar, xp: Backend) -> Scalar:
