@@ -27,7 +27,6 @@ EXTRA_OF: Mapping[str, str] = {
     "gymnasium": "rl",
     "dask": "scale",
     "distributed": "scale",
-    "zarr": "scale",
 }
 """Extras of `pyproject.toml` by the module that they bring; `all` brings every one."""
 
