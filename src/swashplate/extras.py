@@ -25,7 +25,6 @@ EXTRA_OF: Mapping[str, str] = {
     "rosbags": "logs",
     "mcap": "mcap",
     "gymnasium": "rl",
-    "dask": "scale",
     "distributed": "scale",
 }
 """Extras of `pyproject.toml` by the module that they bring; `all` brings every one."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from swashplate.models.nesting import rebuild
+from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
@@ -59,7 +60,7 @@ def plain_pose(vehicle: Vehicle) -> Callable[[Sequence[float], Sequence[float], 
         here = dict(zip(names, map(float, x), strict=True))
         state = rebuild(vehicle.state, list(here.values()))
         inputs = vehicle.inputs(*map(float, u))
-        felt = vehicle.specific_force(state, inputs, parameters, around, _XP)
+        felt = vehicle.specific_force(state, inputs, parameters, environment_of(vehicle, around), _XP)
         thrust = [float(part) / LABORATORY_GRAVITY for part in felt]
         if shape["tail"] is None:
             share = [0.5 * part for part in thrust]

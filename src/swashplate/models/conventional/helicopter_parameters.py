@@ -114,9 +114,9 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("rotor_delta3", "1", "tangent of the main rotor's pitch-flap angle, negative takes pitch off; option delta3"),
     ("stabilator_low", "rad", "incidence of an all-moving horizontal tail in slow flight; option stabilator"),
     ("stabilator_high", "rad", "the same in fast flight"),
-    ("stabilator_from", "m/s", "air speed ahead up to which it stands at stabilator_low"),
+    ("stabilator_from", "m/s", "air speed ahead up to which it stands as in slow flight"),
     ("stabilator_to", "m/s", "air speed from which it stands at stabilator_high; in between it turns evenly"),
-    ("stabilator_collective", "1", "incidence per main rotor collective above stabilator_neutral; 0 for none"),
+    ("stabilator_collective", "1", "incidence per main rotor collective above the neutral one; 0 for none"),
     ("stabilator_neutral", "rad", "main rotor collective at which its schedule is that of speed alone"),
     ("stabilator_pitch_rate", "s", "incidence per pitch rate; 0 for none"),
 )
