@@ -40,6 +40,7 @@ def found(truth: tuple[tuple[str, float], ...] = (), horizon: tuple[float, float
     return sp.identify(sp.vehicle("coax"), seen, free=list(FREE), horizon=horizon)
 
 
+@pytest.mark.proof
 def test_constants_and_asymmetries_are_found() -> None:
     fit = found(tuple(BENT.items()))
     assert not fit.failed
@@ -56,6 +57,7 @@ def test_constants_and_asymmetries_are_found() -> None:
     assert fit.noise.tau_gust_vertical == 0.0  # shared with all forces
 
 
+@pytest.mark.proof
 def test_a_symmetric_aircraft_is_found_symmetric() -> None:
     fit = found()
     for name in ASYMMETRIES:

@@ -19,6 +19,9 @@ from swashplate.flights.maneuvers.ardupilot_chirp import START_DELAY, Chirp
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
 
+pytestmark = pytest.mark.proof
+"""The acceptance trial of `make test` flies over the link as well (tests/unit/api/test_accept_autopilot.py)."""
+
 RATE = 200
 BAND = (0.5, 6.0)
 SWEEPS = tuple(Chirp.planned(axis, 0.08, (0.4, 8.0), record=30.0, fade=1.0) for axis in (10, 11))

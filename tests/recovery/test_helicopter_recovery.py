@@ -109,6 +109,7 @@ def test_a_choice_for_coaxial_helicopters_is_refused() -> None:
         parameterize(vehicle("raptor50"), "flight")
 
 
+@pytest.mark.proof
 def test_state_space_fit_that_starts_from_the_card_finds_the_flown_rotor() -> None:
     """Rotor spring, flap time constant and flap coupling of the ten-state structure, from two sweeps under a hold.
 

@@ -100,6 +100,7 @@ def test_a_method_without_a_traced_likelihood_says_so() -> None:
         sp.posterior(fit, method="nuts")
 
 
+@pytest.mark.proof
 def test_too_few_draws_are_refused_with_their_diagnostics() -> None:
     with pytest.raises(IdentificationError, match=r"the posterior did not converge: .*400 effective draws are needed"):
         sp.posterior(fitted("output-error"), method="nuts", chains=2, warmup=60, draws=100)

@@ -109,6 +109,7 @@ def test_what_was_fitted_is_validated_against_that_card(fan: sp.Vehicle, held: F
     assert found.log_likelihood["model"] > found.log_likelihood["published card"]
 
 
+@pytest.mark.proof
 def test_identify_frees_what_its_card_is_uncertain_of(fan: sp.Vehicle, held: Flight) -> None:
     fit = sp.identify(fan, measured(held))
     assert {e.name for e in fit.estimates} == {"k_vane", "drag", "fan_time", "damping"}

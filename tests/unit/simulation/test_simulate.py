@@ -98,6 +98,7 @@ def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> 
         assert apart.max() < 1e-11
 
 
+@pytest.mark.proof
 def test_a_batch_in_blocks_is_the_batch(coax: Vehicle) -> None:
     """More vehicles than a block holds, kept every tenth step, inputs of their own."""
     count = BLOCK + 3
