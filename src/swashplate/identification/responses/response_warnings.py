@@ -174,7 +174,7 @@ def bias_words(free: FrequencyResponse, direct: FrequencyResponse, biased: NDArr
                 apart = np.abs(np.log(direct.response[off, o, i] / free.response[off, o, i]))
                 words.append(
                     f"{output} / {name}: feedback biases the direct estimate by up to "
-                    f"{20 * np.log10(np.e) * np.nanmax(apart):.1f} dB at {_bands(free.omega, off)}; {given} is given."
+                    f"{20 / np.log(10.0) * np.nanmax(apart):.1f} dB at {_bands(free.omega, off)}; {given} is given."
                 )
     return words
 

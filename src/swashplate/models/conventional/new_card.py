@@ -77,10 +77,10 @@ def new_card(
         parameters[name] = replace(parameters[name], value=value, source="given", status="measured", sigma=None)
     for name, source in USUAL.items():
         parameters.setdefault(name, Parameter(float(ADDED[name][1]), UNITS[name], source, "assumed"))
-    for name, (option, value) in ADDED.items():
-        if isinstance(value, float):
+    for name, (option, stood) in ADDED.items():
+        if isinstance(stood, float):
             words = f"none fitted; option {option} takes it" if option else "none fitted"
-            parameters.setdefault(name, Parameter(value, UNITS[name], words, "assumed"))
+            parameters.setdefault(name, Parameter(stood, UNITS[name], words, "assumed"))
     trust = "Nothing yet: every number marked assumed is a guess. Measure them, and write how into source and status."
     parts = {name: value for name, value in patterns[0].options.items() if name not in _TABLES}
     options = {**parts, "rotation": rotation, "yaw_at_blades": True, "precession_torque": True}
