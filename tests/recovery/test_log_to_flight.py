@@ -28,6 +28,7 @@ def late(vehicle: Vehicle) -> Vehicle:
     return vehicle.with_card(replace(vehicle.card, observer={"nuisance": {"delay_servo": 0.034, "delay_motor": 0.062}}))
 
 
+@pytest.mark.proof
 def test_a_design_that_knows_its_delays_flies_and_one_that_does_not_is_lost() -> None:
     """The short form: few aircraft, few seconds; the second controller is the mutation."""
     coax = sp.vehicle("coax")

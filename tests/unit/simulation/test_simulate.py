@@ -42,7 +42,7 @@ def test_hover_stays_where_it_is(coax: Vehicle) -> None:
     assert np.max(np.abs(moved)) < 1e-9
 
 
-@pytest.mark.parametrize("interpolation", ["held", "linear"])
+@pytest.mark.parametrize("interpolation", ["held", pytest.param("linear", marks=pytest.mark.proof)])
 def test_the_fixed_step_converges_with_order_four(coax: Vehicle, interpolation: str) -> None:
     """Against Dormand-Prince of order 8: halving the step divides the error by 16.
 
@@ -82,7 +82,7 @@ def test_the_same_call_gives_the_same_bits(coax: Vehicle) -> None:
         simulate(coax, inputs, sensors=Sensors())
 
 
-@pytest.mark.parametrize("interpolation", ["held", "linear"])
+@pytest.mark.parametrize("interpolation", ["held", pytest.param("linear", marks=pytest.mark.proof)])
 def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> None:
     """To 1e-11 of each state's largest value, over two seconds and with other masses and starts."""
     inputs, masses, rolls = excited(coax, 201), np.array([0.302, 0.31, 0.333]), np.array([0.0, 0.1, -0.1])
