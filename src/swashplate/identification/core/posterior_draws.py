@@ -102,6 +102,35 @@ class Posterior:
                 "'laplace' stays usable.",
             )
 
+    def drawn(
+        self, low: Array, high: Array, *, count: int, seed: int, covariances: tuple[Array, Array] | None, where: str
+    ) -> Array:
+        """Some of the draws of the model's parameters, each once as long as there are enough, (count, parameters).
+
+        Args:
+            low, high: bounds of physics (parameters,); draws beyond them are left out.
+            count: how many. seed: of the choice.
+            covariances: at the optimum, plain and corrected for coloured residuals, which spreads the draws
+                (`adjusted`); None, or a corrected one that is not finite, takes them as they are.
+            where: whose posterior it is.
+
+        Raises:
+            IdentificationError: where they did not converge, or most of them lie beyond the bounds.
+        """
+        where = f"the posterior of {where}"
+        self.check(where=where)
+        values = self.values
+        if covariances is not None and np.all(np.isfinite(covariances[1])):
+            values = adjusted(values, *covariances)
+        kept = values[np.all((values >= low) & (values <= high), axis=1)]
+        if 2 * len(kept) < len(values):
+            raise IdentificationError(
+                f"only {len(kept)} of {len(values)} draws lie within the bounds of physics.",
+                where=where,
+                hint="The fit knows too little; fix parameters or add data.",
+            )
+        return np.asarray(kept[np.random.default_rng(seed).choice(len(kept), count, replace=count > len(kept))])
+
     def tree(self) -> xr.DataTree:
         """The draws as ArviZ lays them out: groups `posterior`, `sample_stats` and, for NUTS, `diagnostics`."""
         chains, count = self.draws.shape[:2]

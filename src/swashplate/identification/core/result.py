@@ -17,7 +17,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Compared, Comparison
 from swashplate.identification.core.draws import normal_within
-from swashplate.identification.core.posterior_draws import Posterior, adjusted
+from swashplate.identification.core.posterior_draws import Posterior
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
@@ -270,30 +270,13 @@ class Result(Shown, Generic[Model, Details]):
             raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
         low, high = bounds_of(self.solution if within is None else within, self.names)
         if self.posterior is not None and self.posterior.method != "laplace":
-            found = self._of_posterior(low, high, count, seed=seed, corrected=corrected)
-            drawn = {name: found[:, i] for i, name in enumerate(self.names)}
-            return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
-        mean = np.array([self[name].value for name in self.names])
-        found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
+            both = (self.covariance, self.covariance_corrected) if corrected else None
+            found = self.posterior.drawn(low, high, count=count, seed=seed, covariances=both, where=self.name)
+        else:
+            mean = np.array([self[name].value for name in self.names])
+            found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
         drawn = {name: found[:, i] for i, name in enumerate(self.names)}
         return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
-
-    def _of_posterior(self, low: Array, high: Array, count: int, *, seed: int, corrected: bool) -> Array:
-        """Some of the posterior's draws, each once as long as there are enough, (count, p)."""
-        assert self.posterior is not None
-        where = f"the posterior of {self.name}"
-        self.posterior.check(where=where)
-        values = self.posterior.values
-        if corrected and np.all(np.isfinite(self.covariance_corrected)):
-            values = adjusted(values, self.covariance, self.covariance_corrected)
-        kept = values[np.all((values >= low) & (values <= high), axis=1)]
-        if 2 * len(kept) < len(values):
-            raise IdentificationError(
-                f"only {len(kept)} of {len(values)} draws lie within the bounds of physics.",
-                where=where,
-                hint="The fit knows too little; fix parameters or add data.",
-            )
-        return kept[np.random.default_rng(seed).choice(len(kept), count, replace=count > len(kept))]
 
     def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:
         """Vehicles that the data cannot tell from the identified one (see `draw_values`, which it takes).

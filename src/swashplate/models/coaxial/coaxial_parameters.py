@@ -18,73 +18,6 @@ _OWN: Mapping[str, tuple[str, str]] = {
     "air_density": ("kg/m^3", "of the air that it is made for; it flies there where nobody says otherwise"),
     "gravity": ("m/s^2", "where it is made for: 9.81, or 3.71 on Mars"),
 }
-_TAKEN = (
-    "mass",
-    "inertia_xx",
-    "inertia_yy",
-    "inertia_zz",
-    "inertia_xz",
-    "rotor_radius",
-    "rotor_chord",
-    "rotor_blades",
-    "rotor_lift_slope",
-    "rotor_drag",
-    "rotor_drag_thrust",
-    "rotor_twist",
-    "rotor_speed",
-    "blade_inertia",
-    "hub_stiffness",
-    "hinge_offset",
-    "precone",
-    "hub_x",
-    "hub_y",
-    "wake_distortion",
-    "wake_distortion_fade",
-    "phase_lag",
-    "cyclic_phase",
-    "rotor_tip_loss",
-    "rotor_root_cutout",
-    "rotor_induced_factor",
-    "fuselage_area_x",
-    "fuselage_area_y",
-    "fuselage_area_z",
-    "fuselage_wake",
-    "engine_power",
-    "rotor_inertia",
-    "engine_time",
-    "governor_gain",
-    "governor_integral",
-    "servo_time",
-    "servo_delay",
-    "servo_speed",
-    "collective_low",
-    "collective_high",
-    "cyclic_limit",
-    "skid_length",
-    "skid_width",
-    "skid_depth",
-    "skid_stiffness",
-    "skid_damping",
-    "skid_friction",
-)
-"""What a single rotor has too, with the same name and meaning; of the blades and hubs, it holds for both rotors."""
-
-UNITS: Mapping[str, str] = {
-    **{name: SINGLE_UNITS[name] for name in _TAKEN},
-    **{name: unit for name, (unit, _) in _OWN.items()},
-}
-"""Every parameter and its unit, in the order of the equations' tuple."""
-MEANING: Mapping[str, str] = {
-    **{name: SINGLE_MEANING[name] for name in _TAKEN},
-    **{name: text for name, (_, text) in _OWN.items()},
-}
-"""What each parameter is, and what to measure or assume."""
-POSITIVE = (*(n for n in SINGLE_POSITIVE if n in UNITS), "differential_limit", "air_density", "gravity")
-NOT_NEGATIVE = tuple(name for name in SINGLE_NOT_NEGATIVE if name in UNITS)
-ANGLES = (*(n for n in SINGLE_ANGLES if n in UNITS and n != "cyclic_phase"), "differential_limit")
-
-CoaxialParameters = NamedTuple("CoaxialParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
-
 _ROTOR = (
     "rotor_radius",
     "rotor_chord",
@@ -108,6 +41,54 @@ _ROTOR = (
     "rotor_root_cutout",
     "rotor_induced_factor",
 )
+"""Of the blades and hubs: the same for both rotors."""
+_TAKEN = (
+    "mass",
+    "inertia_xx",
+    "inertia_yy",
+    "inertia_zz",
+    "inertia_xz",
+    *_ROTOR,
+    "fuselage_area_x",
+    "fuselage_area_y",
+    "fuselage_area_z",
+    "fuselage_wake",
+    "engine_power",
+    "rotor_inertia",
+    "engine_time",
+    "governor_gain",
+    "governor_integral",
+    "servo_time",
+    "servo_delay",
+    "servo_speed",
+    "collective_low",
+    "collective_high",
+    "cyclic_limit",
+    "skid_length",
+    "skid_width",
+    "skid_depth",
+    "skid_stiffness",
+    "skid_damping",
+    "skid_friction",
+)
+"""What a single rotor has too, with the same name and meaning."""
+
+UNITS: Mapping[str, str] = {
+    **{name: SINGLE_UNITS[name] for name in _TAKEN},
+    **{name: unit for name, (unit, _) in _OWN.items()},
+}
+"""Every parameter and its unit, in the order of the equations' tuple."""
+MEANING: Mapping[str, str] = {
+    **{name: SINGLE_MEANING[name] for name in _TAKEN},
+    **{name: text for name, (_, text) in _OWN.items()},
+}
+"""What each parameter is, and what to measure or assume."""
+POSITIVE = (*(n for n in SINGLE_POSITIVE if n in UNITS), "differential_limit", "air_density", "gravity")
+NOT_NEGATIVE = tuple(name for name in SINGLE_NOT_NEGATIVE if name in UNITS)
+ANGLES = (*(n for n in SINGLE_ANGLES if n in UNITS and n != "cyclic_phase"), "differential_limit")
+
+CoaxialParameters = NamedTuple("CoaxialParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
+
 OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, "hub_height", "shaft_tilt")])  # type: ignore[misc]
 """The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,13 +18,14 @@ from swashplate.api.campaigns import worker
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings
 from swashplate.api.campaigns.kinds import monte_carlo as of_flights
 from swashplate.api.campaigns.kinds.fleet import FLEET
-from swashplate.api.campaigns.kinds.multi_start import MULTI_START, optima
+from swashplate.api.campaigns.kinds.multi_start import MULTI_START, optima, start_values
 from swashplate.api.campaigns.kinds.recovery import RECOVERY, judged
 from swashplate.api.campaigns.shares import quantile, share_interval
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
 from swashplate.control.draws.spread import Limits
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight, stream
+from swashplate.models.catalogue import from_card
 
 
 def found(of: str, table: Columns, **settings: object) -> CampaignFindings:
@@ -231,3 +233,11 @@ def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) ->
         rows[made.of] = made.rows
     assert rows == {"monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1}
     assert set(rows) == set(CAMPAIGNS), "every kind is shown"
+
+
+def test_a_number_that_is_zero_starts_about_it_by_its_own_spread() -> None:
+    coax = sp.vehicle("coax")
+    named = replace(coax.card.parameters["gyroscopic"], value=0.0, sigma=0.01)
+    known = from_card(replace(coax.card, parameters={**coax.card.parameters, "gyroscopic": named}))
+    starts = [start_values(known, ("gyroscopic",), factor=3.0, seed=seed)[0] for seed in range(20)]
+    assert 0.01 < max(np.abs(starts)) <= 0.03

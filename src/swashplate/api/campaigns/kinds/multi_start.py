@@ -3,60 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from swashplate.api.campaigns.flown import (
-    free_of,
-    identified,
+from swashplate.api.campaigns.fitting import (
+    Attempt,
+    FitCampaign,
     outcome_columns,
+    spreads_of,
     started,
     values_of,
-    vehicle_of,
     within_bounds,
 )
-from swashplate.api.campaigns.kind import CampaignFindings, CampaignSettings, NamedFile, in_batches
+from swashplate.api.campaigns.flown import vehicle_of
+from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
 from swashplate.arrays import Array
-from swashplate.errors import CampaignError, SwashError
+from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.result import Result
-from swashplate.identification.identify import identify
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.vehicle import Vehicle
 
 _SHOWN = 6
 
 
-class MultiStartCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """The file of a campaign of starts.
+class MultiStartCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """The file of a campaign of starts, about the vehicle's numbers.
 
     Attributes:
-        vehicle: a name or a file: the equations, and the numbers in the middle of the starts.
         flights: logs to fit to. responses: or measured responses (.nc) instead, for a state-space model.
         condition: False takes the logs as they are, at one rate already. rate: otherwise, samples per second [Hz].
-        free, method, outputs, ties, wind, biases: as of `sp.identify`.
+        biases: as of `sp.identify`.
         factor: each free number starts at its value times or divided by up to this; one that is zero, within plus and
             minus `factor` times its standard deviation or one.
         same: costs that differ by no more are of one optimum, in units of the cost.
     """
 
-    vehicle: str
     flights: list[str] = msgspec.field(default_factory=list)
     responses: str | None = None
     condition: bool = True
     rate: float = 100.0
-    free: str | list[str] | None = None
-    method: str | None = None
-    outputs: list[str] | None = None
-    ties: list[str] = msgspec.field(default_factory=list)
     biases: list[str] = msgspec.field(default_factory=list)
-    wind: bool = False
     factor: float = 3.0
     same: float = 0.1
 
@@ -81,28 +75,23 @@ class MultiStartKind:
 
     def run(self, settings: MultiStartCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
         model, data = self._read(settings, files)
-        names = free_of(model, settings.free, ties=settings.ties)
-        starts: list[Array] = []
-        fits: list[Result[Any, Any] | str] = []
-        for row in range(portion.count):
-            starts.append(start_values(model, names, factor=settings.factor, seed=seed_of(portion.seed, row)))
-            try:
-                fits.append(fitted(settings, started(model, names, starts[-1]), data))
-            except SwashError as error:
-                fits.append(str(error))
-        found = outcome_columns(fits)
+        names = settings.free_of(model)
+        seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
+        starts = [start_values(model, names, factor=settings.factor, seed=seed) for seed in seeds]
+        attempts = [Attempt.at(partial(_fitted, settings, started(model, names, begin), data)) for begin in starts]
+        found = outcome_columns(attempts)
         for k, name in enumerate(names):
             found[f"start.{name}"] = np.array([start[k] for start in starts])
-            found[name] = np.array([np.nan if isinstance(fit, str) else fit[name].value for fit in fits])
+            found[name] = np.array([attempt.estimate(name)[0] for attempt in attempts])
         return found
 
     def replay(
         self, settings: MultiStartCampaign, portion: Portion, files: Mapping[str, Path], row: int
     ) -> Result[Any, Any]:
         model, data = self._read(settings, files)
-        names = free_of(model, settings.free, ties=settings.ties)
+        names = settings.free_of(model)
         begin = start_values(model, names, factor=settings.factor, seed=seed_of(portion.seed, row))
-        return fitted(settings, started(model, names, begin), data)
+        return _fitted(settings, started(model, names, begin), data)
 
     def findings(self, settings: MultiStartCampaign, table: Columns) -> CampaignFindings:
         if not {"cost", "usable"} <= table.keys():
@@ -144,27 +133,18 @@ class MultiStartKind:
         return model, tuple(raw)
 
 
-def fitted(
+def _fitted(
     settings: MultiStartCampaign, begin: Vehicle, data: tuple[Flight, ...] | FrequencyResponse
 ) -> Result[Any, Any]:
-    """One fit, from one start."""
-    return identify(
-        identified(begin),
-        data,
-        free=None if begin.structure is not None else settings.free,
-        method=settings.method,
-        outputs=settings.outputs,
-        ties=settings.ties,
-        wind=settings.wind,
-        biases=settings.biases,
-    )
+    return settings.fitted(begin, data, biases=settings.biases)
 
 
 def start_values(model: Vehicle, names: Sequence[str], *, factor: float, seed: int) -> Array:
     """Where a fit starts: each number off by a factor that is evenly spread in its logarithm, within its bounds."""
     random = np.random.default_rng(seed)
     middle, spread = values_of(model, names), random.uniform(-1.0, 1.0, len(names))
-    return within_bounds(model, names, np.where(middle == 0.0, factor * spread, middle * factor**spread))
+    about = factor * spread * spreads_of(model, names)
+    return within_bounds(model, names, np.where(middle == 0.0, about, middle * factor**spread))
 
 
 def optima(cost: Array, *, same: float) -> list[list[int]]:

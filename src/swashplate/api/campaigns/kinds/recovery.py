@@ -3,65 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
+from scipy.stats import norm
 
-from swashplate.api.campaigns.flown import (
-    free_of,
-    gusts_of,
-    identified,
+from swashplate.api.campaigns.fitting import (
+    Attempt,
+    FitCampaign,
     outcome_columns,
     started,
     values_of,
-    vehicle_of,
     within_bounds,
 )
-from swashplate.api.campaigns.kind import CampaignFindings, CampaignSettings, NamedFile, in_batches
+from swashplate.api.campaigns.flown import gusts_of, vehicle_of
+from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import SURE, share_interval, share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
 from swashplate.api.fly_maneuver import holding
-from swashplate.errors import CampaignError, SwashError
+from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
 from swashplate.identification.core.result import Result
-from swashplate.identification.identify import identify
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import simulate_maneuver
 from swashplate.simulation.sensors import QUIET, Sensors, observe
 from swashplate.simulation.wind import dryden
 
-_NORMAL = 1.959963984540054
+_NORMAL = float(norm.ppf(0.5 * (1.0 + SURE)))
 """Standard deviations that hold 95 % of a normal distribution."""
 
 
-class RecoveryCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """The file of a campaign of recoveries.
+class RecoveryCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """The file of a campaign of recoveries: its vehicle is the truth.
 
     Attributes:
-        vehicle: the truth, a name or a file. controller: its file; the hold of the vehicle's kind where not given.
+        controller: its file; the hold of the vehicle's kind where not given.
         maneuver: as of `swash simulate`. rate: samples per second [Hz].
         gusts: {indoor = SIGMA} or {outdoor = MEAN} [m/s].
         sensors: "clean" (motion capture with noise only) or "real" (with gaps and outliers).
         noise: instead of these, standard deviations of white noise by channel, for any model.
-        free, method, outputs, ties, wind: as of `sp.identify`.
-        start: each free number starts off the truth by up to this share of it.
+        start: each free number starts off the truth by up to this share of it; one that is zero starts there.
     """
 
-    vehicle: str
     maneuver: str
     controller: str | None = None
     rate: float = 100.0
     gusts: dict[str, float] = msgspec.field(default_factory=dict)
     sensors: Literal["clean", "real"] = "clean"
     noise: dict[str, float] = msgspec.field(default_factory=dict)
-    free: str | list[str] | None = None
-    method: str | None = None
-    outputs: list[str] | None = None
-    ties: list[str] = msgspec.field(default_factory=list)
-    wind: bool = False
     start: float = 0.2
 
 
@@ -84,19 +77,13 @@ class RecoveryKind:
 
     def run(self, settings: RecoveryCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
         truth = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
-        names = free_of(truth, settings.free, ties=settings.ties)
+        names = settings.free_of(truth)
         exact = values_of(truth, names)
-        fits: list[Result[Any, Any] | str] = []
-        for row in range(portion.count):
-            try:
-                fits.append(self._fitted(settings, truth, names, files, seed_of(portion.seed, row)))
-            except SwashError as error:
-                fits.append(str(error))
-        found = outcome_columns(fits)
+        seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
+        attempts = [Attempt.at(partial(self._fitted, settings, truth, names, files, seed)) for seed in seeds]
+        found = outcome_columns(attempts)
         for name, true in zip(names, exact, strict=True):
-            every = [None if isinstance(fit, str) else fit[name] for fit in fits]
-            value = np.array([np.nan if e is None else e.value for e in every])
-            sigma = np.array([np.nan if e is None else e.best_sigma for e in every])
+            value, sigma = np.array([attempt.estimate(name) for attempt in attempts]).T
             with np.errstate(divide="ignore", invalid="ignore"):
                 found |= {name: value, f"{name}.sigma": sigma, f"{name}.off": (value - true) / sigma}
         return found
@@ -105,7 +92,7 @@ class RecoveryKind:
         self, settings: RecoveryCampaign, portion: Portion, files: Mapping[str, Path], row: int
     ) -> Result[Any, Any]:
         truth = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
-        names = free_of(truth, settings.free, ties=settings.ties)
+        names = settings.free_of(truth)
         return self._fitted(settings, truth, names, files, seed_of(portion.seed, row))
 
     def findings(self, settings: RecoveryCampaign, table: Columns) -> CampaignFindings:
@@ -141,15 +128,7 @@ class RecoveryKind:
         flight = flown(settings, truth, None if settings.controller is None else files[settings.controller], seed)
         off = np.random.default_rng([seed, 1]).uniform(-settings.start, settings.start, len(names))
         begin = started(truth, names, within_bounds(truth, names, values_of(truth, names) * (1.0 + off)))
-        return identify(
-            identified(begin),
-            flight,
-            free=None if truth.structure is not None else settings.free,
-            method=settings.method,
-            outputs=settings.outputs,
-            ties=settings.ties,
-            wind=settings.wind,
-        )
+        return settings.fitted(begin, flight)
 
 
 def judged(inside: int, of: int) -> str:
