@@ -266,7 +266,9 @@ def track(
         time, samples = stream_of(renamed, e.channels)
         usual = _rate(time, source)
         wanted = [name for name in dict.fromkeys((*held, *own)) if name in e.channels]
-        found.append(tracked(_plan(e, rate or usual, band, spacing, memory, wanted), time, samples, every=every))
+        plan = _plan(e, rate or usual, band, spacing, memory, wanted)
+        units = {name: str(renamed[name].attrs.get("units", "")) for name in e.channels}
+        found.append(tracked(plan, time, samples, every=every, units=units))
     return Tracking(source, simulated, tuple(found), notes)
 
 

@@ -107,7 +107,7 @@ def track(
         typer.echo(repr(found))
         for note in code.notes if code is not None else ():
             typer.echo(f"\n{note}")
-        files = [*map(str, written), *([f"{out / 'report.html'}"] if out is not None else [])]
+        files = [*map(str, written), *([str(out / name) for name in Tracking.files] if out is not None else [])]
         if files:
             typer.echo(f"\nWritten: {', '.join(files)}")
     flying.end_with(found.problems)

@@ -112,14 +112,15 @@ def regression_equation(text: str, *, delays: Mapping[str, float] | None = None)
     )
 
 
-def coefficient_unit(equation: RegressionEquation, name: str) -> str:
-    """The unit of a coefficient, from those of its channels; "" where one of them is unknown."""
-    left = channel(equation.left).unit
+def coefficient_unit(equation: RegressionEquation, name: str, units: Mapping[str, str]) -> str:
+    """The unit of a coefficient, by the schema's units of its channels or else `units`; "" where none is known."""
+    left = channel(equation.left).unit or units.get(equation.left, "")
     if equation.derivative and left:
         left = _PER_SECOND.get(left, f"({left})/s")
     if name == BIAS:
         return left
-    right = channel(equation.regressors[name]).unit
+    other = equation.regressors[name]
+    right = channel(other).unit or units.get(other, "")
     return "" if not (left and right) else left if right == "1" else f"({left})/({right})"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,7 +83,9 @@ def stream_of(flight: Flight, channels: Sequence[str]) -> tuple[Array, Array]:
     return time, np.column_stack(columns)
 
 
-def tracked(plan: RegressionPlan, time: Array, samples: Array, *, every: float = 0.2) -> Tracked:
+def tracked(
+    plan: RegressionPlan, time: Array, samples: Array, *, every: float = 0.2, units: Mapping[str, str] | None = None
+) -> Tracked:
     """Run a recursive regression along a stream.
 
     Args:
@@ -91,9 +93,10 @@ def tracked(plan: RegressionPlan, time: Array, samples: Array, *, every: float =
         time: stamps as they come [s], (n,).
         samples: of the equation's channels, (n, channels).
         every: between looks at the estimate [s].
+        units: of channels that the schema does not know.
     """
     e, regression = plan.equation, RecursiveRegression(plan)
-    units = tuple(coefficient_unit(e, name) for name in e.names)
+    coefficients = tuple(coefficient_unit(e, name, units or {}) for name in e.names)
 
     def step(elapsed: float, k: int) -> str | None:
         return None if regression.step(elapsed, samples[k]) else regression.frozen
@@ -105,7 +108,7 @@ def tracked(plan: RegressionPlan, time: Array, samples: Array, *, every: float =
             f"{100.0 * (1.0 - final.determination):.0f} % of the left side's power is left over: gusts this strong, or "
             "a term that is missing, bias the coefficients, and fewer than nine in ten lie within two standard errors."
         )
-    return Tracked(e.text, e.names, units, plan, *found, notes=tuple(notes))
+    return Tracked(e.text, e.names, coefficients, plan, *found, notes=tuple(notes))
 
 
 def tracked_parameters(plan: SlowPlan, time: Array, inputs: Array, readings: Array, *, every: float = 0.2) -> Tracked:

@@ -8,7 +8,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.errors import IdentificationError
-from swashplate.identification.recursive.equation import regression_equation
+from swashplate.identification.recursive.equation import coefficient_unit, regression_equation
 from swashplate.identification.recursive.model_equations import model_equations
 
 
@@ -61,3 +61,11 @@ def test_hidden_states_leave_their_equations_out(tmp_path: Path) -> None:
     found, left_out = model_equations(model, ("p", "q", "lateral", "longitudinal"))
     assert not found
     assert any("is not in the stream" in words for words in left_out)
+
+
+def test_units_of_the_log_stand_where_the_schema_knows_none() -> None:
+    equation = regression_equation("p_dot = La*A1 + Lx*mystery + bias")
+    units = {"A1": "rad"}
+    assert coefficient_unit(equation, "La", units) == "(rad/s^2)/(rad)"
+    assert coefficient_unit(equation, "Lx", units) == ""
+    assert coefficient_unit(equation, "bias", units) == "rad/s^2"
