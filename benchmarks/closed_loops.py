@@ -7,11 +7,13 @@ import time
 
 import numpy as np
 
-from benchmarks.timing import Span
+from benchmarks.timing import Result, Span, best_rate
 from swashplate.control.draws.robustness import SENSOR_NOISE
 from swashplate.control.draws.spread import spread
 from swashplate.control.draws.variations import draw_numbers
 from swashplate.control.laws.autopilot import autopilot
+from swashplate.control.lqg.design import design
+from swashplate.filtering.sensor_suite import suite
 from swashplate.models.catalogue import vehicle as load_vehicle
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
@@ -68,3 +70,20 @@ def flights(*, count: int, one_by_one: int = 5) -> Span:
     single = (time.perf_counter() - begin) / one_by_one
     note = f"{single * count / seconds:.1f} times faster than one after the other; peak of the process {peak:.2f} GB"
     return Span(f"{count} closed-loop flights of 20 s", seconds, WITHIN * count / OF, note, kept=peak < MEMORY)
+
+
+def observers(*, count: int, repeats: int) -> Result:
+    """Samples of closed loops whose filter finds its gains as it flies: readings, estimates, commands, five steps."""
+    coax = load_vehicle("coax")
+    controller = design(coax, sensors=suite("imu@100,mocap@100+10ms"))
+    seconds: list[float] = []
+
+    def run() -> None:
+        begin = time.process_time()
+        simulate_closed_loops(coax, controller, duration=SECONDS, size=count, rate=PHYSICS, keep=5)
+        seconds.append(time.process_time() - begin)
+
+    samples = round(SECONDS * controller.rate) * count
+    rate = best_rate(run, samples, repeats=repeats)
+    note = f"samples at {controller.rate:g} Hz, all cores; {1e6 * min(seconds) / samples:.0f} us of processor time each"
+    return Result(f"{count} closed loops with a full observer", rate, None, note)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
-from swashplate.export.compiler import shared_library
+from swashplate.compiler import shared_library
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.models.catalogue import vehicle as load_vehicle

@@ -36,13 +36,15 @@ def measure(*, short: bool) -> list[Result]:
         export.step("coax", steps=100_000 * scale, repeats=repeats),
         export.step("raptor50", steps=20_000 * scale, repeats=repeats, bar=True, inflow="pitt-peters"),
         export.environments(steps=100 * scale, repeats=repeats),
-        many.batch("float64", steps=50 * scale, repeats=repeats),
-        many.batch("float32", steps=50 * scale, repeats=repeats),
+        *many.batches("coax", "float64", steps=50 * scale, repeats=repeats),
+        *many.batches("coax", "float32", steps=50 * scale, repeats=repeats),
+        *many.batches("raptor50", "float64", steps=20 * scale, repeats=repeats, promised=False),
         helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),
         helicopter.speeds(repeats=repeats),
         helicopter.lpv(steps=1_000 * scale, repeats=repeats),
         *rotor_options(steps=20_000 * scale, repeats=repeats),
         *link.measure(short=short),
+        *([] if short else [closed_loops.observers(count=128, repeats=2)]),
     ]
     jsbsim, scan = results[0], results[1]
     results[0] = replace(jsbsim, note=f"{jsbsim.note}; the scan is {scan.rate / jsbsim.rate:.1f} times faster")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.export.compiler import shared_library
+from swashplate.compiler import shared_library
 from swashplate.export.model_c import ModelCode
 
 FLY = """#include "NAME.h"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from swashplate.export.stepping_c import CompiledEngine, can_compile
+from swashplate.compiled import can_compile
+from swashplate.export.stepping_c import CompiledEngine
 from swashplate.links.ardupilot.session import ArduPilotSession
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown

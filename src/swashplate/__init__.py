@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
     from swashplate.api.plot_logs import plot_logs
+    from swashplate.api.simulate_batch import simulate_batch
     from swashplate.api.stitch import stitch
     from swashplate.api.structures import show_structure, structures
     from swashplate.api.track import recursive_estimator, track
@@ -217,6 +218,7 @@ __all__ = [
     "show_structure",
     "simulate",
     "simulate_adaptive",
+    "simulate_batch",
     "simulate_bench",
     "simulate_closed_loop",
     "simulate_lpv",

@@ -173,11 +173,17 @@ def test_two_logs_lie_over_each_other_and_are_aligned(browser: Any, address: str
     assert visit.of(offsets) == [-2.5], "they begin together"
     box = visit.page.locator("#logs input[type=number]")
     box.fill("1")
-    box.press("Enter")
+    table(tmp_path / "three.csv", seed=5)
+    visit.drop(tmp_path / "three.csv")
+    drawn(visit, logs=3)
+    assert box.first.input_value() == "1", "what is typed stays while another log is read"
+    box.first.press("Enter")
     visit.until(f"{offsets}[0] === 1")
-    visit.page.click("text=Align by motion")
+    visit.page.locator("text=Align by motion").first.click()
     visit.until(f"Math.abs({offsets}[0] + 2.5) < 0.01")
     assert "correlation" in visit.text("#state")
+    visit.page.click("[aria-label='close three.csv']")
+    drawn(visit, logs=2)
     assert visit.of("document.querySelectorAll('.chart')[0].querySelectorAll('.key').length") == 4
     visit.close()
 

@@ -11,8 +11,9 @@ import pytest
 from commands import one_message, swash
 
 import swashplate as sp
+from swashplate import compiler
 from swashplate.control.controller_file import save_controller
-from swashplate.export import compiler, fmu
+from swashplate.export import fmu
 from swashplate.models.linear.state_space_file import structure, to_toml
 
 pytest.importorskip("casadi", reason="the extra 'export' is not installed")

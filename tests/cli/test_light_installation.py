@@ -6,9 +6,12 @@ import json
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
+from packaging.requirements import Requirement
 from test_frequency_verbs import log
 
 import swashplate as sp
@@ -44,6 +47,17 @@ try:
     flight.plot()
 except ImportError as error:
     assert "swashplate[plot]" in str(error)
+from pathlib import Path
+from swashplate.links.logs.app import logs_app
+from swashplate.links.logs.desk import Desk
+desk = Desk()
+try:
+    logs_app(desk)
+    opened = desk.open(Path(json.loads(sys.argv[2])[0][1]))
+    drawn = desk.traces([(opened.number, "p", 0.0, 60.0)], bins=200)
+    print(json.dumps(["open", opened.state, not len(drawn[0]["values"]), opened.problem]))
+finally:
+    desk.close()
 for name in ("trim", "identify", "simulate_bench"):
     try:
         getattr(sp, name)
@@ -95,11 +109,30 @@ def test_the_light_verbs_do_without_what_the_others_name(tmp_path: Path) -> None
         assert f" needs the library {wanted[0]}" in err, (verb, err)
         assert f"Install it with: pip install 'swashplate[{wanted[1]}]'" in err
     assert ran.returncode == 0, ran.stderr
-    late = told[len(light) + len(heavy) :]
+    assert told[len(light) + len(heavy)] == ["open", "ready", False, ""]
+    late = told[len(light) + len(heavy) + 1 :]
     assert [(name, kind) for name, kind, *_ in late] == [
         (name, "MissingLibraryError") for name in ("trim", "identify", "simulate_bench")
     ]
     assert all(COMMAND in words for *_, words in late)
+
+
+def test_a_log_with_attitude_is_inspected_without_what_is_slow_to_import(tmp_path: Path) -> None:
+    """Of a cold start SciPy's rotations took half a second, and dask, where it is installed, more than one."""
+    time = np.arange(3000) / 100.0
+    rows = np.column_stack([time, *(np.sin(time * rate) for rate in (0.3, 0.2, 0.1)), time, time, time])
+    head = "time [s],phi [rad],theta [rad],psi [rad],u [m/s],v [m/s],w [m/s]"
+    np.savetxt(tmp_path / "turned.csv", rows, delimiter=",", header=head, comments="")
+    code = (
+        "import sys\nfrom typer.testing import CliRunner\nfrom swashplate.cli.app import app\n"
+        "print([CliRunner().invoke(app, ['inspect', name]).exit_code for name in sys.argv[1:]])\n"
+        "print([name for name in ('scipy', 'dask.base', 'jax', 'matplotlib', 'plotly') if name in sys.modules])\n"
+        "import swashplate.flights.spectrum, dask.base\n"
+        "print([name for name in ('scipy', 'dask.base') if name in sys.modules])"
+    )
+    words = [sys.executable, "-c", code, log(tmp_path / "flown.csv", seed=1), str(tmp_path / "turned.csv")]
+    ran = subprocess.run(words, capture_output=True, text=True, check=True, timeout=300)
+    assert ran.stdout.splitlines() == ["[0, 0]", "[]", "['scipy', 'dask.base']"]
 
 
 def test_what_does_import_jax_would_be_noticed() -> None:
@@ -117,6 +150,34 @@ def test_the_extras_that_messages_name_are_the_projects() -> None:
     assert not set(_plain(project["dependencies"])) & set(EXTRA_OF)
     (every,) = extras["all"]
     assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all"})
+
+
+def _brought_by(requirements: list[str]) -> set[str]:
+    """Names of all distributions that these requirements bring with them here, extras left out."""
+    found: set[str] = set()
+    open_ = [Requirement(line).name for line in requirements]
+    while open_:
+        name = open_.pop().lower().replace("_", "-")
+        if name not in found:
+            found.add(name)
+            wants = map(Requirement, metadata.requires(name) or ())
+            open_ += [want.name for want in wants if want.marker is None or want.marker.evaluate({"extra": ""})]
+    return found
+
+
+def _megabytes(names: set[str]) -> float:
+    """What the files of distributions take on the disk by their own records; compiled Python has none."""
+    return sum(file.size or 0 for name in names for file in metadata.files(name) or ()) / 1e6
+
+
+def test_the_plain_package_brings_less_than_350_megabytes() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    plain = _brought_by(project["dependencies"])
+    assert {"numpy", "scipy", "pandas", "xarray"} <= plain
+    assert not {"jax", "jaxlib", "matplotlib", "dask", "casadi"} & plain
+    own = sum(path.stat().st_size for path in (ROOT / "src").rglob("*") if path.suffix != ".pyc" and path.is_file())
+    assert 200.0 < _megabytes(plain) + own / 1e6 < 350.0
+    assert _megabytes(plain | _brought_by(["jax", "matplotlib"])) > 350.0, "it can say no"
 
 
 def _plain(requirements: list[str]) -> list[str]:

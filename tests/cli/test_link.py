@@ -31,7 +31,9 @@ IDLE = [1500, 1500, 1500, 1500, 1000, 1000]
         (["ardupilot", "--vehicle", "coax", "--record", "flight.txt"], "expected .nc or .csv"),
         (["ardupilot", "--vehicle", "coax", "--record", "nowhere/flight.nc"], "the folder does not exist"),
         (["ardupilot", "--vehicle", "coax", "--voltage", "-1"], "expected 0 to 1000"),
-        (["px4", "--vehicle", "helion"], "no servo mapping 'helion_px4'"),
+        (["px4", "--vehicle", "lynx"], "no servo mapping 'lynx_px4'"),
+        (["px4", "--vehicle", "x8"], "a multirotor's motors have no servo mapping"),
+        (["ardupilot", "--vehicle", "crazyflie"], "Fly it with `swash live`"),
     ],
 )
 def test_what_is_refused(arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

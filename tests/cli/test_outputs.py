@@ -173,7 +173,7 @@ def test_identify_writes_four_files_and_ends_with_its_summary(work: Work, simula
     assert sp.vehicle(out / "model.toml").card.values()["tau_f_upper"] == 1.3
     assert json.loads((out / "fit.json").read_text())["estimates"][0]["sigma_corrected"] is None  # NaN is not JSON
     last = outcome.out.rstrip().splitlines()[-6:]
-    assert [line.split(":")[0] for line in last] == ["What", "Fit", "Prediction", "Verdict", "Beware", "Report"]
+    assert [line.split(":")[0] for line in last] == ["What", "Fit", "Prediction", "Verdict", "Warnings", "Report"]
     assert "81" in last[2]
     assert "35" in last[2]
     assert "cannot be judged: yaw" in last[3]

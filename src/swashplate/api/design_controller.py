@@ -88,7 +88,7 @@ class ControllerDesign(Shown):
         lines = [f"{'LQG' if plan.sensors else 'LQR'} of {vehicle.called}, {plan.rate:g} Hz, {plan.n} states"]
         if plan.period:
             told += f"; constant gains, a cycle of {plan.period}"
-        lines += [f"told: {told}", f"late: {self.late}"]
+        lines += [f"sensors: {told}", f"late: {self.late}"]
         waits = ", ".join(f"{name} {d}" for name, d in zip(vehicle.input_names, plan.delays, strict=True) if d)
         if waits:
             lines.append(f"in whole samples: {waits}")

@@ -277,7 +277,8 @@ def _plant(
 
 def link_engine(notice: Say) -> MakeEngine:
     """The vehicle's own C where this machine can compile it, which is quicker; XLA elsewhere."""
-    from swashplate.export.stepping_c import CompiledEngine, can_compile
+    from swashplate.compiled import can_compile
+    from swashplate.export.stepping_c import CompiledEngine
 
     def make(moved: Vehicle, environment: Environment) -> SteppingEngine:
         if can_compile():

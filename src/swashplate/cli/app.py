@@ -90,9 +90,9 @@ app.command("live", short_help="Fly a model in the browser, in real time.")(live
 app.command("replay", short_help="Look at a logged flight beside a model's prediction, or film it.")(replay.replay)
 app.command("decouple", short_help="Design the decoupling controller of a coaxial helicopter.")(decouple.decouple)
 app.command("inspect", short_help="Show what is in a log and what is wrong with it.")(inspect.inspect)
-app.command("plot", short_help="Draw logs over time or frequency, several over each other.")(plot.plot)
+app.command("plot", short_help="Draw logs over time or frequency, also several over each other.")(plot.plot)
 app.command("rotor-speed", short_help="Measure rotor speed from vibration in a log.")(rotor_speed.rotor_speed)
-app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and take them out.")(
+app.command("reconstruct", short_help="Find biases and scale factors of a flight's sensors, and remove them.")(
     reconstruct.reconstruct
 )
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)

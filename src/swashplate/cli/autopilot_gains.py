@@ -22,7 +22,7 @@ class AutopilotChoice(StrEnum):
 def gains(
     model: shared.Model,
     autopilot: Annotated[
-        AutopilotChoice, typer.Option("--autopilot", help="Whose law and parameter names.")
+        AutopilotChoice, typer.Option("--autopilot", help="Autopilot whose law and parameter names are used.")
     ] = AutopilotChoice.ARDUPILOT,
     servos: Annotated[
         str | None,
@@ -31,10 +31,14 @@ def gains(
     delay: Delay = None,
     notch: Annotated[
         str | None,
-        typer.Option("--notch", metavar="HZ,WIDTH", help="Notch of the gyros, and its double [Hz] (ArduPilot)."),
+        typer.Option(
+            "--notch",
+            metavar="HZ,WIDTH",
+            help="Notch filter of the gyros, and of twice its frequency [Hz] (ArduPilot).",
+        ),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option("--rate", help="Of the loops [Hz]: 400, or 250 for PX4.", min=50.0)
+        float | None, typer.Option("--rate", help="Rate of the loops [Hz]; 400 by default, or 250 for PX4.", min=50.0)
     ] = None,
     parameters: Annotated[
         Path | None,
@@ -56,9 +60,9 @@ def gains(
 ) -> None:
     """Gains of rate, attitude, height and place loops for a vehicle under ArduPilot or PX4.
 
-    They keep 6 dB, 45 degrees and a sensitivity below two at every loop with all others closed: rotors, bar, delays and
-    filters are in it. Then the autopilot's law, rebuilt, flies STABILIZE, ALT_HOLD and LOITER on the nonlinear model.
-    Exit code 2 where no gains hold, or those of --parameters do not.
+    Every loop keeps 6 dB, 45 degrees and a sensitivity below two with all others closed, with rotors, bar, delays
+    and filters. Then a copy of the autopilot's law flies STABILIZE, ALT_HOLD and LOITER on the nonlinear model.
+    Exit code 2 if no gains keep the margins, or if those of --parameters do not.
     """
     suffix = ".parm" if autopilot is AutopilotChoice.ARDUPILOT else ".params"
     shared.check_suffixes((out, suffix, "--out"), (controller, ".toml", "--controller"))

@@ -106,7 +106,7 @@ def plan(
     vehicle: _Vehicle = "coax",
     only: _Only = None,
     accuracy: Annotated[
-        float, typer.Option("--accuracy", help="Wanted standard deviation over value.", min=1e-5, max=1.0)
+        float, typer.Option("--accuracy", help="Required relative standard deviation.", min=1e-5, max=1.0)
     ] = 0.01,
     json: options.Json = False,
 ) -> None:
@@ -139,7 +139,7 @@ def simulate(
     vehicle: _Vehicle = "coax",
     only: _Only = None,
     repeats: Annotated[int, typer.Option("--repeats", help="Passes through the points of each record.", min=1)] = 1,
-    seed: Annotated[int, typer.Option("--seed", help="Of noise, bias, drift and vibration.", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of noise, bias, drift and vibration.", min=0)] = 0,
     quiet: options.Quiet = False,
 ) -> None:
     """Make the records of the virtual bench: the vehicle held still, by the equations of flight."""

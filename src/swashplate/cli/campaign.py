@@ -14,18 +14,20 @@ if TYPE_CHECKING:
     from swashplate.api.campaigns.results import Campaign
 
 app = typer.Typer(
-    help="Many flights, fits or logs, as a TOML file says, on every core of one machine or of many, kept in a folder. "
-    "Killed at any moment, a campaign goes on where it was.",
+    help="Compute many flights, fits or logs from a TOML file, on every core of one machine or of several, "
+    "into a folder. If a campaign is stopped, it continues where it was.",
     rich_markup_mode=None,
     no_args_is_help=True,
 )
-Store = Annotated[Path, typer.Argument(metavar="FOLDER", help="Of the campaign.")]
+Store = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the campaign.")]
 Workers = Annotated[
     int | None, typer.Option("--workers", help="Processes on this machine, one core each; by default all cores.", min=1)
 ]
 Scheduler = Annotated[
     str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://host:8786, whose workers are taken."),
+    typer.Option(
+        "--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler, tcp://host:8786, whose workers are used."
+    ),
 ]
 Engine = Annotated[
     str | None,
@@ -33,23 +35,25 @@ Engine = Annotated[
 ]
 
 
-@app.command("run", short_help="Compute a campaign, or what is left of it.")
+@app.command("run", short_help="Compute a campaign, or continue one.")
 def run(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The campaign: a TOML file (docs/howto/campaigns.md).")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Where results are kept.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Folder for the results.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say cost and size only: two tasks are done.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only print cost and size: two tasks are computed.")
+    ] = False,
     accept_changes: Annotated[
-        bool, typer.Option("--accept-changes", help="Go on though the file or the program has changed.")
+        bool, typer.Option("--accept-changes", help="Continue although the file or the program has changed.")
     ] = False,
     engine: Engine = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Compute a campaign into a folder. The same command, or `swash campaign resume`, goes on with what is left of one.
+    """Compute a campaign into a folder. The same command, or `swash campaign resume`, continues one that was stopped.
 
-    Exit code 2 where tasks were given up; the others are there.
+    Exit code 2 if tasks failed; the results of the others are kept.
     """
     import swashplate as sp
     from swashplate.cli.console import as_json, progress
@@ -67,17 +71,17 @@ def run(
     _show(found, json=json, quiet=quiet)
 
 
-@app.command("resume", short_help="Go on with a campaign where it was.")
+@app.command("resume", short_help="Continue a campaign where it stopped.")
 def resume(
     folder: Store,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try tasks again that were given up.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try failed tasks again.")] = False,
     engine: Engine = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Go on with a campaign from its folder alone, with as many workers as you like, wherever they are."""
+    """Continue a campaign from its folder, with any number of workers on any machine."""
     import swashplate as sp
     from swashplate.cli.console import progress
 
@@ -87,15 +91,15 @@ def resume(
     _show(found, json=json, quiet=quiet)
 
 
-@app.command("status", short_help="How far a campaign is, and what it has found so far.")
+@app.command("status", short_help="Show the progress and the results so far of a campaign.")
 def status(folder: Store, json: options.Json = False) -> None:
-    """How far a campaign is, who is at work, and what it has found so far; also while it is computed."""
+    """Show the progress, the workers and the results so far of a campaign, also while it runs."""
     import swashplate as sp
 
     _show(sp.campaign_results(folder), json=json, quiet=False, judged=False)
 
 
-@app.command("report", short_help="Write what a campaign has found as a page or a table.")
+@app.command("report", short_help="Write the results of a campaign as a page or a table.")
 def report(
     folder: Store,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="A page (.html), or the table: .nc, .csv.")],
@@ -110,14 +114,14 @@ def report(
         typer.echo(f"Written: {written}")
 
 
-@app.command("replay", short_help="Compute one row of a campaign again, whole.")
+@app.command("replay", short_help="Compute one row of a campaign again.")
 def replay(
     folder: Store,
-    number: Annotated[int, typer.Argument(metavar="NUMBER", help="Of the row, as the report has it.", min=0)],
+    number: Annotated[int, typer.Argument(metavar="NUMBER", help="Number of the row in the report.", min=0)],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="A flight as .nc, a fit as .json.")],
     quiet: options.Quiet = False,
 ) -> None:
-    """The worst flight of a thousand, as a flight to look at: its task is done again as a worker does it."""
+    """Compute one row again and save it, for example the worst flight of a thousand. Its whole task is repeated."""
     import swashplate as sp
     from swashplate.cli.console import doing
 

@@ -21,7 +21,8 @@ def compare(
         typer.Option("--flight", metavar="LOG", help="Fly the models along this flight instead. May be repeated."),
     ] = None,
     outputs: Annotated[
-        str | None, typer.Option("--outputs", metavar="NAME,NAME", help="Channels along the flight; else all.")
+        str | None,
+        typer.Option("--outputs", metavar="NAME,NAME", help="Channels of the flight to compare; all by default."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.html", help="A page with figures.")] = None,
     rate: options.Rate = 100.0,
@@ -34,7 +35,7 @@ def compare(
 ) -> None:
     """Put cases side by side, each against the first: frequency responses, fits (parameters, modes) or models (modes).
 
-    With --flight the models follow the recorded inputs, and the fit of every output is told.
+    With --flight the models are simulated with the recorded inputs, and the fit of every output is printed.
     """
     import swashplate as sp
     from swashplate.cli.console import as_json

@@ -41,11 +41,13 @@ Altitude = Annotated[
 ]
 Mass = Annotated[float | None, typer.Option("--mass", help="Mass instead of the card's [kg].")]
 Set = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Another number of the card; may be repeated.")
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Change a number of the card; may be repeated.")
 ]
 Switch = Annotated[
     list[str] | None,
-    typer.Option("--option", metavar="NAME=VALUE", help="Another option of the card, e.g. bar=true; may be repeated."),
+    typer.Option(
+        "--option", metavar="NAME=VALUE", help="Change an option of the card, e.g. bar=true; may be repeated."
+    ),
 ]
 
 

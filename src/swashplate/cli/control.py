@@ -12,12 +12,12 @@ from swashplate.cli import controller_options as shared
 from swashplate.cli.lateness import Delay, delays_from
 
 app = typer.Typer(
-    help="Model-based controllers with an observer, and what sensors can see.",
+    help="Model-based controllers with an observer, and what sensors can observe.",
     rich_markup_mode=None,
     no_args_is_help=True,
 )
 app.command("check", short_help="Margins, handling qualities and steps of a controller.")(control_check.check)
-app.command("observability", short_help="What sensors can see of a vehicle, and what they cannot.")(
+app.command("observability", short_help="Which states of a vehicle sensors can observe, and which not.")(
     observability.observability
 )
 app.command("gains", short_help="Gains of ArduPilot or PX4 for a vehicle, with margins.")(autopilot_gains.gains)
@@ -33,7 +33,7 @@ def design(
     model: shared.Model,
     method: Annotated[
         shared.DesignMethod,
-        typer.Option("--method", help="With an observer on sensors (lqg), or fed with the states (lqr)."),
+        typer.Option("--method", help="With an observer on sensors (lqg), or with the true states (lqr)."),
     ] = shared.DesignMethod.LQG,
     sensors: shared.Sensors = shared.USUAL_SENSORS,
     holding: Annotated[
@@ -46,7 +46,7 @@ def design(
     computation: Annotated[
         float | None,
         typer.Option(
-            "--computation", metavar="MS", help="From a reading to its command [ms]; a sample is left if not given."
+            "--computation", metavar="MS", help="Time from a reading to its command [ms]; one sample by default."
         ),
     ] = None,
     allow: Annotated[
@@ -65,7 +65,7 @@ def design(
     ] = None,
     gain: Annotated[
         shared.ObserverGain,
-        typer.Option("--gain", help="Of the observer: found as it flies, or constant (a small processor)."),
+        typer.Option("--gain", help="Gain of the observer: computed in flight, or constant (for a small processor)."),
     ] = shared.ObserverGain.FLYING,
     voltage: shared.Voltage = None,
     switched: given.Switch = None,

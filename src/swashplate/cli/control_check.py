@@ -36,33 +36,39 @@ def check(
         HandlingTask, typer.Option("--task", help="Which boundaries of ADS-33E: target tracking, or all other tasks.")
     ] = HandlingTask.OTHER,
     response: Annotated[
-        Response, typer.Option("--response", help="What a steady command gives: it says which bandwidth counts.")
+        Response,
+        typer.Option(
+            "--response", help="Type of the response to a steady command; it determines which bandwidth counts."
+        ),
     ] = Response.AUTO,
     scale: Annotated[
         float | None,
-        typer.Option("--scale", help="Times that the vehicle is smaller than a full-size one; 1 scales nothing."),
+        typer.Option("--scale", help="Ratio of the size of a full-size helicopter to the vehicle's; 1 for no scaling."),
     ] = None,
     speed: Annotated[float, typer.Option("--speed", help="Speed ahead of the steady flight [m/s].")] = 0.0,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage [V].")] = None,
     delay: Delay = None,
     computation: Annotated[
-        float | None, typer.Option("--computation", metavar="MS", help="From a reading to its command [ms].", min=0.0)
+        float | None,
+        typer.Option("--computation", metavar="MS", help="Time from a reading to its command [ms].", min=0.0),
     ] = None,
     delay_margin: Annotated[
         float | None,
         typer.Option(
             "--delay-margin",
             metavar="MS",
-            help="Further delay that the loops must stand [ms]; a sample and the computation if not given.",
+            help="Additional delay that the loops must tolerate [ms]; by default a sample and the computation.",
             min=0.0,
         ),
     ] = None,
-    duration: Annotated[float, typer.Option("--duration", help="Of each step [s].", min=5.0, max=300.0)] = 20.0,
+    duration: Annotated[
+        float, typer.Option("--duration", help="Duration of each step [s].", min=5.0, max=300.0)
+    ] = 20.0,
     gusts: Annotated[
         str,
         typer.Option(
             "--gusts",
-            help="Turbulence to hold against: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s].",
+            help="Turbulence: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s].",
         ),
     ] = "indoor",
     json: options.Json = False,
@@ -70,7 +76,7 @@ def check(
 ) -> None:
     """Judge a controller on a model: margins, disturbance rejection, handling qualities, steps, coupling, gusts.
 
-    Exit code 2 where the loop does not stand; what could be found is written and marked.
+    Exit code 2 if the loop is unstable; everything that could be computed is written and marked.
     """
     if scale is not None and not scale > 0.0:
         raise SwashError(f"is {scale:g}, expected a positive number.", channel="--scale", hint="Full size is 1.")

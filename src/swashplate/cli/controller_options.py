@@ -50,7 +50,7 @@ Rate = Annotated[float, typer.Option("--rate", help="Steps of the controller per
 Code = Annotated[
     Path | None, typer.Option("--c", metavar="FILE", help="Write one step of it as C99 (needs the extra 'export').")
 ]
-CPrecision = Annotated[Precision, typer.Option("--precision", help="Of the C.")]
+CPrecision = Annotated[Precision, typer.Option("--precision", help="Number type of the C code.")]
 
 
 USUAL_SENSORS = "imu@100,mocap@100+10ms"

@@ -8,9 +8,7 @@ import typer
 
 from swashplate.cli import options
 
-app = typer.Typer(
-    help="Public data sets by name: which there are, and getting them.", rich_markup_mode=None, no_args_is_help=True
-)
+app = typer.Typer(help="List and download public data sets.", rich_markup_mode=None, no_args_is_help=True)
 
 
 @app.command("list")
@@ -36,7 +34,7 @@ def fetch(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The data set, as in `swash data list`.")],
     quiet: options.Quiet = False,
 ) -> None:
-    """Download a data set from its public address into the user's cache, checked by hash; found files are not."""
+    """Download the missing files of a data set from its public address into the user's cache, checked by hash."""
     import swashplate as sp
     from swashplate.cli.console import progress
 

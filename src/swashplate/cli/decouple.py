@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _LAG = "Phase lag that makes the model's step straight (straight; by default in mode manual), the rotor's from the battery-compensated motor command (battery), the plain one (motor) or the hover's speed (hover), or a constant in degrees."  # fmt: skip # noqa: E501
 _STEP = "Fly this step of the pitch command for 6 m, with and without the decoupling."
-_DRIFT = "Seen on the step with this law [m to the right after 6 m]: take it out."
+_DRIFT = "Drift that a flown step with this law had [m to the right after 6 m]; the new law corrects it."
 _GUSTS = "With a step: fly drawn models, or without --fit this one, in gusts: none, indoor, indoor=SIGMA, or a mean wind outdoors [m/s]."  # fmt: skip # noqa: E501
 _SENSORS = "Fly on estimates from these, e.g. imu@100,mocap@50+20ms, not on measurements."
 
@@ -31,7 +31,7 @@ def decouple(
         typer.Option("--mixing", help="Form of the equations to invert; the model's own by default."),
     ] = None,
     speed_terms: Annotated[
-        bool, typer.Option("--speed-terms/--no-speed-terms", help="Cancel what speed does across the motion.")
+        bool, typer.Option("--speed-terms/--no-speed-terms", help="Cancel the effect of speed across the motion.")
     ] = True,
     mode: Annotated[
         shared.AutopilotMode, typer.Option("--mode", help="What the servos hold besides a pilot's commands.")
@@ -56,8 +56,8 @@ def decouple(
     ] = None,
     drift: Annotated[float | None, typer.Option("--drift", help=_DRIFT)] = None,
     gusts: Annotated[str, typer.Option("--gusts", help=_GUSTS)] = "none",
-    draws: Annotated[int, typer.Option("--draws", help="How many of them.", min=2)] = 500,
-    seed: Annotated[int, typer.Option("--seed", help="Of the draws.", min=0)] = 0,
+    draws: Annotated[int, typer.Option("--draws", help="Number of drawn models.", min=2)] = 500,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the draws.", min=0)] = 0,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:

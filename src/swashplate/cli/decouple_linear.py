@@ -19,19 +19,20 @@ def decouple(
     ],
     pair: Annotated[
         list[str] | None,
-        typer.Option(
-            "--pair", metavar="INPUT=OUTPUT", help="Which input is to move which output; lateral=p and so on."
-        ),
+        typer.Option("--pair", metavar="INPUT=OUTPUT", help="The input that moves an output, for example lateral=p."),
     ] = None,
     frequency: Annotated[
-        float, typer.Option("--frequency", help="Where the matrix decouples best [rad/s].", min=1e-3)
+        float, typer.Option("--frequency", help="Frequency at which the matrix decouples best [rad/s].", min=1e-3)
     ] = 3.0,
-    bandwidth: Annotated[float, typer.Option("--bandwidth", help="Of the filter's axes [rad/s].", min=1e-3)] = 10.0,
+    bandwidth: Annotated[
+        float, typer.Option("--bandwidth", help="Bandwidth of the filter's axes [rad/s].", min=1e-3)
+    ] = 10.0,
     keep: Annotated[
-        str | None, typer.Option("--keep", metavar="STATE,...", help="States of the filter's copy; the fast ones.")
+        str | None,
+        typer.Option("--keep", metavar="STATE,...", help="States of the filter's copy; the fast ones by default."),
     ] = None,
     at: Annotated[str, typer.Option("--at", metavar="W,...", help="Frequencies of the table [rad/s].")] = "1,3,10,20",
-    speed: Annotated[float, typer.Option("--speed", help="Of a vehicle's steady flight [m/s].")] = 0.0,
+    speed: Annotated[float, typer.Option("--speed", help="Speed of a vehicle's steady flight [m/s].")] = 0.0,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="Matrix and filter (.json).")] = None,
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE", help="The coupling and steps as HTML.")
@@ -41,8 +42,8 @@ def decouple(
 ) -> None:
     """Decouple the axes of a linear model: by a constant matrix, and by a filter that copies its fast states.
 
-    The table is the off-axis over the on-axis response against frequency, without, with the matrix, with the filter.
-    Exit code 2 where the filter would not come to rest; the matrix is told and written all the same.
+    The table has the ratio of off-axis to on-axis response over frequency: without, with the matrix, and with the
+    filter. Exit code 2 if the filter would be unstable; the matrix is still printed and written.
     """
     shared.check_suffixes((out, ".json", "--out"), (report, ".html", "--report"))
     frequencies = options.numbers(at, option="--at")

@@ -12,8 +12,10 @@ from swashplate.cli import options
 
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path("demo"),
-    simulated: Annotated[bool, typer.Option("--simulated", help="Simulated flights even where real ones are.")] = False,
-    seed: Annotated[int, typer.Option("--seed", help="Of the simulated flights' noise.", min=0)] = 1,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="Use simulated flights even if real ones are available.")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the simulated flights' noise.", min=0)] = 1,
     quiet: options.Quiet = False,
 ) -> None:
     """Run the main job: identify the CoaX from one flight and predict another, with a report.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @given.flown
 def derivatives(
     asked: given.Conditions,
-    imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as Bhandari et al. have them.")] = False,
+    imperial: Annotated[bool, typer.Option("--imperial", help="In feet, as in Bhandari et al.")] = False,
     primed: Annotated[
         bool,
         typer.Option("--primed", help="Roll and yaw rows mixed by the product of inertia, as most published tables."),
@@ -27,17 +27,21 @@ def derivatives(
     published: Annotated[
         Path | None,
         typer.Option(
-            "--published", metavar="FILE.csv", help="Beside a report's: name,value[,unit], or A and B as a matrix."
+            "--published", metavar="FILE.csv", help="Compare with a report: name,value[,unit], or A and B as a matrix."
         ),
     ] = None,
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Also 5 % and 95 % bounds from the tolerances on the card.")
     ] = False,
-    draws: Annotated[int, typer.Option("--draws", help="Samples of the card for that.", min=10, max=100_000)] = 200,
-    seed: Annotated[int, typer.Option("--seed", help="Of the samples.", min=0)] = 0,
+    draws: Annotated[
+        int, typer.Option("--draws", help="Number of samples of the card for --uncertainty.", min=10, max=100_000)
+    ] = 200,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the samples.", min=0)] = 0,
     left_out: Annotated[
         bool,
-        typer.Option("--left-out", help="Instead: what leaving out each one changes, those that matter least first."),
+        typer.Option(
+            "--left-out", help="Show instead what changes when each one is left out, the least important first."
+        ),
     ] = False,
     plot: given.Page = None,
     json: options.Json = False,

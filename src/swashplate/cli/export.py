@@ -55,16 +55,14 @@ def export(
             "--speed", metavar="V", help="Speed ahead [m/s] of the flight that it starts from; hover if not given."
         ),
     ] = None,
-    precision: Annotated[
-        CodePrecision, typer.Option("--precision", help="Of the numbers in C.")
-    ] = CodePrecision.DOUBLE,
+    precision: Annotated[CodePrecision, typer.Option("--precision", help="Number type in C.")] = CodePrecision.DOUBLE,
     name: Annotated[
         str | None,
-        typer.Option("--name", help="What files and C functions begin with; the model's own name if not given."),
+        typer.Option("--name", help="Prefix of files and C functions; by default the model's name."),
     ] = None,
     delays: Annotated[
         bool | None,
-        typer.Option("--delays/--no-delays", help="Take along a model's identified input delays, as is usual, or not."),
+        typer.Option("--delays/--no-delays", help="Include the model's identified input delays, or leave them out."),
     ] = None,
     mass: given.Mass = None,
     changed: given.Set = None,

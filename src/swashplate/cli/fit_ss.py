@@ -20,7 +20,7 @@ def fit_ss(
     ],
     responses: flying.ResponsesLast = None,
     search: Annotated[
-        bool, typer.Option("--search", help="Try structures, drop the hopeless early, pick one and say why.")
+        bool, typer.Option("--search", help="Try structures, drop the worst early, choose one and say why.")
     ] = False,
     out: options.OutFolder = None,
     start: flying.Start = None,
@@ -36,9 +36,11 @@ def fit_ss(
     band: flying.BandsOption = None,
     without: flying.Without = None,
     coherence: flying.Coherence = 0.6,
-    reduce: Annotated[bool, typer.Option("--reduce", help="Take out what the responses do not tell.")] = False,
-    starts: Annotated[int, typer.Option("--starts", help="Starting points that are followed.", min=1)] = 4,
-    seed: Annotated[int, typer.Option("--seed", help="Of the starting points.", min=0)] = 0,
+    reduce: Annotated[
+        bool, typer.Option("--reduce", help="Remove parameters that the responses do not determine.")
+    ] = False,
+    starts: Annotated[int, typer.Option("--starts", help="Number of starting points.", min=1)] = 4,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the starting points.", min=0)] = 0,
     gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,

@@ -13,11 +13,14 @@ def fit_tf(
     responses: flying.Responses,
     input: Annotated[str, typer.Option("--input", help="The input channel.")],
     outputs: Annotated[
-        str | None, typer.Option("--outputs", help="Output channels with shared poles; all where not given.")
+        str | None, typer.Option("--outputs", help="Output channels with shared poles; all by default.")
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--form", help='Zeros/poles: "1/2", "0/1+1s" (integrator), "0/0" (gain and delay); else tried.'),
+        typer.Option(
+            "--form",
+            help='Zeros/poles: "1/2", "0/1+1s" (integrator), "0/0" (gain and delay); by default the usual forms.',
+        ),
     ] = None,
     fix: Annotated[
         list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter, for example tau=0.05.")
@@ -27,7 +30,7 @@ def fit_tf(
     loop: Annotated[
         bool,
         typer.Option(
-            "--margins", help="Margins, the responses taken as broken loops; bandwidth and phase delay of the attitude."
+            "--margins", help="Margins of the responses as open loops; bandwidth and phase delay of the attitude."
         ),
     ] = False,
     gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,

@@ -23,13 +23,13 @@ def fit_time(
         str | None,
         typer.Option("--outputs", help="Channels to fit, separated by commas; all of the model's by default."),
     ] = None,
-    biases: Annotated[
-        str | None, typer.Option("--biases", help="Outputs with a constant of their own in each record.")
-    ] = None,
-    shifts: Annotated[bool, typer.Option("--shifts/--no-shifts", help="Constants in the states' rates.")] = True,
+    biases: Annotated[str | None, typer.Option("--biases", help="Outputs with a constant bias in each record.")] = None,
+    shifts: Annotated[
+        bool, typer.Option("--shifts/--no-shifts", help="Estimate constants in the states' rates.")
+    ] = True,
     start: flying.Start = None,
     fix: flying.Fix = None,
-    iterations: Annotated[int, typer.Option("--iterations", help="At most this many.", min=1)] = 80,
+    iterations: Annotated[int, typer.Option("--iterations", help="Largest number of iterations.", min=1)] = 80,
     horizon: options.HorizonAhead = None,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,

@@ -47,7 +47,7 @@ Rename = Annotated[
 ]
 Start = Annotated[list[str] | None, typer.Option("--start", metavar="NAME=VALUE", help="Start value of a parameter.")]
 Fix = Annotated[list[str] | None, typer.Option("--fix", metavar="NAME=VALUE", help="Hold a parameter at a value.")]
-Coherence = Annotated[float, typer.Option("--coherence", help="Least coherence that counts.", min=0.0, max=1.0)]
+Coherence = Annotated[float, typer.Option("--coherence", help="Smallest coherence that is used.", min=0.0, max=1.0)]
 
 
 def band(text: str | None, *, option: str = "--band") -> tuple[float, float] | None:

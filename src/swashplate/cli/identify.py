@@ -53,7 +53,7 @@ def identify(
             help="What is known beforehand: a card of the bench or of another flight, or one parameter; repeatable.",
         ),
     ] = None,
-    iterations: Annotated[int, typer.Option("--iterations", help="At most so many iterations.", min=1)] = 60,
+    iterations: Annotated[int, typer.Option("--iterations", help="Largest number of iterations.", min=1)] = 60,
     keep_unexcited: Annotated[
         bool, typer.Option("--keep-unexcited", help="Also fit parameters of axes that no flight moves independently.")
     ] = False,
@@ -64,8 +64,8 @@ def identify(
         bool,
         typer.Option(
             "--nested",
-            help="Fit the model with and without each part of its physics, and say which parts the flights ask for; "
-            "one fit per part.",
+            help="Fit the model with and without each part of its physics, and say which parts the flights "
+            "need; one fit per part.",
         ),
     ] = False,
     horizon: options.HorizonAhead = None,
@@ -74,8 +74,8 @@ def identify(
         typer.Option(
             "--posterior",
             metavar="laplace|nuts",
-            help="Draws of what the fit does not know, in posterior.nc (ArviZ reads it) and for Monte Carlo: laplace "
-            "(normal, free) or nuts (of the likelihood itself, minutes; extra 'posterior').",
+            help="Draw models from the fit's uncertainty, into posterior.nc (for ArviZ) and for Monte Carlo: "
+            "laplace (normal, fast) or nuts (from the likelihood, minutes; extra 'posterior').",
         ),
     ] = None,
     rate: options.Rate = 100.0,

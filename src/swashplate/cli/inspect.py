@@ -18,7 +18,7 @@ def inspect(
 ) -> None:
     """Show a log's channels, units, rates, gaps and frequency sweeps, and the problems in it; nothing is changed.
 
-    Of a record of the test bench it shows the columns and the procedures that it is for.
+    For a record of the test bench it shows the columns and the procedures.
 
     A log that is itself damaged (cut off, bytes lost, its clock set back) is shown as far as it could be read, and ends
     with an error.

@@ -36,10 +36,10 @@ Sag = Annotated[float, typer.Option("--sag", help="Fall of the voltage [V/s].", 
 SensorsOption = Annotated[
     InertialSensors, typer.Option("--sensors", help="Gyros and accelerometers without or with noise and bias.")
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Of the noise.", min=0)]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the noise.", min=0)]
 Record = Annotated[
     Path | None,
-    typer.Option("--record", metavar="FILE", help="Keep the true flights on disk while they are flown: .nc or .csv."),
+    typer.Option("--record", metavar="FILE", help="Save the true flights while they are flown: .nc or .csv."),
 ]
 RecordRate = Annotated[float, typer.Option("--record-rate", help="Samples per second kept.", min=1.0, max=2000.0)]
 IdleExit = Annotated[
@@ -92,8 +92,8 @@ def ardupilot(
 ) -> None:
     """Be the physics of ArduPilot's SITL (`arducopter-heli --model JSON:127.0.0.1`): lockstep over UDP.
 
-    The vehicle stands on the ground with its rotors stopped until the autopilot starts it, and stands there again when
-    the autopilot is restarted. Ctrl-C ends.
+    The vehicle stands on the ground with its rotors stopped until the autopilot starts it, and is there again when
+    the autopilot is restarted. Ctrl-C ends the program.
     """
     if check:
         where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)
@@ -158,7 +158,7 @@ def px4(
 ) -> None:
     """Be the simulator of PX4's SITL (`make px4_sitl none_iris` and the like): MAVLink HIL in lockstep over TCP.
 
-    Needs the extra `link`. The vehicle stands on the ground whenever PX4 connects. Ctrl-C ends.
+    Needs the extra `link`. The vehicle is on the ground whenever PX4 connects. Ctrl-C ends the program.
     """
     if check:
         where = given.conditions(vehicle, speed="0", wind=wind, altitude=altitude, changed=changed, switched=switched)

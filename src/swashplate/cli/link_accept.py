@@ -20,34 +20,40 @@ def accept(
     vehicle: options.VehicleName,
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", metavar="FOLDER", help="For report, log and what it printed; a new folder."),
+        typer.Option(
+            "--out", "-o", metavar="FOLDER", help="New folder for the report, the log and the binary's output."
+        ),
     ],
     servos: Annotated[
         str | None,
         typer.Option("--servos", metavar="NAME|FILE", help="Servo mapping; by default the one of the vehicle's name."),
     ] = None,
     truth: Annotated[
-        str | None, typer.Option("--truth", metavar="MODEL", help="Hold the estimates against another vehicle or card.")
+        str | None, typer.Option("--truth", metavar="MODEL", help="Compare the estimates with another vehicle or card.")
     ] = None,
     axes: Annotated[
         str, typer.Option("--axes", metavar="NAME,NAME", help="Axes that are swept: roll, pitch, yaw, heave.")
     ] = "roll,pitch,yaw,heave",
-    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Of the sweeps [Hz].")] = "0.4-8",
-    seconds: Annotated[float, typer.Option("--seconds", help="Of each sweep.", min=10.0, max=255.0)] = 40.0,
+    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Band of the sweeps [Hz].")] = "0.4-8",
+    seconds: Annotated[float, typer.Option("--seconds", help="Seconds of each sweep.", min=10.0, max=255.0)] = 40.0,
     hover: Annotated[float, typer.Option("--hover", help="Seconds in each mode.", min=1.0, max=600.0)] = 10.0,
-    height: Annotated[float, typer.Option("--height", help="Of the hover [m].", min=1.0, max=50.0)] = 5.0,
+    height: Annotated[float, typer.Option("--height", help="Height of the hover [m].", min=1.0, max=50.0)] = 5.0,
     ekf: Annotated[
-        float, typer.Option("--ekf", help="Simulated seconds until it must let itself be armed.", min=1.0, max=3600.0)
+        float,
+        typer.Option("--ekf", help="Simulated seconds within which it must be ready to arm.", min=1.0, max=3600.0),
     ] = 120.0,
     defaults: Annotated[
         list[Path] | None,
-        typer.Option("--defaults", metavar="FILE", help="A parameter file of yours, read last. May be repeated."),
+        typer.Option("--defaults", metavar="FILE", help="An additional parameter file, read last. May be repeated."),
     ] = None,
     instance: Annotated[
-        int, typer.Option("--instance", "-I", help="Of SITL: adds 10 times this to every port.", min=0, max=99)
+        int,
+        typer.Option(
+            "--instance", "-I", help="Instance of SITL: adds 10 times this number to every port.", min=0, max=99
+        ),
     ] = 0,
     speedup: Annotated[
-        float, typer.Option("--speedup", help="Most simulated seconds a second.", min=0.1, max=100.0)
+        float, typer.Option("--speedup", help="Largest number of simulated seconds per second.", min=0.1, max=100.0)
     ] = 10.0,
     timeout: Annotated[
         float, typer.Option("--timeout", help="Seconds until the binary answers.", min=0.5, max=600.0)
@@ -59,11 +65,11 @@ def accept(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Start a SITL binary with a vehicle's files, fly it from a cold start, and put truth beside what its log says.
+    """Start a SITL binary with a vehicle's files, fly it from a cold start, and compare its log with the truth.
 
     It waits for the EKF, arms, hovers in STABILIZE, ALT_HOLD and LOITER, sweeps each axis in System ID mode, lands, and
-    takes the log through respond, fit-tf and fit-ss. Every line has a verdict; one that fails makes exit code 2. Needs
-    the extra `link`. The binary is ended whatever happens.
+    takes the log through respond, fit-tf and fit-ss. Every line has a verdict; the exit code is 2 if one fails. Needs
+    the extra `link`. The binary is ended in every case.
     """
     import swashplate as sp
     from swashplate.cli.console import as_json, progress

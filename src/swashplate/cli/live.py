@@ -29,7 +29,7 @@ def live(
         typer.Option(
             "--controller",
             metavar="FILE",
-            help="A controller's file: of `swash decouple` for all modes, any other to move its place.",
+            help="A controller's file: one of `swash decouple` for all modes, any other for the mode Position.",
         ),
     ] = None,
     out: Annotated[

@@ -42,17 +42,18 @@ def maneuver(
         typer.Option("--out", "-o", metavar="FILE", help="The series as .csv; without it the rules are checked only."),
     ] = None,
     rate: Annotated[
-        float, typer.Option("--rate", help="Of the series and of the log [Hz].", min=1.0, max=10000.0)
+        float, typer.Option("--rate", help="Rate of the series and of the log [Hz].", min=1.0, max=10000.0)
     ] = 100.0,
     noise: Annotated[
         float | None, typer.Option("--noise", help="Standard deviation of the output's noise, in its unit.", min=0.0)
     ] = None,
     gain: Annotated[
-        float | None, typer.Option("--gain", help="Output over input where it is weakest in the band.", min=0.0)
+        float | None, typer.Option("--gain", help="Smallest ratio of output to input in the band.", min=0.0)
     ] = None,
-    coherence: Annotated[float, typer.Option("--coherence", help="Wanted everywhere in the band.")] = 0.8,
+    coherence: Annotated[float, typer.Option("--coherence", help="Required coherence in the whole band.")] = 0.8,
     bandwidth: Annotated[
-        float | None, typer.Option("--bandwidth", help="Of the response, or of the mode of interest [Hz].")
+        float | None,
+        typer.Option("--bandwidth", help="Bandwidth of the response, or frequency of the mode of interest [Hz]."),
     ] = None,
     f180: Annotated[
         float | None, typer.Option("--f180", help="Frequency at which the response's phase is -180 deg [Hz].")
@@ -62,7 +63,7 @@ def maneuver(
     ] = False,
     sid_axis: Annotated[
         int | None,
-        typer.Option("--sid-axis", help="ArduPilot's SID_AXIS; without it the mixer, behind the rate controller."),
+        typer.Option("--sid-axis", help="ArduPilot's SID_AXIS; by default the mixer, after the rate controller."),
     ] = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
@@ -98,11 +99,11 @@ def maneuver(
             typer.echo(f"\nWritten: {', '.join(map(str, written))}")
 
 
-@app.command("design", short_help="The excitation that tells most of what is unknown, within limits.")
+@app.command("design", short_help="Design the excitation that determines unknown parameters best, within limits.")
 def design(
     for_: Annotated[str, typer.Option("--for", metavar="MODEL", help="A vehicle's name, or a card or model file.")],
     unknown: Annotated[
-        str, typer.Option("--unknown", metavar="NAMES", help="Parameters that the flight is to tell, by commas.")
+        str, typer.Option("--unknown", metavar="NAMES", help="Parameters to determine, separated by commas.")
     ],
     limits: Annotated[
         str,
@@ -118,17 +119,18 @@ def design(
         str | None, typer.Option("--axes", help="Of roll, pitch, yaw, heave, by commas; all that the vehicle has.")
     ] = None,
     criterion: Annotated[
-        str, typer.Option("--criterion", help="D (least volume of the errors) or A (least sum of squares).")
+        str, typer.Option("--criterion", help="D (minimum volume of the errors) or A (minimum sum of squares).")
     ] = "D",
     robust: Annotated[
-        str, typer.Option("--robust", help="average over draws of the prior, or for the worst of them.")
+        str,
+        typer.Option("--robust", help="Optimise for the average over draws of the prior, or for the worst of them."),
     ] = "average",
     spread: Annotated[
-        float, typer.Option("--spread", help="Share by which the unknowns may be off.", min=0.0, max=0.9)
+        float, typer.Option("--spread", help="Possible relative error of the unknown parameters.", min=0.0, max=0.9)
     ] = 0.3,
-    draws: Annotated[int, typer.Option("--draws", help="Draws of the prior.", min=1, max=100)] = 5,
-    rate: Annotated[float, typer.Option("--rate", help="Of the series and of the log [Hz].", min=20.0)] = 100.0,
-    seed: Annotated[int, typer.Option("--seed", help="Of the draws.")] = 0,
+    draws: Annotated[int, typer.Option("--draws", help="Number of draws of the prior.", min=1, max=100)] = 5,
+    rate: Annotated[float, typer.Option("--rate", help="Rate of the series and of the log [Hz].", min=20.0)] = 100.0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the draws.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="The series as .csv, the flight card beside it as .txt."),
@@ -136,10 +138,10 @@ def design(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Design a multisine for what is unknown, in the closed loop, and say what it buys beside a sweep and a 3-2-1-1.
+    """Design a multisine for unknown parameters, in the closed loop, and compare it with a sweep and a 3-2-1-1.
 
-    Prints the bounds that each would reach, what each second buys, and a flight card. Where nothing within the limits
-    tells all that is unknown: exit code 2, and what stands in the way.
+    Prints the expected bounds of each, how they improve with each second, and a flight card. If no maneuver within
+    the limits determines all parameters, the exit code is 2, and the reason is printed.
     """
     import swashplate as sp
     from swashplate.cli.console import as_json, console, progress

@@ -27,7 +27,7 @@ class Many:
 def many(
     monte_carlo: Annotated[
         int | None,
-        typer.Option("--monte-carlo", help="So many flights with sensor noise; --out keeps the worst.", min=2),
+        typer.Option("--monte-carlo", help="Number of flights with sensor noise; --out gets the worst flight.", min=2),
     ] = None,
     fit: Annotated[
         Path | None, typer.Option("--fit", metavar="FILE", help="With --monte-carlo: models drawn from this fit.json.")
@@ -50,21 +50,23 @@ def many(
         ),
     ] = None,
     payload: Annotated[
-        float, typer.Option("--payload", help="With --monte-carlo: up to so much mass more [kg].", min=0.0)
+        float, typer.Option("--payload", help="With --monte-carlo: largest added mass [kg].", min=0.0)
     ] = 0.0,
     delay: Annotated[
-        float, typer.Option("--delay", help="With --monte-carlo: commands later by up to [s].", min=0.0, max=1.0)
+        float,
+        typer.Option("--delay", help="With --monte-carlo: largest added delay of commands [s].", min=0.0, max=1.0),
     ] = 0.0,
     command_bits: Annotated[
         int | None,
-        typer.Option("--command-bits", help="With --monte-carlo: commands are told in so many bits.", min=4, max=24),
+        typer.Option("--command-bits", help="With --monte-carlo: number of bits of each command.", min=4, max=24),
     ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
             "--limit",
             metavar="NAME=VALUE",
-            help="With --monte-carlo: beyond it a flight is lost: lean=45deg, rate=360deg/s, place=2m, height=1m, "
+            help="With --monte-carlo: limit beyond which a flight counts as lost: lean=45deg, rate=360deg/s, "
+            "place=2m, height=1m,"
             "heading=45deg, or NAME=none; repeatable.",
         ),
     ] = None,

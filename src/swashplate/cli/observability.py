@@ -15,13 +15,13 @@ def observability(
     model: shared.Model,
     sensors: shared.Sensors = shared.USUAL_SENSORS,
     speed: given.Speed = "0",
-    seconds: Annotated[float, typer.Option("--seconds", help="How long is watched [s].", min=0.1)] = 10.0,
+    seconds: Annotated[float, typer.Option("--seconds", help="Length of the observation [s].", min=0.1)] = 10.0,
     rate: Annotated[float, typer.Option("--rate", help="Samples per second of the model [Hz].", min=1.0)] = 100.0,
     voltage: shared.Voltage = None,
     switched: given.Switch = None,
     json: options.Json = False,
 ) -> None:
-    """Say which directions of a vehicle's states a sensor suite cannot see, and how well the others are known."""
+    """Show which directions of a vehicle's states a sensor suite cannot observe, and how well the others are known."""
     import swashplate as sp
     from swashplate.cli.console import doing
 

@@ -25,7 +25,7 @@ def open_(
     open_page: live.Open = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Look at logs in the browser: plots, findings and their remedies, events, spectra, track, sweeps to gains.
+    """Look at logs in the browser: plots, problems and their corrections, events, spectra, track, sweeps to gains.
 
     Every view says which command and which lines of Python do the same.
     """

@@ -18,26 +18,28 @@ _THEMES = ("paper", "light", "dark")
 def plot(
     logs: Annotated[list[str], typer.Argument(metavar="LOG...", help="Logs, or windows of them (FILE@5-30).")],
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE", help="Where to: .pdf, .svg, .png, or .html to zoom in.")
+        Path, typer.Option("--out", "-o", metavar="FILE", help="File to write: .pdf, .svg, .png, or .html to zoom in.")
     ] = Path("plot.html"),
     channels: Annotated[
         str | None,
-        typer.Option("--channels", metavar="NAME,NAME", help="Which, one panel each; else the usual ones."),
+        typer.Option(
+            "--channels", metavar="NAME,NAME", help="Channels to draw, one panel each; the usual ones by default."
+        ),
     ] = None,
     spectrum: Annotated[bool, typer.Option("--spectrum", help="Power spectral density instead (Welch).")] = False,
     spectrogram: Annotated[bool, typer.Option("--spectrogram", help="Power over time and frequency instead.")] = False,
     align: Annotated[
-        str, typer.Option("--align", metavar="HOW", help=f"Several logs on one clock: {', '.join(_ALIGNMENTS)}.")
+        str, typer.Option("--align", metavar="HOW", help=f"How to align several logs: {', '.join(_ALIGNMENTS)}.")
     ] = "auto",
     theme: Annotated[
-        str, typer.Option("--theme", metavar="NAME", help=f"Of a still figure: {', '.join(_THEMES)}.")
+        str, typer.Option("--theme", metavar="NAME", help=f"Colours of a .pdf, .svg or .png: {', '.join(_THEMES)}.")
     ] = "paper",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a log's channels as they were recorded; several logs lie over each other, aligned in time."""
+    """Draw a log's channels as they were recorded; several logs are drawn over each other, aligned in time."""
     from swashplate.api.plot_logs import plot_logs
     from swashplate.cli.reading import read
 

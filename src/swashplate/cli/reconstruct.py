@@ -24,9 +24,9 @@ def reconstruct(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Hold measured rates and accelerations against attitude and position: biases, scale factors, delays, lever arm.
+    """Compare measured rates and accelerations with attitude and position: biases, scale factors, delays, lever arm.
 
-    Each estimate has its bound. What is significant (three standard errors) is taken out of the flight in --out.
+    Each estimate has its bound. Significant errors (three standard errors) are removed from the flight in --out.
     """
     from swashplate.cli.console import as_json
     from swashplate.cli.reading import conditioned

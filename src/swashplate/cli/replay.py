@@ -21,12 +21,12 @@ def replay(
         str | None,
         typer.Option(
             "--model",
-            help="A model file or a vehicle's name: its prediction flies along.",
+            help="A model file or a vehicle's name: its prediction is shown too.",
             autocompletion=options._vehicle_names,
         ),
     ] = None,
     ahead: Annotated[
-        float, typer.Option("--ahead", help="Seconds after which the prediction starts anew.", min=0.1, max=60.0)
+        float, typer.Option("--ahead", help="Seconds after which the prediction starts again.", min=0.1, max=60.0)
     ] = 2.0,
     hold_missing: Annotated[
         bool,

@@ -35,7 +35,7 @@ def respond(
         str | None, typer.Option("--windows", help="Window lengths in s, separated by commas; by the book's rules.")
     ] = None,
     direct: Annotated[
-        bool, typer.Option("--direct", help="The direct estimate: sweeps found in the inputs are no references.")
+        bool, typer.Option("--direct", help="Direct estimate only: do not use sweeps in the inputs as references.")
     ] = False,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,

@@ -24,7 +24,9 @@ def rotor_speed(
             "counter-clockwise. The strongest line, as omega_rotor, if not given.",
         ),
     ] = None,
-    per_turn: Annotated[float, typer.Option("--per-turn", help="Vibrations per turn that the line is.")] = 1.0,
+    per_turn: Annotated[
+        float, typer.Option("--per-turn", help="Number of vibrations per turn that cause the line.")
+    ] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the flight with the speeds (netCDF).")] = None,
     mapping: options.Mapping = None,
     unit: options.Units = None,

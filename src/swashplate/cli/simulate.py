@@ -29,18 +29,18 @@ def simulate(
     maneuver: Annotated[
         str, typer.Option("--maneuver", help='For example "sweep:pitch,0.5-8Hz,60s" or "doublet:roll,0.5s,0.2".')
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The flight: .nc (nothing lost) or .csv.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The flight: .nc (complete) or .csv.")],
     sensors: Annotated[
         SensorSet,
         typer.Option("--sensors", help="The true states, motion capture with noise only, or with gaps and outliers."),
     ] = SensorSet.NONE,
-    seed: Annotated[int, typer.Option("--seed", help="Of all that is random.", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)] = 0,
     voltage: Annotated[float | None, typer.Option("--voltage", help="Battery voltage at the start [V].")] = None,
     sag: Annotated[float, typer.Option("--sag", help="Fall of the voltage [V/s].")] = 0.0,
     wind: Annotated[
         str, typer.Option("--wind", metavar="N,E,D", help="Wind towards north, east and down [m/s].")
     ] = "0,0,0",
-    speed: Annotated[float, typer.Option("--speed", help="Speed ahead that the maneuver begins at [m/s].")] = 0.0,
+    speed: Annotated[float, typer.Option("--speed", help="Forward speed at the start of the maneuver [m/s].")] = 0.0,
     switched: given.Switch = None,
     controller: Annotated[
         Path | None,
@@ -48,7 +48,7 @@ def simulate(
     ] = None,
     pilot: Annotated[
         bool,
-        typer.Option("--pilot", help="Roll and pitch are a pilot's commands to the controller."),
+        typer.Option("--pilot", help="Roll and pitch of the maneuver are a pilot's commands to the controller."),
     ] = False,
     many: Many = Many(None, {}, ()),  # noqa: B008
     rate: options.Rate = 100.0,

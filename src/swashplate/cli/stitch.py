@@ -22,17 +22,19 @@ def stitch(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="The model to write.")],
     trim: Annotated[
         list[str] | None,
-        typer.Option("--trim", metavar="LOG", help="Flight whose means are a point's trim; one a point, in order."),
+        typer.Option(
+            "--trim", metavar="LOG", help="Flight whose mean values are a point's trim; one for each point, in order."
+        ),
     ] = None,
     gradients: Annotated[
         Gradients | None,
         typer.Option(
             "--gradients",
-            help="How trims change with speed: as the points' derivatives say, or by differences of the trims; the "
-            "default for identified points.",
+            help="How trims change with speed: from the points' derivatives, or from differences of the trims "
+            "(default for identified points).",
         ),
     ] = None,
-    title: Annotated[str, typer.Option("--title", help="What the model is.")] = "",
+    title: Annotated[str, typer.Option("--title", help="Title of the model.")] = "",
     mapping: options.Mapping = None,
     unit: options.Units = None,
     drop_bad_stamps: options.BadStamps = False,

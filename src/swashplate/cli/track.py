@@ -21,31 +21,41 @@ def track(
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option("--model", help="A linear model, its rows in place of --equation; or a vehicle, with --unknown."),
+        typer.Option("--model", help="A linear model whose rows replace --equation; or a vehicle, with --unknown."),
     ] = None,
     out: options.OutFolder = None,
     rate: Annotated[
         float | None, typer.Option("--rate", help="Samples a second [Hz]; the log's own if not given.", min=1.0)
     ] = None,
-    band: Annotated[str, typer.Option("--band", metavar="LOW-HIGH", help="Frequencies looked at [Hz].")] = "0.1-2.5",
+    band: Annotated[
+        str, typer.Option("--band", metavar="LOW-HIGH", help="Frequencies that are used [Hz].")
+    ] = "0.1-2.5",
     spacing: Annotated[
-        float | None, typer.Option("--spacing", help="Between them [Hz]; a 25th of HIGH if not given.", min=1e-4)
+        float | None, typer.Option("--spacing", help="Distance between them [Hz]; HIGH / 25 by default.", min=1e-4)
     ] = None,
     memory: Annotated[
-        float | None, typer.Option("--memory", help="Forget with this time constant [s]; never if not given.")
+        float | None, typer.Option("--memory", help="Time constant of forgetting [s]; none by default.")
     ] = None,
     held: Annotated[
-        str | None, typer.Option("--held", help="Channels held between samples (commands), by commas.")
+        str | None,
+        typer.Option("--held", help="Channels that are constant between samples (commands), separated by commas."),
     ] = None,
     delay: Annotated[
         list[str] | None, typer.Option("--delay", metavar="NAME=SECONDS", help="A channel acts this late. Repeatable.")
     ] = None,
     unknown: Annotated[
-        str | None, typer.Option("--unknown", metavar="NAMES", help="Parameters of the vehicle, by commas: mass.")
+        str | None,
+        typer.Option(
+            "--unknown", metavar="NAMES", help="Parameters of the vehicle, separated by commas, for example mass."
+        ),
     ] = None,
-    spread: Annotated[float, typer.Option("--spread", help="What they may be off at the start, as a share.")] = 0.2,
-    wander: Annotated[float, typer.Option("--wander", help="Share that they may wander in a second.")] = 0.02,
-    every: Annotated[float, typer.Option("--every", help="Between looks at the estimate [s].", min=0.001)] = 0.2,
+    spread: Annotated[
+        float, typer.Option("--spread", help="Possible relative error of the parameters at the start.")
+    ] = 0.2,
+    wander: Annotated[
+        float, typer.Option("--wander", help="Possible relative change of the parameters in a second.")
+    ] = 0.02,
+    every: Annotated[float, typer.Option("--every", help="Time between two estimates [s].", min=0.001)] = 0.2,
     c_code: Annotated[Path | None, typer.Option("--c", metavar="DIR", help="Write the estimators as C99 here.")] = None,
     rename: flying.Rename = "",
     mapping: options.Mapping = None,
@@ -57,8 +67,8 @@ def track(
     """Estimate coefficients of equations of motion along a log, sample by sample as on board, with bounds over time.
 
     Equations go through recursive Fourier regression (no derivative is taken, nothing is filtered), parameters of a
-    vehicle through an extended Kalman filter. Gaps, values that are no numbers and clocks that jump freeze the
-    estimate, and are told. Writes report.html and track.json to --out. Examples:
+    vehicle through an extended Kalman filter. Gaps, NaN values and jumps of the clock hold the estimate, and are
+    reported. Writes report.html and track.json to --out. Examples:
 
     swash track flight.csv --equation "q_dot = Mq*q + Md*servo_pitch + bias" --held servo_pitch --out tracked
 

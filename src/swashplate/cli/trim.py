@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def trim(
     asked: given.Conditions,
     autorotation: Annotated[
-        bool, typer.Option("--autorotation", help="Sink as fast as needs no power of the engine.")
+        bool, typer.Option("--autorotation", help="Find the sink rate that needs no engine power.")
     ] = False,
     plot: given.Page = None,
     json: options.Json = False,

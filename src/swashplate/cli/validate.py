@@ -27,7 +27,10 @@ def validate(
     horizons: Annotated[str, typer.Option("--horizons", help="Seconds ahead, separated by commas.")] = "0.5,1,2,5",
     every: Annotated[float, typer.Option("--every", help="Seconds between start points.", min=0.01)] = 0.1,
     calibration: Annotated[
-        float, typer.Option("--calibration", help="Seconds at each start that tell delays and trims.", min=1.0)
+        float,
+        typer.Option(
+            "--calibration", help="First seconds of each flight, from which delays and trims are estimated.", min=1.0
+        ),
     ] = 5.0,
     band: flying.BandOption = None,
     rate: options.Rate = 100.0,

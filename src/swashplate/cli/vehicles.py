@@ -56,15 +56,18 @@ def list_(json: options.Json = False) -> None:
 @app.command()
 def new(
     out: Annotated[Path, typer.Argument(metavar="FILE", help="The card to write, e.g. mine.toml.")],
-    mass: Annotated[float, typer.Option("--mass", help="With fuel or battery [kg].")],
-    radius: Annotated[float, typer.Option("--radius", help="Of the main rotor [m].")],
-    title: Annotated[str, typer.Option("--title", help="What the aircraft is.")] = "My helicopter",
-    rotation: Annotated[Rotation, typer.Option("--rotation", help="Main rotor seen from above.")] = Rotation.CW,
+    mass: Annotated[float, typer.Option("--mass", help="Mass with fuel or battery [kg].")],
+    radius: Annotated[float, typer.Option("--radius", help="Radius of the main rotor [m].")],
+    title: Annotated[str, typer.Option("--title", help="Title of the card.")] = "My helicopter",
+    rotation: Annotated[
+        Rotation, typer.Option("--rotation", help="Direction of the main rotor, seen from above.")
+    ] = Rotation.CW,
     size_class: Annotated[
-        ClassName | None, typer.Option("--class", help="Whose statistics are used; by default by mass and radius.")
+        ClassName | None,
+        typer.Option("--class", help="Class whose statistics are used; by default from mass and radius."),
     ] = None,
     like: Annotated[
-        str | None, typer.Option("--like", help="A packaged helicopter that is scaled, in place of a class.")
+        str | None, typer.Option("--like", help="Scale a packaged helicopter instead of using a class.")
     ] = None,
 ) -> None:
     """Write a commented card for your own single-rotor helicopter: statistics of its class, to be measured."""
@@ -93,7 +96,7 @@ def show(
     trim: Annotated[bool, typer.Option("--trim", help="Also the hover: its inputs, states and modes.")] = False,
     json: options.Json = False,
 ) -> None:
-    """Show what a vehicle is, where its card may be trusted, and every number with unit, status and source."""
+    """Describe a vehicle, the range of its card, and every number with unit, status and source."""
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import parameter_table
     from swashplate.models.catalogue import vehicle as find

@@ -7,11 +7,12 @@ depend on each other are sought in one loop, so that a processor works on the on
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from swashplate.export.c_expression import Statement, Statements
 from swashplate.export.c_text import Precision, literal
 
-_SETTLED: dict[Precision, float] = {"double": 1e-8, "single": 1e-4}
+SETTLED: dict[Precision, float] = {"double": 1e-8, "single": 1e-4}
 """Relative change of a step after which the error, of the order of its square, is below rounding."""
 
 
@@ -27,7 +28,39 @@ def looped(found: Statements, steps: Sequence[int], *, real: str, precision: Pre
         real, precision, outputs: as for `c_expression.body`.
     """
     count, n = len(steps), len(outputs)
-    start, value, slope = ([found.outputs[n + k, i] for i in range(count)] for k in range(3))
+    lines: list[str] = []
+    for search in searches(found, count, first=n):
+        lines += [f"  {_named(s).text(real, precision)}" for s in search.before]
+        if search.sought:
+            lines += _loop(search, steps, real, precision)
+    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in found.outputs.items() if o < n]
+    head = [f"  {real} {', '.join(f'root{i} = root[{i}]' for i in range(count))};", "  int step;"]
+    kept = [f"  root[{i}] = root{i};" for i in range(count)]
+    return "\n".join([*head, *lines, *kept, *stores]) + "\n"
+
+
+@dataclass(frozen=True)
+class Search:
+    """Roots that are sought in one loop, after those that they depend on.
+
+    Attributes:
+        before: statements that can be evaluated once the earlier searches have ended, in order.
+        sought: numbers of the roots; none for what comes after the last search.
+        inside: statements of the loop.
+        start, value, slope: texts of each root sought: the first guess, the residual and its derivative.
+    """
+
+    before: tuple[Statement, ...]
+    sought: tuple[int, ...]
+    inside: tuple[Statement, ...]
+    start: tuple[str, ...]
+    value: tuple[str, ...]
+    slope: tuple[str, ...]
+
+
+def searches(found: Statements, count: int, *, first: int) -> list[Search]:
+    """A function with `count` roots in the order of its searches; outputs `first` and the next two are the roots'."""
+    start, value, slope = ([found.outputs[first + k, i] for i in range(count)] for k in range(3))
     needs = _needs(found.body, count)
     rounds = _rounds([*zip(start, value, slope, strict=True)], needs, count)
 
@@ -36,18 +69,13 @@ def looped(found: Statements, steps: Sequence[int], *, real: str, precision: Pre
         roots, _ = needs.get(name, (frozenset(), frozenset()))
         return max((rounds[r] for r in roots), default=0)
 
-    lines: list[str] = []
-    for number in range(max(rounds) + 1):
-        plain = [s for s in found.body if not needs[s.name][1] and known_after(s.name) == number]
-        lines += [f"  {_named(s).text(real, precision)}" for s in plain]
-        sought = [i for i in range(count) if rounds[i] == number + 1]
-        if sought:
-            inside = [s for s in found.body if needs[s.name][1] & set(sought)]
-            lines += _loop(sought, inside, steps, (start, value, slope), real, precision)
-    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in found.outputs.items() if o < n]
-    head = [f"  {real} {', '.join(f'root{i} = root[{i}]' for i in range(count))};", "  int step;"]
-    kept = [f"  root[{i}] = root{i};" for i in range(count)]
-    return "\n".join([*head, *lines, *kept, *stores]) + "\n"
+    made = []
+    for number in range(max(rounds, default=0) + 1):
+        sought = tuple(i for i in range(count) if rounds[i] == number + 1)
+        texts = (tuple(t[i] for i in sought) for t in (start, value, slope))
+        before = tuple(s for s in found.body if not needs[s.name][1] and known_after(s.name) == number)
+        made.append(Search(before, sought, tuple(s for s in found.body if needs[s.name][1] & set(sought)), *texts))
+    return made
 
 
 _Needs = dict[str, tuple[frozenset[int], frozenset[int]]]
@@ -84,25 +112,19 @@ def _named(s: Statement) -> Statement:
     return Statement(s.name, s.operation, tuple(map(_renamed, s.reads)))
 
 
-def _loop(
-    sought: Sequence[int],
-    inside: Sequence[Statement],
-    steps: Sequence[int],
-    texts: tuple[Sequence[str], Sequence[str], Sequence[str]],
-    real: str,
-    precision: Precision,
-) -> list[str]:
-    start, value, slope = texts
+def _loop(search: Search, steps: Sequence[int], real: str, precision: Precision) -> list[str]:
+    sought = search.sought
     size = "fabsf" if precision == "single" else "fabs"
-    small = literal(_SETTLED[precision], precision)
+    small = literal(SETTLED[precision], precision)
     settled = " && ".join(f"{size}(move{i}) <= {small} * {size}(root{i})" for i in sought)
     most = max(steps[i] for i in sought)
-    begin = " ".join(f"root{i} = {_renamed(start[i])};" for i in sought)
+    begin = " ".join(f"root{i} = {_renamed(start)};" for i, start in zip(sought, search.start, strict=True))
+    quotients = zip(sought, search.value, search.slope, strict=True)
     return [
         f"  for (step = known ? -{most} : 0; step < {most}; ++step) {{",
         f"    if (step == 0) {{ {begin} }}",
-        *(f"    {_named(s).text(real, precision)}" for s in inside),
-        *(f"    const {real} move{i} = {_renamed(value[i])} / {_renamed(slope[i])};" for i in sought),
+        *(f"    {_named(s).text(real, precision)}" for s in search.inside),
+        *(f"    const {real} move{i} = {_renamed(value)} / {_renamed(slope)};" for i, value, slope in quotients),
         *(f"    root{i} -= move{i};" for i in sought),
         f"    if ({settled}) break;",
         "  }",

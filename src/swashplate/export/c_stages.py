@@ -18,8 +18,9 @@ from swashplate.export.c_text import Precision
 if TYPE_CHECKING:
     from swashplate.export.traced import Traced
 
-_STATE, _FIXED = "x[", "c"
-_MOVING = (_STATE, "guess[", "root[")
+_FIXED = "c"
+ROOTS = ("guess[", "root[")
+_MOVING = ("x[", *ROOTS)
 
 
 @dataclass(frozen=True)
@@ -56,21 +57,28 @@ def stages(model: Traced, *, real: str, precision: Precision) -> Stages:
     return Stages(printed(first, real, precision, [_FIXED]), moving, len(first.outputs), count)
 
 
-def split(found: Statements) -> tuple[Statements, Statements]:
-    """What no state moves, with what the rest needs of it as outputs, and the rest, which reads those as `c[i]`.
+def split(
+    found: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = _FIXED
+) -> tuple[Statements, Statements]:
+    """What nothing `moving` moves, with what the rest needs of it as outputs, and the rest, which reads it as `c[i]`.
 
     What the rest divides by is inverted once, before.
+
+    Args:
+        found: what is split.
+        moving: how the texts begin of what changes; the states where not given.
+        fixed: the array through which the rest reads the first.
     """
     first: list[Statement] = []
     rest: list[Statement] = []
     moved: set[str] = set()
     for s in found.body:
-        if not any(name in moved or name.startswith(_MOVING) for name in s.reads):
+        if not any(name in moved or name.startswith(moving) for name in s.reads):
             first.append(s)
             continue
         moved.add(s.name)
         over, by = (s.reads[0], s.reads[-1])
-        if s.operation == "DIV" and not (by in moved or by.startswith(_MOVING)):
+        if s.operation == "DIV" and not (by in moved or by.startswith(moving)):
             inverse = Statement(f"i_{s.name}", "INV", (by,))
             first.append(inverse)
             rest.append(Statement(s.name, "MUL", (over, inverse.name)))
@@ -78,7 +86,7 @@ def split(found: Statements) -> tuple[Statements, Statements]:
             rest.append(s)
     made = {s.name for s in first}
     asked = [*(name for s in rest for name in s.reads), *found.outputs.values()]
-    kept = {name: f"{_FIXED}[{i}]" for i, name in enumerate(dict.fromkeys(name for name in asked if name in made))}
+    kept = {name: f"{fixed}[{i}]" for i, name in enumerate(dict.fromkeys(name for name in asked if name in made))}
     return (
         Statements(tuple(first), {(0, i): name for i, name in enumerate(kept)}),
         Statements(

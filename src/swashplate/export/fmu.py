@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.export.compiler import compiler, shared_library
+from swashplate.compiler import compiler, shared_library
 from swashplate.export.fmu_description import description
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import Traced

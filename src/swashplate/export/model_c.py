@@ -60,13 +60,17 @@ def model_code(model: Traced, *, precision: Precision = "double") -> ModelCode:
     )
 
 
-def frame_code(model: Traced) -> str:
-    """C of NAME_frame alone, in double precision: some steps and the rates where they lead, without any header.
+def frame_code(model: Traced, told: object) -> str:
+    """C of NAME_frame alone, in double precision: some steps and what is told of where they lead, without any header.
 
     Args:
         model: what to print; its Jacobians are not needed.
+        told: a CasADi function of states, rates and gravity.
     """
-    return _filled(_ALONE + _RATES + _STEP + _FRAME, {**_blanks(model, "double"), **_equations(model, "double")})
+    names = ("x", "rates", "g")
+    text = body(told, real=f"{model.name}_real", precision="double", inputs=names, outputs=["told"])
+    blanks = {**_blanks(model, "double"), **_equations(model, "double"), "TOLD": _used(text, names)}
+    return _filled(_ALONE + _RATES + _STEP + _FRAME, blanks)
 
 
 def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
@@ -277,14 +281,20 @@ void @NAME@_step(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @
 """
 
 _FRAME = """
-void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt, int steps, @REAL@ *told);
+static void tell(const @REAL@ *x, const @REAL@ *rates, const @REAL@ *g, @REAL@ *told) {
+@TOLD@}
 
-/* Steps under held inputs; told: the states and their derivatives behind them. */
-void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, @REAL@ dt, int steps, @REAL@ *told) {
+void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *g, @REAL@ dt, int steps,
+                  @REAL@ *told);
+
+/* Steps under held inputs, and what is told of where they lead. */
+void @NAME@_frame(@REAL@ *x, const @REAL@ *u, const @REAL@ *s, const @REAL@ *p, const @REAL@ *g, @REAL@ dt, int steps,
+                  @REAL@ *told) {
+  @REAL@ rates[@NAME@_n_states];
   int i;
   for (i = 0; i < steps; ++i) @NAME@_step(x, u, s, p, dt);
-  for (i = 0; i < @NAME@_n_states; ++i) told[i] = x[i];
-  @NAME@_rates(x, u, s, p, told + @NAME@_n_states);
+  @NAME@_rates(x, u, s, p, rates);
+  tell(x, rates, g, told);
 }
 """
 

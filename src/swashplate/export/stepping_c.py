@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import tempfile
-from importlib.util import find_spec
-from pathlib import Path
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-import platformdirs
 
 from swashplate.arrays import Array
-from swashplate.export.compiler import compiler, shared_library
+from swashplate.compiled import loaded
 from swashplate.export.model_c import frame_code
-from swashplate.export.traced import trace_vehicle
+from swashplate.export.traced import require_casadi, trace_vehicle
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import SURROUNDINGS
+from swashplate.simulation.stepping import motion_row
 from swashplate.simulation.trim import Trim
 
 _OPTIONS = ("-O1",)
 """-O2 takes 2.5 times as long to compile and is no faster (measured)."""
 _POINTER = ctypes.POINTER(ctypes.c_double)
-
-
-def can_compile() -> bool:
-    """Whether this machine has CasADi and a C compiler."""
-    return compiler() is not None and find_spec("casadi") is not None
 
 
 class CompiledEngine:
@@ -49,49 +42,32 @@ class CompiledEngine:
         row, inputs = np.zeros(len(moved.state_names)), np.zeros(len(moved.input_names))
         start = Trim(row, inputs, moved.state_names, moved.input_names, environment, 0.0, 0.0, 0.0, 0.0)
         model = trace_vehicle(moved, start, name="body", jacobians=False)
-        self._frame = _loaded(frame_code(model)).body_frame
-        self._frame.argtypes = [_POINTER] * 4 + [ctypes.c_double, ctypes.c_int, _POINTER]
+        self._frame = loaded(frame_code(model, _told(row.size)), options=_OPTIONS).body_frame
+        self._frame.argtypes = [_POINTER] * 5 + [ctypes.c_double, ctypes.c_int, _POINTER]
         self._frame.restype = None
         names = [v.name for v in model.surroundings]
         self._moving = [(k, SURROUNDINGS.index(name)) for k, name in enumerate(names) if name in SURROUNDINGS]
         self._state, self._inputs = row, inputs
         self._around = np.array([v.start for v in model.surroundings])
-        self._told, numbers = np.zeros(2 * row.size), np.array([v.start for v in model.parameters])
-        self._rows = (self._state, self._inputs, self._around, numbers)
+        self._told, numbers = np.zeros(row.size + 5), np.array([v.start for v in model.parameters])
+        self._rows = (self._state, self._inputs, self._around, numbers, np.array([float(environment.gravity)]))
         self._given = [row.ctypes.data_as(_POINTER) for row in self._rows]
         self._answer = self._told.ctypes.data_as(_POINTER)
 
     def place(self, row: Array) -> None:
         self._state[:] = row
 
-    def advance(self, inputs: Array, around: Array, step: float, steps: int) -> Array:
+    def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
         self._inputs[:] = inputs
         for own, given in self._moving:
             self._around[own] = around[given]
         self._frame(*self._given, step, steps, self._answer)
-        return self._told
+        return self._told.tolist()
 
 
-def _loaded(source: str) -> ctypes.CDLL:
-    """The library of a source: from the cache, compiled where it is missing or does not load."""
-    told = "\0".join((source, compiler() or "", *_OPTIONS))
-    folder = Path(platformdirs.user_cache_dir("swashplate")) / "c"
-    found = folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
-    if found.is_file():
-        try:
-            return ctypes.CDLL(str(found))
-        except OSError:  # damaged: made anew
-            found.unlink(missing_ok=True)
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        keeping = tempfile.TemporaryDirectory(dir=folder)
-    except OSError:  # nothing can be kept
-        keeping = tempfile.TemporaryDirectory()
-    with keeping as made:
-        text, place = Path(made) / "body.c", Path(made) / "body.so"
-        text.write_text(source, encoding="utf-8")
-        shared_library([text], place, options=_OPTIONS)
-        if Path(made).parent == folder:
-            os.replace(place, found)
-            place = found
-        return ctypes.CDLL(str(place))  # what is loaded stays when its file goes
+def _told(states: int) -> Any:
+    """`motion_row` as a CasADi function of a state row of `tumbling`, its rates and gravity."""
+    casadi = require_casadi()
+    x, rates, g = (casadi.SX.sym(name, size) for name, size in (("x", states), ("rates", states), ("g", 1)))
+    row = motion_row([x[k] for k in range(states)], [rates[k] for k in range(states)], g, CasadiBackend())
+    return casadi.Function("f", [x, rates, g], [casadi.vertcat(*row)], {"cse": True})

@@ -114,7 +114,7 @@ class Looped:
     steps: tuple[int, ...] = ()
 
 
-class _Looping(CasadiBackend):
+class Looping(CasadiBackend):
     """Leaves roots as symbols. C can then end the search when the guess no longer moves, instead of unrolling it."""
 
     def __init__(self, casadi: Any) -> None:
@@ -130,7 +130,10 @@ class _Looping(CasadiBackend):
 
     def looped(self, given: Sequence[Any], results: Sequence[Any]) -> Looped:
         """A function of `given` whose outputs are `results` and what the roots need."""
-        column = self._casadi.vertcat
+
+        def column(*entries: Any) -> Any:
+            return self._casadi.vertcat(self._casadi.SX(0, 1), *entries)
+
         symbols = [column(*(getattr(root, name) for root in self.roots)) for name in ("guess", "root")]
         sought = [column(*(getattr(root, name) for root in self.roots)) for name in ("start", "value", "slope")]
         inputs, outputs = [*given, *symbols], [*results, *sought]
@@ -196,7 +199,7 @@ def trace_vehicle(
     def function(results: Sequence[Any]) -> Any:
         return casadi.Function("f", [x, u, rest, p], list(results), {"cse": True})
 
-    looping = _Looping(casadi)
+    looping = Looping(casadi)
     with_roots = rates(looping)
     numbers = vehicle.values()
     card = vehicle.card.parameters

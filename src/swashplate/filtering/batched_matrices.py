@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 
+from swashplate.filtering import stack_kernels
 from swashplate.filtering.matrix_operations import JaxMatrices, Scalars
 from swashplate.physics.backend import Backend
 from swashplate.simulation.trigonometry import vector_backend
@@ -100,6 +101,22 @@ class StackMatrices(JaxMatrices):
 
     def flat(self, matrix: Stack, /) -> Any:
         return matrix.data.reshape(-1, self._vehicles)
+
+    def propagated(self, A: Stack, J: Stack | None, P: Stack, noise: Any, dt: float) -> Stack | None:
+        """The covariance a sample later by one call of C (`stack_kernels.propagated`); None where there is no C."""
+        if not stack_kernels.fits(P.shape[0]):
+            return None
+        rows = jnp.zeros((0, *P.data.shape[1:])) if J is None else J.data
+        return Stack(stack_kernels.propagated(A.data, rows, P.data, jnp.asarray(noise), dt))
+
+    def updated(
+        self, H: Stack, mean: Stack, P: Stack, innovations: Stack, noise: Any
+    ) -> tuple[Stack, Stack, Stack] | None:
+        """Mean, covariance and that of the innovations after readings by one call of C; None where there is no C."""
+        if not stack_kernels.fits(P.shape[0]):
+            return None
+        found = stack_kernels.updated(H.data, P.data, mean.data[:, 0], innovations.data[:, 0], jnp.asarray(noise))
+        return Stack(found[0][:, None]), Stack(found[1]), Stack(found[2])
 
     def stacked(self, parts: Sequence[Stack], /) -> Stack:
         return Stack(jnp.concatenate([part.data for part in parts], axis=0))

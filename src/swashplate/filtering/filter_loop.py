@@ -17,8 +17,10 @@ Predict = Callable[[Any, Any], Any]
 """(corrected state, what holds now) to the state one sample later."""
 
 
-def filtered(start: Any, readings: Any, along: Any, *, correct: Correct, predict: Predict) -> tuple[Any, Any]:
-    """What is told at every sample, and the states after each reading (traceable).
+def filtered(
+    start: Any, readings: Any, along: Any, *, correct: Correct, predict: Predict
+) -> tuple[Any, tuple[Any, Any]]:
+    """The state after the last sample; what is told at every sample and the states after each reading (traceable).
 
     Args:
         start: predicted state at the first sample.
@@ -32,4 +34,4 @@ def filtered(start: Any, readings: Any, along: Any, *, correct: Correct, predict
         corrected, told = correct(state, reading, now)
         return predict(corrected, now), (told, corrected)
 
-    return jax.lax.scan(sample, start, (readings, along))[1]  # type: ignore[no-any-return]
+    return jax.lax.scan(sample, start, (readings, along))

@@ -290,6 +290,10 @@ def corrected(
 
     expected, H = M.linearised(heard, estimate.mean, M.column([*M.scalars(w), *flags]))
     innovations = M.column(innovations_of(plan, M.column(flags) * y, expected, M))
+    own = getattr(M, "updated", None)  # operations that have one of their own for this may use it
+    if own is not None and (found := own(H, *estimate, innovations, numbers.measurement)) is not None:
+        mean, covariance, spread = found
+        return ObserverEstimate(mean, covariance), innovations, spread
     together = H @ estimate.covariance
     spread = H @ together.T + M.diagonal(numbers.measurement)
     # Rows of [S | H P | innovation] without those above them, the pivots' roots taken out: a Cholesky factor L of S
@@ -337,7 +341,6 @@ def predicted(
     x = begin[:moves, :]
     moved = change(rates, x, w, dt, M)
     _, A = M.linearised(rates, x + 0.5 * moved, w)
-    F, _ = held_series(A, dt, np.eye(moves))
     mean, stored, J = [x + moved, begin[moves:own, :]], [], None
     if any(at.kept for at in plan.sampling):
 
@@ -346,6 +349,10 @@ def predicted(
 
         readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))
         mean.append(readings)
+    at_once = getattr(M, "propagated", None)
+    if at_once is not None and (found := at_once(A, J, P, numbers.process, dt)) is not None:
+        return ObserverEstimate(M.stacked(mean), found)
+    F, _ = held_series(A, dt, np.eye(moves))
     for _ in range(2):  # the moved states' rows, the offsets', the kept readings'; then the same from the other side
         stored = [] if J is None else [J @ P]
         P = M.stacked([F @ P[:moves, :], P[moves:own, :], *stored]).T

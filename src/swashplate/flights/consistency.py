@@ -12,17 +12,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, rotation
+from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, to_body
 from swashplate.flights.conditioning.derive import body_rates, differentiate
 from swashplate.flights.conditioning.filters import within
 from swashplate.flights.conditioning.resample import common, unbroken
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, LOGGED_UNIT, POSITION, QUATERNION, RATES, VARIANTS, VELOCITY, channel
 
-Array = NDArray[np.float64]
 Reference = Callable[[Array], Array]
 """What the other side of the log says about the three axes at the times of a uniform grid, shape (n, 3)."""
 
@@ -47,6 +46,8 @@ _STEEPEST = 0.5 * np.pi + 0.02  # rad: no pitch angle is larger
 _MAX_GAP = 0.25  # s
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the weight along body z says little
 _GRAVITY = 9.80665
+
+_DOWN = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
 
         def body(grid: Array) -> Array:
             assert attitude is not None
-            return np.asarray(rotation(interpolate(attitude.time, attitude.quaternion, grid)).inv().apply(local(grid)))
+            return to_body(interpolate(attitude.time, attitude.quaternion, grid), local(grid))
 
         whole = attitude is not None and len(attitude.axes) == 3
         for names, reference in ((_LOCAL, local), *([(VELOCITY, body)] if whole else [])):
@@ -386,7 +387,7 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
         down = np.ones(values.size)
         if attitude is not None:
             # Third row, third column of body to local: how much of body z points down.
-            down = rotation(interpolate(attitude.time, attitude.quaternion, stamps)).as_matrix()[:, 2, 2]
+            down = to_body(interpolate(attitude.time, attitude.quaternion, stamps), _DOWN)[:, 2]
         upright = np.abs(down) > _UPRIGHT
         felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= _SHORTEST else _GRAVITY
         for unit, weight in (("m/s^2", _GRAVITY), ("g", 1.0)):

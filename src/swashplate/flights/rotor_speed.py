@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import FlightError
@@ -134,6 +133,8 @@ def _unbroken(flight: Flight, pair: tuple[str, ...]) -> tuple[list[tuple[Array, 
     """
     table, time = flight.array(pair), flight.time(pair[0])
     if pair == QUATERNION:
+        from scipy.spatial.transform import Rotation
+
         angles = Rotation.from_quat(table[:, [1, 2, 3, 0]]).as_euler("ZYX")
         table = angles[:, [2, 1]]
     signal = np.asarray(table[:, 0] + 1j * table[:, 1])

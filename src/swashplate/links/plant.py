@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
 from swashplate.links.recorder import Recorder
@@ -15,11 +14,10 @@ from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
-from swashplate.physics.frames import Vector
 from swashplate.simulation.dynamics import SURROUNDINGS
 from swashplate.simulation.record import simulated_flight
 from swashplate.simulation.standing import at_rest
-from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, motion
+from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill
 
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
 _FASTEST = 500.0
@@ -61,6 +59,7 @@ class Plant:
         numbers: of the vehicle's card.
         standing_depth: how far the CG is above the ground when the vehicle stands [m].
         time: since it was put on the ground [s].
+        voltage: of the battery now [V].
         broken: why it lies where it is; empty while it is whole.
     """
 
@@ -79,6 +78,8 @@ class Plant:
         self._rest = at_rest(vehicle, self.environment)
         self.standing_depth = -float(self._rest[vehicle.index("z")])
         self.numbers = vehicle.card.values()
+        names = vehicle.state_names
+        self._rotors = [names.index(each) for each in ("omega_lower", "omega_upper", "omega") if each in names]
         self._stepping = Stepping(vehicle, self._rest, self.environment, engine=engine)
         self._recorder, self._spacing = recorder, 1.0 / record_rate
         self.restart()
@@ -87,11 +88,6 @@ class Plant:
         """Compile the equations now instead of under the first packet."""
         self._stepping.advance(np.zeros(len(self.vehicle.input_names)), 1e-3)
         self.restart()
-
-    @property
-    def voltage(self) -> float:
-        """Of the battery now [V]."""
-        return float(self._stepping.surroundings[SURROUNDINGS.index("voltage")])
 
     @property
     def moved(self) -> Motion:
@@ -108,8 +104,8 @@ class Plant:
         self.broken = ""
         self.mapping.restart()
         self._stepping.place(self._rest)
-        self._stepping.surround(voltage=self.environment.voltage)
-        self._held = self._resting(self._rest)
+        self._surround(float(self.environment.voltage))
+        self._held = at_standstill(self._rest, float(self.environment.gravity))
         self._next = 0.0
         if self._recorder is not None:
             self._recorder.restart()
@@ -131,28 +127,28 @@ class Plant:
         self.time += duration
         if self._around.sag:
             low = 0.5 * self.environment.voltage
-            self._stepping.surround(voltage=max(low, self.environment.voltage - self._around.sag * self.time))
+            self._surround(max(low, self.environment.voltage - self._around.sag * self.time))
         if self.time >= self._next - 1e-9:
             self._next += self._spacing
             if self._recorder is not None:
                 self._recorder.add(self.time, [*self._held.states, *inputs, *self._stepping.surroundings])
         return self._held
 
+    def _surround(self, voltage: float) -> None:
+        self.voltage = voltage
+        self._stepping.surround(voltage=voltage)
+
     def rotor_speeds(self, held: Motion) -> tuple[float, float]:
         """Of main and tail rotor, or of lower and upper rotor [rad/s]."""
-        names = self.vehicle.state_names
-        if "omega_lower" in names:
-            lower, upper = held.states[names.index("omega_lower")], held.states[names.index("omega_upper")]
-            return max(0.0, float(lower)), max(0.0, float(upper))
-        main = max(0.0, float(held.states[names.index("omega")]))
+        speeds = [max(0.0, held.states[k]) for k in self._rotors]
+        if len(speeds) == 2:
+            return speeds[0], speeds[1]
+        (main,) = speeds
         return main, main * self.numbers["tail_gear"]
 
-    def _break(self, why: str, states: Array) -> None:
+    def _break(self, why: str, states: list[float]) -> None:
         self.broken = why
-        stopped = np.array(states)
+        stopped = list(states)
         for name in _SPEEDS:
             stopped[self.vehicle.index(name)] = 0.0
-        self._held = self._resting(stopped)
-
-    def _resting(self, states: Array) -> Motion:
-        return motion(states, Vector(0.0, 0.0, 0.0), float(self.environment.gravity))
+        self._held = at_standstill(stopped, float(self.environment.gravity))

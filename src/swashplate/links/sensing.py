@@ -60,6 +60,8 @@ class Sensing:
 
     def __init__(self, plant: Plant, *, unit: InertialUnit | None = None, seed: int = 0) -> None:
         self._plant, self._unit, self._seed = plant, unit, seed
+        around = plant.environment
+        self._wind = Vector(*map(float, (around.wind_north, around.wind_east, around.wind_down)))
         self.restart()
 
     def restart(self) -> None:
@@ -70,9 +72,10 @@ class Sensing:
     def read(self, moved: Motion) -> Readings:
         """Readings of a motion at the plant's time."""
         plant, body = self._plant, moved.body
-        around = plant.environment
-        wind = Vector(*map(float, (around.wind_north, around.wind_east, around.wind_down)))
-        air = body.velocity + local_to_body(wind, body.attitude, _FLOATS).scaled(-1.0)
+        wind = self._wind
+        air = body.velocity
+        if any(wind):
+            air = air + local_to_body(wind, body.attitude, _FLOATS).scaled(-1.0)
         gyro, force = self._shaken(body.rates, moved.force)
         down = math.cos(body.phi) * math.cos(body.theta)
         seen = min(FARTHEST, max(0.0, -body.z) / down) if down > 0.1 else FARTHEST

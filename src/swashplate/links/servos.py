@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib import resources
+from operator import mul
 from pathlib import Path
 
 import numpy as np
 
 from swashplate import documents
-from swashplate.arrays import Array
 from swashplate.errors import LinkError
 from swashplate.links import swashplates
 from swashplate.links.mapping_table import MappingTable
@@ -48,18 +48,17 @@ class HelicopterMapping:
         )
         if len(rows) != len(self.swash):
             raise table.error("swashplate.channels", f"has {len(self.swash)} servos, the type has {len(rows)}.")
-        self._inverse = swashplates.unmixed(rows)
+        self._inverse = swashplates.unmixed(rows).tolist()
         self.collective_pulse, self.collective_deg = swash.pair("collective_pulse"), swash.pair("collective_deg")
         pulses, pitches = (np.array(self.collective_pulse) - CENTRE) / HALF, np.radians(self.collective_deg)
         if pulses[0] == pulses[1]:
             raise swash.error("collective_pulse", "has two equal pulses.")
-        self._collective = (pulses, pitches)
+        self._collective = (*pulses.tolist(), *pitches.tolist())
         self.cyclic_deg = swash.pair("cyclic_deg")
-        lateral, longitudinal = np.radians(self.cyclic_deg)
-        self._cyclic = (lateral, longitudinal)
+        self._cyclic = np.radians(self.cyclic_deg).tolist()
         self.tail = tail.servo(tail.number("channel"), servos)
         self.tail_deg = tail.pair("deg")
-        self._tail_pitch = np.radians(self.tail_deg)
+        self._tail_pitch = np.radians(self.tail_deg).tolist()
         self.throttle = throttle.servo(throttle.number("channel"), servos)
         self.full = throttle.number("full", missing=1.0)
         self.spool = throttle.number("spool_time", missing=8.0)
@@ -74,17 +73,18 @@ class HelicopterMapping:
         """Engine off."""
         self._running = 0.0
 
-    def inputs(self, pulses: Sequence[float], duration: float) -> Array:
+    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
-        collective, roll, pitch = self._inverse @ [s.throw(pulses[s.channel - 1]) for s in self.swash]
-        (first, last), (least, most) = self._collective
+        throws = [s.throw(pulses[s.channel - 1]) for s in self.swash]
+        collective, roll, pitch = (sum(map(mul, row, throws)) for row in self._inverse)
+        first, last, least, most = self._collective
         theta0 = least + (collective - first) / (last - first) * (most - least)
         side, ahead = self._cyclic
         low, high = self._tail_pitch
         tail = 0.5 * (low + high) + 0.5 * (high - low) * self.tail.travel(pulses[self.tail.channel - 1])
         asked = min(1.0, self.throttle.share(pulses[self.throttle.channel - 1]) / self.full)
         self._running = min(asked, self._running + duration / self.spool)
-        return np.array([theta0, -ahead * pitch, side * roll, tail, self._running])
+        return [theta0, -ahead * pitch, side * roll, tail, self._running]
 
 
 class CoaxialMapping:
@@ -106,7 +106,7 @@ class CoaxialMapping:
     def restart(self) -> None:
         """Nothing is carried over."""
 
-    def inputs(self, pulses: Sequence[float], duration: float) -> Array:
+    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
         """motor_lower, motor_upper (0 to 1) and servo_roll, servo_pitch (-1 to 1) for pulses [us] by output.
 
         An output at its low end holds the rotor still: less would ask the drive train of the card for a negative speed.
@@ -116,7 +116,7 @@ class CoaxialMapping:
         ]
         servos = [k * s.travel(pulses[s.channel - 1]) for s, k in zip(self.servos, self.travel, strict=True)]
         # Autopilots count nose up as positive pitch, the CoaX nose down.
-        return np.array([*motors, servos[0], -servos[1]])
+        return [*motors, servos[0], -servos[1]]
 
 
 ServoMapping = HelicopterMapping | CoaxialMapping

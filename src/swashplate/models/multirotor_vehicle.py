@@ -289,6 +289,8 @@ def multirotor(card: Card) -> Vehicle:
         traits=Traits(
             axes=axes(par, senses),
             observed=True,
+            no_link="a multirotor's motors have no servo mapping; ArduPilot's and PX4's own multirotor simulators "
+            "fly such a frame",
             choices=choices,
             effects=lambda card: EFFECTS,
             recording=RecordingFit(),

@@ -28,6 +28,22 @@ def standard_altitude(density: float) -> float:
     return float(_KELVIN / _LAPSE * (1.0 - (density / SEA_LEVEL_DENSITY) ** (1.0 / (_EXPONENT - 1.0))))
 
 
+def temperature_of(density: Scalar, xp: Backend) -> Scalar:
+    """Temperature [K] of the standard day's air where it has a density [kg/m^3], as an equation."""
+    tropopause = _KELVIN - _LAPSE * _TROPOPAUSE
+    return xp.maximum(tropopause, _KELVIN * (density / SEA_LEVEL_DENSITY) ** (1.0 / (_EXPONENT - 1.0)))
+
+
+def sound_speed(temperature: Scalar, xp: Backend) -> Scalar:
+    """Speed of sound [m/s] in air of a temperature [K] (ISO 2533:1975, eq. 21): 340.3 at 288.15."""
+    return 20.046796 * xp.sqrt(temperature)
+
+
+def viscosity(temperature: Scalar, xp: Backend) -> Scalar:
+    """Dynamic viscosity of air [Pa s] at a temperature [K] (Sutherland's law, ISO 2533:1975, eq. 22)."""
+    return 1.458e-6 * temperature * xp.sqrt(temperature) / (temperature + 110.4)
+
+
 def density_at(height: Scalar, xp: Backend) -> Scalar:
     """Density [kg/m^3] at a geometric height [m] up to 20 km, as an equation."""
     geopotential = _RADIUS * height / (_RADIUS + height)

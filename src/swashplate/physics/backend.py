@@ -10,12 +10,21 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import numpy as np
+
 Scalar = Any
 """A number: `float`, a JAX tracer or array, or a CasADi expression."""
 
 
 class Backend(Protocol):
-    """The operations of an equation."""
+    """The operations of an equation.
+
+    Attributes:
+        arrays: functions of arrays (NumPy's or jax.numpy's) for what is integrated numerically; None where a number is
+            an expression, and such equations cannot be traced.
+    """
+
+    arrays: Any
 
     def sin(self, x: Scalar, /) -> Scalar: ...
     def cos(self, x: Scalar, /) -> Scalar: ...
@@ -32,6 +41,7 @@ class Backend(Protocol):
 class FloatBackend:
     """Plain Python floats: slow, and good for looking at one evaluation by hand."""
 
+    arrays: Any = np
     sin = staticmethod(math.sin)
     cos = staticmethod(math.cos)
     tan = staticmethod(math.tan)
@@ -50,6 +60,17 @@ class FloatBackend:
         return x
 
 
+class ArrayBackend:
+    """NumPy arrays: a whole record at once."""
+
+    def __init__(self) -> None:
+        self.arrays: Any = np
+        self.sin, self.cos, self.tan, self.sqrt = np.sin, np.cos, np.tan, np.sqrt
+        self.atan2, self.abs, self.where = np.arctan2, np.abs, np.where
+        self.minimum, self.maximum = np.minimum, np.maximum
+        self.detached = _same
+
+
 class JaxBackend:
     """JAX arrays and tracers: simulation, fitting, batches."""
 
@@ -57,6 +78,7 @@ class JaxBackend:
         import jax
         import jax.numpy as jnp
 
+        self.arrays: Any = jnp
         self.sin, self.cos, self.tan, self.sqrt = jnp.sin, jnp.cos, jnp.tan, jnp.sqrt
         self.atan2, self.abs, self.where = jnp.arctan2, jnp.abs, jnp.where
         self.minimum, self.maximum = jnp.minimum, jnp.maximum
@@ -69,6 +91,7 @@ class CasadiBackend:
     def __init__(self) -> None:
         import casadi
 
+        self.arrays: Any = None
         self.sin, self.cos, self.tan, self.sqrt = casadi.sin, casadi.cos, casadi.tan, casadi.sqrt
         self.atan2, self.abs, self.where = casadi.atan2, casadi.fabs, casadi.if_else
         self.minimum, self.maximum = casadi.fmin, casadi.fmax

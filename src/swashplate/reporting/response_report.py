@@ -130,6 +130,6 @@ def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:
         *(text for f in m.transfer_functions for text in f.warnings),
     ]
     rows.append(
-        ("Beware", " ".join(told[:3]) or "nothing that these flights could show.", "caution" if told else "plain")
+        ("Warnings", " ".join(told[:3]) or "no problem was found in these flights.", "caution" if told else "plain")
     )
     return tuple(rows)

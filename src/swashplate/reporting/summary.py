@@ -53,7 +53,7 @@ def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
             ("Prediction", "not tested: no flight was held out. Do not trust the model before it was.", "caution")
         )
         rows.append(_changes(fit))
-    rows.append(_beware(fit, validation))
+    rows.append(_warnings(fit, validation))
     return tuple(rows)
 
 
@@ -127,7 +127,7 @@ def _changes(fit: Result[Any, Any]) -> Line:
     return "Change", f"Moved most for its uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
 
 
-def _beware(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
+def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
     words = []
     if fit:
         blind = list(dict.fromkeys(a.axis for a in getattr(fit.details, "excitation", ()) if not a.identifiable))
@@ -143,6 +143,6 @@ def _beware(fit: Result[Any, Any] | None, validation: Validation | None) -> Line
     elif validation and any(not r.voltage_known for r in validation.records):
         words.append("battery voltage not logged")
     if not words:
-        return "Beware", "nothing that these flights could show.", "plain"
+        return "Warnings", "no problem was found in these flights.", "plain"
     text = "; ".join(words)
-    return "Beware", f"{text[0].upper()}{text[1:]}.", "caution"
+    return "Warnings", f"{text[0].upper()}{text[1:]}.", "caution"

@@ -10,7 +10,7 @@ Attitude is carried as a quaternion (`tumbling`): what an autopilot or a hand do
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple, Protocol
 
@@ -23,7 +23,7 @@ from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import FloatBackend
+from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Vector, body_to_local
 from swashplate.physics.rigid_body import RigidBody, gravity
@@ -36,13 +36,15 @@ from swashplate.simulation.dynamics import (
     row_rates,
 )
 from swashplate.simulation.runge_kutta import rk4_step
-from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
+from swashplate.simulation.tumbling import TumblingBody, counted_on, from_euler, seen, tumbling
 
 LONGEST_STEP = 5e-4
 """s, of one Runge-Kutta step: skids on the ground are the stiffest part (friction of a light body: 1/1400 s)."""
 
 _FLOATS = FloatBackend()
 _SPEEDS = slice(RigidBody._fields.index("u"), RigidBody._fields.index("w") + 1)
+_COUNTED = (RigidBody._fields.index("phi"), RigidBody._fields.index("psi"))
+"""Angles that do not jump where a turn is full."""
 
 
 class Motion(NamedTuple):
@@ -58,7 +60,7 @@ class Motion(NamedTuple):
     body: RigidBody
     velocity: Vector
     force: Vector
-    states: Array
+    states: list[float]
 
 
 class SteppingEngine(Protocol):
@@ -67,11 +69,11 @@ class SteppingEngine(Protocol):
     def place(self, row: Array) -> None:
         """Put the vehicle into a state row of `tumbling`, shape (n_states + 1,)."""
 
-    def advance(self, inputs: Array, around: Array, step: float, steps: int) -> Array:
+    def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
         """Take Runge-Kutta steps of `step` [s] under held inputs and surroundings (`SURROUNDINGS`).
 
         Returns:
-            The state row and its derivative behind it, shape (2 (n_states + 1),); not to be changed.
+            What `motion_row` tells of where they lead.
         """
 
 
@@ -92,13 +94,12 @@ class Stepping:
     def __init__(
         self, vehicle: Vehicle, state: Array, environment: Environment, *, engine: MakeEngine | None = None
     ) -> None:
-        self.vehicle, self._moved = vehicle, tumbling(vehicle)
+        self.vehicle = vehicle
         around = environment_of(vehicle, environment)
-        self._engine: SteppingEngine = (engine or XlaEngine)(self._moved, around)
-        self._n = len(self._moved.state_names)
-        self._gravity = float(around.gravity)
+        self._engine: SteppingEngine = (engine or XlaEngine)(tumbling(vehicle), around)
+        self._n = len(vehicle.state_names)
         self._around = np.array([getattr(around, name) for name in SURROUNDINGS])
-        self._low, self._high = np.array(vehicle.input_limits).T
+        self._limits = [(float(low), float(high)) for low, high in vehicle.input_limits]
         self.place(state)
 
     @property
@@ -108,30 +109,33 @@ class Stepping:
 
     def place(self, state: Array) -> None:
         """Put the vehicle into a state."""
-        self._last = np.array(state, dtype=np.float64)
-        self._engine.place(from_euler(self._last))
+        row = np.array(state, dtype=np.float64)
+        self._last = row.tolist()
+        self._engine.place(from_euler(row))
 
     def surround(self, **values: float) -> None:
         """Change wind or voltage, by name."""
         for name, value in values.items():
             self._around[SURROUNDINGS.index(name)] = value
 
-    def advance(self, inputs: Array, duration: float) -> Motion:
+    def advance(self, inputs: Sequence[float] | Array, duration: float) -> Motion:
         """Hold inputs (cut to their limits) for `duration` [s] and tell where that leads.
 
         Raises:
             DivergenceError: where a state is no longer finite; the vehicle stays where it last was.
         """
         steps = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
-        held = np.minimum(np.maximum(inputs, self._low), self._high)
-        values = self._engine.advance(held, self._around, duration / steps, steps)
-        if not math.isfinite(values.sum()) and not np.isfinite(values).all():
-            self.place(self._last)
-            first = int(np.argmin(np.isfinite(values))) % self._n
-            name = self._moved.state_names[first]
+        held = [low if v < low else min(v, high) for v, (low, high) in zip(inputs, self._limits, strict=True)]
+        told, n = self._engine.advance(held, self._around, duration / steps, steps), self._n
+        if not math.isfinite(sum(told)) and (wild := [k for k, v in enumerate(told) if not math.isfinite(v)]):
+            self.place(np.array(self._last))
+            name = self.vehicle.state_names[wild[0] if wild[0] < n else _SPEEDS.start + (wild[0] - n) % 3]
             raise DivergenceError("left the finite numbers.", time=float("nan"), state=name)
-        self._last = to_euler(values[: self._n], self._last)
-        return motion(self._last, Vector(*values[self._n :][_SPEEDS].tolist()), self._gravity)
+        for angle in _COUNTED:
+            told[angle] = counted_on(told[angle], self._last[angle])
+        self._last = told[:n]
+        body, velocity, force = told[: len(RigidBody._fields)], told[n : n + 3], told[n + 3 :]
+        return Motion(RigidBody._make(body), Vector._make(velocity), Vector._make(force), self._last)
 
 
 class XlaEngine:
@@ -141,26 +145,42 @@ class XlaEngine:
         enable_double_precision()
         self._advance = _compiled(equations_of(moved))
         self._parameters = jax.device_put(parameter_row(moved, environment))
+        self._gravity = float(environment.gravity)
 
     def place(self, row: Array) -> None:
         self._state = jax.device_put(row)
 
-    def advance(self, inputs: Array, around: Array, step: float, steps: int) -> Array:
+    def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
         row = np.concatenate([inputs, around, (step, float(steps))])
         self._state, told = self._advance(self._state, row, self._parameters)
-        return np.asarray(told)
+        found = np.asarray(told).tolist()
+        n = len(found) // 2
+        return motion_row(found[:n], found[n:], self._gravity, _FLOATS)
 
 
-def motion(states: Array, change: Vector, g: float) -> Motion:
-    """What sensors need, from a state row and the rates of u, v and w [m/s^2].
+def motion_row(states: Sequence[Scalar], rates: Sequence[Scalar], g: Scalar, xp: Backend) -> list[Scalar]:
+    """What sensors need, from a state row of `tumbling` and its rates, as one row.
 
     The specific force is the acceleration less gravity, seen from turning axes (Stevens, Lewis and Johnson 2016, eq.
     1.7-15): one evaluation of the equations then tells everything.
+
+    Returns:
+        The vehicle's own state row with roll and yaw [rad] within half a turn, velocity north-east-down [m/s], and
+        specific force in body axes [m/s^2], 6 + n_states numbers.
     """
-    body = RigidBody(*states[: len(RigidBody._fields)].tolist())
-    pull = gravity(1.0, g, body.attitude, _FLOATS)
+    body = seen(TumblingBody._make(states[: len(TumblingBody._fields)]), xp)
+    change, pull = Vector._make(rates[_SPEEDS]), gravity(1.0, g, body.attitude, xp)
     force = change + body.rates.cross(body.velocity) + pull.scaled(-1.0)
-    return Motion(body, body_to_local(body.velocity, body.attitude, _FLOATS), force, states)
+    rest = states[len(TumblingBody._fields) :]
+    return [*body, *rest, *body_to_local(body.velocity, body.attitude, xp), *force]
+
+
+def at_standstill(states: Array | Sequence[float], g: float) -> Motion:
+    """The motion of a body that does not move, under gravity g [m/s^2]: its state row and what it weighs."""
+    row = list(map(float, states))
+    body = RigidBody._make(row[: len(RigidBody._fields)])
+    weight = gravity(1.0, g, body.attitude, _FLOATS).scaled(-1.0)
+    return Motion(body, Vector(0.0, 0.0, 0.0), weight, row)
 
 
 @lru_cache(maxsize=16)

@@ -24,7 +24,7 @@ class _Kernel(NamedTuple):
     cosine: tuple[float, ...]
 
 
-_KERNELS = {
+KERNELS = {
     "float64": _Kernel(
         (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21),
         (
@@ -55,7 +55,7 @@ _KERNELS = {
 def _rotated(x: Any, quarter_turns: int) -> Any:
     """sin(x + quarter_turns pi/2)."""
     x = jnp.asarray(x)
-    kernel = _KERNELS[str(x.dtype)]
+    kernel = KERNELS[str(x.dtype)]
     turns = jnp.round(x * (2.0 / jnp.pi))
     r = x
     for part in kernel.half_pi:

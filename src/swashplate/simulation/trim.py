@@ -14,12 +14,13 @@ from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
-from swashplate.models.doubts import nominal_voltage
+from swashplate.models.doubts import doubts, nominal_voltage
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, local_to_body
+from swashplate.physics.ground_contact import Grip
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
@@ -142,7 +143,8 @@ def trim(
         raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
     equations = equations_of(vehicle)
     if height is None:
-        height = _CLEAR if vehicle.card.options.get("ground") else 0.0
+        touches = vehicle.card.options.get("ground") or set(Grip._fields) <= set(vehicle.state_names)
+        height = _CLEAR if touches else 0.0
     if turn and (surroundings.wind_north or surroundings.wind_east):
         raise TrimError(
             "a turn in wind is no steady flight.",
@@ -193,12 +195,19 @@ def trim(
             f"no equilibrium was found for {where}: {worst} keeps changing at {largest:.2g} per second.",
             where=vehicle.card.where,
             channel=worst,
-            hint="Ask for a slower flight, or check the card.",
+            hint=_near_there(vehicle, state, inputs, surroundings) + "Ask for a slower flight, or check the card.",
         )
     _check_limits(vehicle, inputs, where)
     return Trim(
         state, inputs, vehicle.state_names, vehicle.input_names, surroundings, speed, lateral, climb, largest, turn
     )
+
+
+def _near_there(vehicle: Vehicle, state: Array, inputs: Array, surroundings: Environment) -> str:
+    """What of the equations does not hold where the search for a trim ended: stalled blades carry no more."""
+    if not np.all(np.isfinite([*state, *inputs])):
+        return ""
+    return "".join(f"Near there {words}. " for words in doubts(vehicle, state, inputs, surroundings))
 
 
 _CLEAR = 10.0

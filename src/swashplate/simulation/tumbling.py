@@ -82,7 +82,7 @@ def _derivatives(
     xp: Backend,
 ) -> Any:
     body: TumblingBody = state.body
-    rates = free(state._replace(body=_seen(body, xp)), inputs, par, env, xp)
+    rates = free(state._replace(body=seen(body, xp)), inputs, par, env, xp)
     turned = quaternion_rates(_rotation(body), Vector(body.p, body.q, body.r))
     return rates._replace(body=TumblingBody._make((*rates.body[:_PHI], *turned, *rates.body[_P:])))
 
@@ -90,15 +90,15 @@ def _derivatives(
 def _specific_force(
     free: Callable[..., Vector], state: Tumbling, inputs: object, par: object, env: Environment, xp: Backend
 ) -> Vector:
-    return free(state._replace(body=_seen(state.body, xp)), inputs, par, env, xp)
+    return free(state._replace(body=seen(state.body, xp)), inputs, par, env, xp)
 
 
 def _rotation(body: TumblingBody) -> Quaternion:
     return Quaternion(body.q0, body.q1, body.q2, body.q3)
 
 
-def _seen(body: TumblingBody, xp: Backend) -> RigidBody:
-    """The body with roll, pitch and yaw."""
+def seen(body: TumblingBody, xp: Backend) -> RigidBody:
+    """The body with roll, pitch and yaw, roll and yaw within half a turn."""
     return RigidBody(*body[:_PHI], *euler_of(_rotation(body), xp), body.p, body.q, body.r)
 
 
@@ -111,10 +111,14 @@ def from_euler(row: Array) -> Array:
 def to_euler(row: Array, before: Array) -> Array:
     """A state row of `tumbling` as one of the vehicle, with roll and yaw counted on from `before`, a row of it."""
     found = euler_of(Quaternion(*row[_PHI : _PHI + 4].tolist()), _FLOATS)
-    last = before[_PHI : _PHI + 3].tolist()
-    angles = [was + math.remainder(now - was, 2.0 * math.pi) for now, was in zip(found, last, strict=True)]
-    angles[1] = found.theta
+    roll, _, yaw = before[_PHI:_P].tolist()
+    angles = [counted_on(found.phi, roll), found.theta, counted_on(found.psi, yaw)]
     return np.concatenate([row[:_PHI], angles, row[_PHI + 4 :]])
+
+
+def counted_on(angle: float, before: float) -> float:
+    """The angle [rad], whole turns apart, that is nearest to `before`."""
+    return before + math.remainder(angle - before, 2.0 * math.pi)
 
 
 def steep(states: Array) -> bool:

@@ -91,7 +91,7 @@ class Floor:
         if self.reached and self.ceiling < _LOW:
             unforeseen = self.moved * (1.0 - self.ceiling / 100.0) * factor
             return (
-                f"the flight hardly moves beside what nobody foresees ({moved} against {unforeseen:.2g} "
+                f"the flight's motion is small beside what cannot be predicted ({moved} against {unforeseen:.2g} "
                 f"{unit.shown_unit} rms){promise}: even the ceiling reaches {_percent(self.ceiling)} %."
             )
         if self.reached:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import jax
@@ -13,20 +12,22 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import (
-    N_DISTURBANCES,
-    FilterState,
-    StochasticModel,
-    commands,
-    stochastic_model,
-)
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, commands_moved, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, predicted_covariance
 from swashplate.identification.core.records import Record
-from swashplate.identification.time.innovations import filter_record
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.start_states import mean_velocity, slopes, steady_flight
+from swashplate.identification.time.record_filter import (
+    FilterNumbers,
+    ahead_of,
+    along,
+    begun,
+    seen_at_start,
+    starting_samples,
+)
+from swashplate.identification.time.start_states import mean_velocity, steady_flight
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import lengthened
 from swashplate.validation.spans import HORIZONS
 
 SETTLING = 2.0
@@ -70,32 +71,22 @@ def predict(
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them.
     """
     model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
-    parameters = jax.tree.map(jnp.asarray, vehicle.values())
-    value, rate = slopes(record, np.array([0]))
     n, ahead = record.time.size, round(horizon / record.dt)
     starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
-    inputs, voltage = (
-        np.concatenate([rows, np.repeat(rows[-1:], ahead, axis=0)]) for rows in (record.inputs, record.voltage)
-    )
-    innovations, covariance, filtered, disturbances, states = _predict(
-        model,
-        ahead,
-        record.outputs,
-        inputs,
-        voltage,
-        (value[0], rate[0], mean_velocity(vehicle, record)),
-        parameters,
-        jax.tree.map(jnp.asarray, noise),
-        jax.tree.map(jnp.asarray, nuisance),
-        starts,
-    )
+    inputs, voltage = (lengthened(rows, n + ahead) for rows in (record.inputs, record.voltage))
+    reaching, _ = commands_moved(vehicle, record.dt, inputs, nuisance, np)
+    starting = reaching[: starting_samples(record.dt)].mean(axis=0)
+    numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
+    begin = begun(model, numbers, seen_at_start(vehicle, record))
+    innovations, filtered = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
+    kept = [vehicle.index(name) for name in PREDICTED]
     return Predictions(
-        starts=np.asarray(starts),
-        states=np.asarray(states),
-        filtered=np.asarray(filtered),
-        innovations=np.asarray(innovations),
-        covariance=np.asarray(covariance),
-        disturbances=np.asarray(disturbances),
+        starts=starts,
+        states=ahead_of(model, filtered, numbers, reaching, voltage, starts, ahead)[..., kept],
+        filtered=filtered.x[:, kept],
+        innovations=innovations,
+        covariance=np.asarray(begin.gain.covariance),
+        disturbances=filtered.gust[:, :N_DISTURBANCES] + filtered.drift,
     )
 
 
@@ -113,49 +104,6 @@ def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kin
     turned = (attitude * Rotation.from_rotvec(rates * time)).as_euler("ZYX")[:, ::-1]
     turned = angles + (turned - angles + np.pi) % (2 * np.pi) - np.pi
     return np.concatenate([moved, velocity, turned, rates], axis=1)
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _predict(
-    model: StochasticModel,
-    ahead: int,
-    y: Any,
-    inputs: Any,
-    voltage: Any,
-    first: Any,
-    parameters: Any,
-    noise: Noise,
-    nuisance: Nuisance,
-    starts: Any,
-) -> tuple[Any, Any, Any, Any, Any]:
-    n = y.shape[0]
-    innovations, covariance, filtered = filter_record(
-        model,
-        y,
-        inputs[:n],
-        voltage[:n],
-        value=first[0],
-        rate=first[1],
-        velocity=first[2],
-        parameters=parameters,
-        noise=noise,
-        nuisance=nuisance,
-    )
-    reaching = commands(model.vehicle, model.dt, inputs, nuisance)
-    kept = jnp.array([model.vehicle.index(name) for name in PREDICTED])
-
-    def advance(x: Any, acting: Any, k: Any) -> Any:
-        return model.step(x, acting, reaching[k], parameters, voltage[k])
-
-    def run(start: Any) -> Any:
-        def sample(state: FilterState, k: Any) -> tuple[FilterState, Any]:
-            following = model.predict(state, noise, advance, k)
-            return following, following.x[kept]
-
-        return jax.lax.scan(sample, jax.tree.map(lambda rows: rows[start], filtered), start + jnp.arange(ahead))[1]
-
-    acting = filtered.gust[:, :N_DISTURBANCES] + filtered.drift
-    return innovations, covariance, filtered.x[:, kept], acting, jax.vmap(run)(starts)
 
 
 def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, horizon: float) -> Array:

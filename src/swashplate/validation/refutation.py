@@ -195,7 +195,7 @@ def _in_words(
             if heard
             else "the controls do not stand out of gusts and noise in any output or band: fly a sweep."
             if led
-            else "past motion tells the commands as well as later motion does: they may be a controller's answer."
+            else "past motion predicts the commands as well as later motion does: they may be a controller's answer."
         )
         return Judgement(OPEN, (words,), findings, silent, samples, constants)
     told = [f for f in findings if f.heard]

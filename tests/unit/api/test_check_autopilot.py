@@ -148,8 +148,9 @@ def test_px4_over_udp_with_integers_in_bytes() -> None:
     assert found.problems == ("PWM_MAIN_REV is 4, expected 0.",)
 
 
-def test_px4_of_a_helicopter() -> None:
-    found = px4_parameters(servo_mapping("raptor50_px4", RAPTOR))
+@pytest.mark.parametrize("name", ["raptor50_px4", "helion_px4", "xcell60_px4"])
+def test_px4_of_a_helicopter(name: str) -> None:
+    found = px4_parameters(servo_mapping(name, RAPTOR))
     assert {k: found[k] for k in ("CA_AIRFRAME", "CA_SP0_COUNT", "CA_SP0_ANG1", "PWM_MAIN_FUNC2")} == {
         "CA_AIRFRAME": 11.0,
         "CA_SP0_COUNT": 3.0,

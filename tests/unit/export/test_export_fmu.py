@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.compiler import compiler
 from swashplate.errors import ExportError
 from swashplate.export import fmu as fmu_module
-from swashplate.export.compiler import compiler
 from swashplate.export.fmu import fmu, fmu_platform, internal_step
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import swashplate as sp
-from swashplate.export.compiler import STRICT, compiler
+from swashplate.compiler import STRICT, compiler
 from swashplate.export.formats import Export, export_model
 from swashplate.models.linear.state_space_file import structure
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate.export.compiler import compiler, shared_library
+from swashplate.compiler import compiler, shared_library
 from swashplate.export.regression_c import RegressionCode, regression_code
 from swashplate.identification.recursive.equation import regression_equation
 from swashplate.identification.recursive.fourier_regression import RecursiveRegression, RegressionPlan, regression_plan

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.compiler import compiler
 from swashplate.errors import DivergenceError, ExportError
 from swashplate.export import stepping_c
-from swashplate.export.compiler import compiler
 from swashplate.export.stepping_c import CompiledEngine
 from swashplate.models.catalogue import vehicle
 from swashplate.physics.environment import Environment
@@ -51,50 +49,13 @@ def test_one_that_flies_apart_stays_where_it_was() -> None:
     assert np.isfinite(stepping.advance(np.zeros(4), 0.01).states).all()
 
 
-SOURCE = "void body_frame(void);\nvoid body_frame(void) {}\n"
-
-
-@pytest.fixture
-def cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr(stepping_c.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
-    return tmp_path / "swashplate" / "c"
-
-
-def test_it_is_compiled_once_and_without_a_compiler_not_offered(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    stepping_c._loaded(SOURCE)
-    (first,) = cache.iterdir()
-    stamp = first.stat().st_mtime_ns
-    stepping_c._loaded(SOURCE)
-    assert first.stat().st_mtime_ns == stamp
-    stepping_c._loaded(SOURCE + "\n")
-    assert sorted(f.suffix for f in cache.iterdir()) == [".so", ".so"], "what was made on the way is gone"
-    monkeypatch.setattr(stepping_c, "compiler", lambda: None)
-    assert not stepping_c.can_compile()
-
-
-def test_a_damaged_library_is_made_anew(cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    stepping_c._loaded(SOURCE)
-    (found,) = cache.iterdir()
-    monkeypatch.setattr(stepping_c.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "other" / name))
-    damaged = tmp_path / "other" / "swashplate" / "c" / found.name  # a path that the loader has not seen
-    damaged.parent.mkdir(parents=True)
-    damaged.write_bytes(b"no library")
-    assert stepping_c._loaded(SOURCE).body_frame
-    assert damaged.read_bytes()[:4] == found.read_bytes()[:4]
-
-
-def test_where_nothing_can_be_kept_it_still_steps(cache: Path) -> None:
-    cache.parent.write_text("a file where the folder should be")
-    assert stepping_c._loaded(SOURCE).body_frame
-
-
 def test_a_compiler_that_fails_is_told_of_and_the_link_flies_on(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
 
-    def refused(source: str) -> None:
+    def refused(source: str, **options: object) -> None:
         raise ExportError("cc refused the exported sources: no math.h")
 
-    monkeypatch.setattr(stepping_c, "_loaded", refused)
+    monkeypatch.setattr(stepping_c, "loaded", refused)
     linked = sp.link_ardupilot(sp.vehicle("coax"), port=0, idle_exit=0.1, notice=said.append)
     assert linked.exchanges == 0
     assert said == [

@@ -166,7 +166,7 @@ def _filtered(y: np.ndarray, u: np.ndarray, nuisance: Nuisance, heading: float) 
         def advance(x: Any, acting: Any, u: Any) -> Any:
             return model.step(x, acting, u, COAX.values(), jnp.asarray(VOLTAGE))
 
-        return model.run(start, y, advance, u, Noise(), nuisance, gain)
+        return model.run(start, y, advance, u, Noise(), nuisance, gain)[1]
 
     innovations, states = _compiled(run)(y, u, heading)
     return np.asarray(innovations), states

@@ -12,7 +12,7 @@ from swashplate.simulation.dynamics import enable_double_precision
 def test_a_scalar_filter_is_the_recursion_by_hand() -> None:
     enable_double_precision()
     readings, pushes = np.array([1.0, 0.5, -0.2, 0.3]), np.array([0.1, 0.2, 0.3, 0.4])
-    told, states = filtered(
+    last, (told, states) = filtered(
         jnp.asarray(0.2),
         readings,
         pushes,
@@ -26,3 +26,4 @@ def test_a_scalar_filter_is_the_recursion_by_hand() -> None:
         expected.append((innovation, x))
         x = 0.9 * x + push
     np.testing.assert_allclose(np.column_stack([told, states]), expected, rtol=1e-15)
+    assert float(last) == x

@@ -35,8 +35,8 @@ def restarted(line: Bench) -> Bench:
     return line
 
 
-def state(line: Bench) -> tuple[bytes, float]:
-    return line.plant._held.states.tobytes(), line.plant.time
+def state(line: Bench) -> tuple[tuple[float, ...], float]:
+    return tuple(line.plant._held.states), line.plant.time
 
 
 @pytest.mark.parametrize(("name", "idle"), [("raptor50", IDLE), ("coax", COAX_IDLE)])

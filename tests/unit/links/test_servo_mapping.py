@@ -10,6 +10,7 @@ import pytest
 
 from swashplate.errors import LinkError
 from swashplate.links import swashplates
+from swashplate.links.px4.messages import pulses as pulses_of_px4
 from swashplate.links.servo import Servo
 from swashplate.links.servos import packaged, servo_mapping
 from swashplate.models.catalogue import vehicle
@@ -127,6 +128,27 @@ def test_every_packaged_mapping_loads(name: str) -> None:
     own = name.removesuffix("_px4")
     mapping = servo_mapping(name, OWN.get(own) or standing(vehicle(own)))
     assert np.isfinite(mapping.inputs([0.0] * 32, 0.01)).all()
+
+
+@pytest.mark.parametrize("name", ["raptor50", "helion", "xcell60"])
+def test_px4s_helicopter_outputs_come_back(name: str) -> None:
+    """PX4's servo k gets collective + cos(angle) pitch - sin(angle) roll (ActuatorEffectivenessHelicopter, arms of 1),
+    the motor stands first, the tail second; each command alone moves its own input alone, into the right direction."""
+    mapping = servo_mapping(f"{name}_px4", standing(vehicle(name)))
+    low, high = -0.05, 0.45  # CA_HELI_PITCH_C0 and C4
+
+    def flown(collective: float, roll: float, pitch: float, yaw: float) -> list[float]:
+        plate = [collective + math.cos(a) * pitch - math.sin(a) * roll for a in np.radians((0, 140, 220))]
+        controls = [1.0, yaw, *plate]
+        return mapping.inputs(pulses_of_px4(controls, mapping.shares), 100.0)
+
+    still = flown(low, 0.0, 0.0, 0.0)
+    assert still == pytest.approx([math.radians(-2.0), 0.0, 0.0, math.radians(10.0), 1.0], abs=1e-12)
+    assert flown(high, 0.0, 0.0, 0.0)[0] == pytest.approx(math.radians(12.0))
+    rolled, pitched = flown(0.1, 0.2, 0.0, 0.0), flown(0.1, 0.0, 0.2, 0.0)
+    assert rolled[1:3] == pytest.approx([0.0, 0.2 * math.radians(8.0)], abs=1e-12)
+    assert pitched[1:3] == pytest.approx([-0.2 * math.radians(8.0), 0.0], abs=1e-12)
+    assert flown(low, 0.0, 0.0, 1.0)[3] == pytest.approx(math.radians(30.0))
 
 
 GOOD = """kind = "servo-mapping"

@@ -12,8 +12,8 @@ import pytest
 
 import swashplate as sp
 from exported import compiled
+from swashplate.compiler import compiler
 from swashplate.errors import CardError
-from swashplate.export.compiler import compiler
 from swashplate.export.model_c import model_code
 from swashplate.export.traced import trace_vehicle
 from swashplate.flights.flight import Flight, Provenance, stream

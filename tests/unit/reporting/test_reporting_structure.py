@@ -158,7 +158,7 @@ def test_summary_has_five_lines_and_a_picture() -> None:
         assert len(report.summary) == 5
         assert report.picture is not None
     only = compose(None, validation(), modes=modes())
-    assert [label for label, _, _ in only.summary] == ["What", "Prediction", "Verdict", "Beware"]
+    assert [label for label, _, _ in only.summary] == ["What", "Prediction", "Verdict", "Warnings"]
 
 
 def test_summary_praises_the_model_only_where_it_beats_every_rival() -> None:

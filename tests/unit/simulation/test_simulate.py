@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from swashplate.api.simulate_batch import simulate_batch
 from swashplate.errors import DivergenceError, FlightError, SwashError, TrimError
 from swashplate.flights.flight import Flight
 from swashplate.models.catalogue import vehicle
@@ -12,7 +13,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation import trigonometry
 from swashplate.simulation.adaptive import simulate_adaptive
-from swashplate.simulation.batch import BLOCK, simulate_batch
+from swashplate.simulation.batch import BLOCK
 from swashplate.simulation.integrate import simulate, trajectory
 from swashplate.simulation.sensors import Sensors
 from swashplate.simulation.trim import trim
@@ -82,11 +83,15 @@ def test_the_same_call_gives_the_same_bits(coax: Vehicle) -> None:
         simulate(coax, inputs, sensors=Sensors())
 
 
-@pytest.mark.parametrize("interpolation", ["held", pytest.param("linear", marks=pytest.mark.proof)])
-def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str) -> None:
+@pytest.mark.parametrize(
+    ("interpolation", "engine"),
+    [("held", "c"), ("held", "jax"), *(pytest.param("linear", e, marks=pytest.mark.proof) for e in ("c", "jax"))],
+)
+def test_single_and_batched_flights_agree(coax: Vehicle, interpolation: str, engine: str) -> None:
     """To 1e-11 of each state's largest value, over two seconds and with other masses and starts."""
     inputs, masses, rolls = excited(coax, 201), np.array([0.302, 0.31, 0.333]), np.array([0.0, 0.1, -0.1])
-    batch = simulate_batch(coax, inputs, parameters={"mass": masses}, start={"phi": rolls}, interpolation=interpolation)
+    varied = {"parameters": {"mass": masses}, "start": {"phi": rolls}}
+    batch = simulate_batch(coax, inputs, **varied, interpolation=interpolation, engine=engine)
     for i in range(3):
         start = {"phi": float(rolls[i])}
         hover = {name: value for name, value in trim(coax).states().items() if name != "phi"}
@@ -103,10 +108,10 @@ def test_a_batch_in_blocks_is_the_batch(coax: Vehicle) -> None:
     """More vehicles than a block holds, kept every tenth step, inputs of their own."""
     count = BLOCK + 3
     inputs = {**trim(coax).commands(), "servo_roll": np.linspace(-0.1, 0.1, count) * np.ones((11, 1))}
-    batch = simulate_batch(coax, inputs, keep=10)
+    batch = simulate_batch(coax, inputs, keep=10, engine="jax")
     assert batch.states.shape == (2, 18, count)
     some = [0, BLOCK - 1, -1]  # of the first block and of the rest, as many as the rest so that nothing more compiles
-    few = simulate_batch(coax, {**inputs, "servo_roll": inputs["servo_roll"][:, some]}, keep=10)
+    few = simulate_batch(coax, {**inputs, "servo_roll": inputs["servo_roll"][:, some]}, keep=10, engine="jax")
     np.testing.assert_allclose(batch.states[:, :, some], few.states, atol=1e-13)
     assert len(batch) == count
 

@@ -36,7 +36,7 @@ def test_steps_are_those_of_the_simulation(name: str, options: dict[str, object]
     np.testing.assert_allclose(told.states, truth.array(flown.state_names)[-1], rtol=1e-11, atol=1e-11)
 
     # The specific force by the vehicle's own sum of forces, and the velocity by its own rotation.
-    nested = rebuild(flown.state, told.states.tolist())
+    nested = rebuild(flown.state, told.states)
     commands = flown.inputs(*inputs[-2].tolist())
     felt = flown.specific_force(nested, commands, flown.values(), around, FloatBackend())
     np.testing.assert_allclose(told.force, felt, rtol=1e-9, atol=1e-9)

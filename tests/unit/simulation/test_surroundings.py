@@ -7,10 +7,10 @@ import pytest
 from tests.cli.commands import swash
 
 import swashplate as sp
+from swashplate.api.simulate_batch import simulate_batch
 from swashplate.errors import CardError
 from swashplate.models.surroundings import environment_of
 from swashplate.physics.atmosphere import air_density
-from swashplate.simulation.batch import simulate_batch
 from swashplate.simulation.late import acting_rows
 
 HEAVE = sp.structure("heave")

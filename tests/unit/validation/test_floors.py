@@ -138,7 +138,7 @@ def test_a_flight_that_nothing_moves_has_a_low_ceiling_and_says_so() -> None:
     found = _floor(record, level)
     assert found.ceiling < 45.0  # the mean of noise is nearer than its last value: 29 %
     assert found.reached
-    assert "hardly moves" in found.words
+    assert "motion is small beside what cannot be predicted" in found.words
     assert "even the ceiling reaches" in found.words
 
 

@@ -206,4 +206,4 @@ def _along(
     start = ObserverEstimate(mean, covariance), mean.at[n:].set(0.0)
     due = jnp.where(jnp.arange(len(pose)) % plan.sampling[0].every == 0, 1.0, 0.0)
     seen, now = (pose[:, :, None], body), (driving[:, :, None], due)
-    return filtered(start, seen, now, correct=correct, predict=predict)[0]
+    return filtered(start, seen, now, correct=correct, predict=predict)[1][0]

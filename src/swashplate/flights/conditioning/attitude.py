@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation, Slerp
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, QUATERNION
+from swashplate.physics.backend import ArrayBackend
+from swashplate.physics.frames import Euler
+from swashplate.physics.quaternion import quaternion_of
 from swashplate.registry import listed
+
+if TYPE_CHECKING:  # half a second to import, and most of what imports this module turns nothing
+    from scipy.spatial.transform import Rotation
 
 _TOO_SHORT = 1e-6  # a quaternion shorter than this has no direction left to normalise
 
@@ -40,7 +47,16 @@ def continuous(quaternion: ArrayLike) -> Array:
 
 def rotation(quaternion: ArrayLike) -> Rotation:
     """SciPy rotation (body to local) of scalar-first quaternions, shape (n, 4) or (4,)."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_quat(np.roll(np.asarray(quaternion, dtype=np.float64), -1, axis=-1))
+
+
+def to_body(quaternion: Array, local: Array) -> Array:
+    """Vectors in body axes, shape (n, 3), of vectors in local axes, (n, 3) or (3,), and unit quaternions (n, 4)."""
+    v = quaternion[:, 1:]
+    twice = 2.0 * np.cross(v, np.broadcast_to(local, v.shape))
+    return np.asarray(local - quaternion[:, :1] * twice + np.cross(v, twice), dtype=np.float64)
 
 
 def euler_from_quaternion(quaternion: ArrayLike) -> Array:
@@ -52,7 +68,7 @@ def euler_from_quaternion(quaternion: ArrayLike) -> Array:
 def quaternion_from_euler(euler: ArrayLike) -> Array:
     """Scalar-first quaternions (n, 4), free of sign flips, of phi, theta, psi [rad], shape (n, 3)."""
     angles = np.atleast_2d(np.asarray(euler, dtype=np.float64))
-    return continuous(np.roll(Rotation.from_euler("ZYX", angles[:, ::-1]).as_quat(), 1, axis=-1))
+    return continuous(np.stack(quaternion_of(Euler(*angles.T), ArrayBackend()), axis=-1))
 
 
 def interpolate(time: ArrayLike, quaternion: ArrayLike, new_time: ArrayLike) -> Array:
@@ -60,12 +76,17 @@ def interpolate(time: ArrayLike, quaternion: ArrayLike, new_time: ArrayLike) -> 
 
     Times outside `time` take the nearest end.
     """
-    stamps = np.asarray(time, dtype=np.float64)
+    stamps, q = np.asarray(time, dtype=np.float64), continuous(quaternion)
     wanted = np.clip(np.asarray(new_time, dtype=np.float64), stamps[0], stamps[-1])
     if stamps.size == 1:
-        return np.repeat(continuous(quaternion), wanted.size, axis=0)
-    between = Slerp(stamps, rotation(continuous(quaternion)))(wanted)
-    return continuous(np.roll(between.as_quat(), 1, axis=-1))
+        return np.repeat(q, wanted.size, axis=0)
+    cosine = np.clip(np.sum(q[:-1] * q[1:], axis=1, keepdims=True), 0.0, 1.0)
+    across = q[1:] - cosine * q[:-1]
+    sine = np.linalg.norm(across, axis=1, keepdims=True)
+    across = across / np.where(sine > 0.0, sine, 1.0)  # the second axis of the plane in which the attitude turns
+    at = np.clip(np.searchsorted(stamps, wanted, side="right") - 1, 0, stamps.size - 2)
+    angle = np.arctan2(sine, cosine)[at] * ((wanted - stamps[at]) / np.diff(stamps)[at])[:, None]
+    return continuous(np.cos(angle) * q[at] + np.sin(angle) * across[at])
 
 
 def attitude_of(flight: Flight) -> Array:

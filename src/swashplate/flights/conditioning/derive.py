@@ -12,7 +12,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.attitude import attitude_of, rotation, with_euler
+from swashplate.flights.conditioning.attitude import attitude_of, to_body, with_euler
 from swashplate.flights.conditioning.filters import by_segment, uniform_rate
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import POSITION, RATES, VELOCITY
@@ -81,11 +81,10 @@ def derive(flight: Flight, *, gravity: float = GRAVITY) -> Flight:
     derived.update(zip(RATES, omega[:, :3].T, strict=True))
     if all(name in flight for name in POSITION):
         position = flight.array(POSITION)
-        to_body = rotation(q).inv()
         velocity = by_segment(flight, position, lambda part: differentiate(part, rate=rate))
         acceleration = by_segment(flight, position, lambda part: differentiate(part, rate=rate, order=2))
-        force = to_body.apply(acceleration - np.array([0.0, 0.0, gravity]))
-        derived.update(zip(VELOCITY, to_body.apply(velocity).T, strict=True))
+        force = to_body(q, acceleration - np.array([0.0, 0.0, gravity]))
+        derived.update(zip(VELOCITY, to_body(q, velocity).T, strict=True))
         derived.update(zip(("ax", "ay", "az"), force.T, strict=True))
     for name, values in derived.items():
         if name not in flight:

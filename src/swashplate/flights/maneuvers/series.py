@@ -14,6 +14,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import ManeuverError
 from swashplate.flights.maneuvers import multisine
+from swashplate.registry import nearest
 
 AXES = ("roll", "pitch", "yaw", "heave")
 """What a maneuver moves, where it names no input; which inputs that are is the vehicle's to say."""
@@ -80,10 +81,11 @@ class Maneuver:
                 continue
             for name, share in (axes or {}).get(axis, {axis: 1.0}).items():
                 if name not in added:
+                    known = (*(axes or {}), *names)
                     raise ManeuverError(
-                        f"moves '{name}', which the vehicle does not have.",
+                        f"the vehicle has no axis and no input '{name}'.",
                         channel=axis,
-                        hint=f"Its inputs are {', '.join(names)}.",
+                        hint=" ".join(filter(None, (nearest(axis, known), f"It has {', '.join(known)}."))),
                     )
                 added[name] = added[name] + share * signal
         return added

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from swashplate.arrays import Array
 from swashplate.flights import units
@@ -59,7 +58,11 @@ def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
         place: of every stamped message of the log, increasing, shape (n,).
         time: its stamp [s].
     """
-    smooth = median_filter(time, size=_WINDOW, mode="nearest") if time.size else time
+    if not np.any(np.diff(time) < 0.0):
+        return np.zeros(0, dtype=np.int64)
+    from scipy.ndimage import median_filter  # a third of a second that most logs need not wait
+
+    smooth = median_filter(time, size=_WINDOW, mode="nearest")
     falls = np.flatnonzero(np.diff(smooth) < -_FALL)
     found = []
     for i in falls.tolist():

@@ -222,25 +222,35 @@ def _inside(values: Array, name: str, unit: str | None, source: Source) -> tuple
     return converted, units.inside_unit(unit)
 
 
-def _table(source: Source, mapping: Mapping[str, Any]) -> tuple[list[str] | None, list[list[str]], int]:
+def _table(source: Source, mapping: Mapping[str, Any]) -> tuple[list[str] | None, Sequence[Sequence[str]], int]:
     """Header cells (None without one), rows of data, and the line number of the first row."""
     delimiter = mapping.get("delimiter")
     if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
         raise FlightError(f"delimiter = {delimiter!r} in the mapping is not one character.", where=source.name)
-    rows = tables.rows_of(source.text or "", where=source.name, delimiter=delimiter)
-    start = 0
-    while start < len(rows) and (not any(rows[start]) or rows[start][0].startswith("#")):
-        start += 1
+    text, headed = source.text or "", mapping.get("header", True) is not False
+    numbers = tables.NumberRows.of(text, delimiter=delimiter)
+    if numbers is not None:
+        head = tables.rows_of("\n".join(numbers.head), where=source.name, delimiter=numbers.mark)
+        if _first(head) + headed == len(head):
+            return _names(head[-1]) if headed else None, numbers, len(head) + 1
+    rows = tables.rows_of(text, where=source.name, delimiter=delimiter)
+    start = _first(rows)
     while len(rows) > start and not any(rows[-1]):
         rows.pop()
     if start == len(rows):
         raise FlightError("holds no table.", where=source.name, hint="Export it again.")
-    if mapping.get("header", True) is False:
-        return None, rows[start:], start + 1
-    header = rows[start]
+    return (_names(rows[start]) if headed else None), rows[start + headed :], start + headed + 1
+
+
+def _first(rows: Sequence[Sequence[str]]) -> int:
+    """The first row that is neither blank nor a comment."""
+    return next((i for i, row in enumerate(rows) if any(row) and not row[0].startswith("#")), len(rows))
+
+
+def _names(header: list[str]) -> list[str]:
     while header and not header[-1]:
         header = header[:-1]  # a separator at the end of each line
-    return header, rows[start + 1 :], start + 2
+    return header
 
 
 def read(source: Source, options: Options) -> Flight:
@@ -283,13 +293,14 @@ def read(source: Source, options: Options) -> Flight:
     iso = "time" in columns and bool(rows) and _is_date(rows[0], columns["time"].index)
     _check_units({name: c for name, c in columns.items() if not (iso and name == "time")}, options, source)
     width = max(column.index for column in columns.values()) + 1
-    for i, row in enumerate(rows):
-        if len(row) < width:
-            raise FlightError(
-                f"line {first_line + i} has {len(row)} cell{'s' * (len(row) != 1)}, expected {width}.",
-                where=source.name,
-                hint="The line is cut off: remove or complete it.",
-            )
+    short = tables.first_shorter(rows, width)
+    if short is not None:
+        found = len(rows[short])
+        raise FlightError(
+            f"line {first_line + short} has {found} cell{'s' * (found != 1)}, expected {width}.",
+            where=source.name,
+            hint="The line is cut off: remove or complete it.",
+        )
     channels: dict[str, Array] = {}
     labels: dict[str, str] = {}
     time, zero = np.arange(len(rows)) / float(rate or 1.0), 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
@@ -59,6 +58,8 @@ def multiply(a: Array, b: Array) -> Array:
 
 
 def _quaternion(matrix: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_matrix(matrix).as_quat(scalar_first=True), dtype=np.float64)
 
 
@@ -83,6 +84,8 @@ def from_rotation(angles: Array, rotation: str, *, where: str | None = None) -> 
         rotation: "helical" (rotation vector: axis times angle) or "euler_" and an order such as "euler_xyz"
             (intrinsic rotations about the named axes, in that order).
     """
+    from scipy.spatial.transform import Rotation
+
     order = rotation.removeprefix("euler_").upper()
     if rotation == "helical":
         turned = Rotation.from_rotvec(angles)

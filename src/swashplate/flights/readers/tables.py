@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 
@@ -48,6 +50,81 @@ def _is_bare(text: str) -> bool:
     return text.isascii() and not any(mark in text for mark in ' \t\v\f\x1c\x1d\x1e\x1f"')
 
 
+_OF_NUMBERS = b"0123456789+-.eE,;\t \n"
+_MOST_HEAD = 100
+"""Lines: a table of numbers that begins later is read cell by cell."""
+
+
+@dataclass(frozen=True)
+class NumberRows(Sequence[list[str]]):
+    """Rows of nothing but numbers, as many in each: parsed at once, split into cells only where one is asked for.
+
+    Attributes:
+        head: the lines before the first row.
+        lines: the rows as they stand in the file.
+        mark: the separator.
+        numbers: shape (rows, columns).
+    """
+
+    head: list[str]
+    lines: list[str]
+    mark: str
+    numbers: Array
+
+    @staticmethod
+    def of(text: str, *, delimiter: str | None = None) -> NumberRows | None:
+        """The rows of a text; None where a cell is blank or no number, or a row is longer than another.
+
+        Python's own numbers are meant, to the last bit (numpy's C parser rounds as `float` does); what is None is read
+        by `rows_of`, which says what is wrong and where.
+        """
+        begin, head = 0, list[str]()
+        while len(head) < _MOST_HEAD and (end := text.find("\n", begin)) >= 0:
+            if _bare_numbers(text[begin:end].removesuffix("\r")):
+                break
+            head.append(text[begin:end])
+            begin = end + 1
+        body = text[begin:].replace("\r\n", "\n").rstrip("\n")
+        mark = delimiter or separator("\n".join(text.split("\n", 40)[:40]))
+        if mark not in tuple(",;\t") or not _bare_numbers(body):
+            return None
+        lines = body.split("\n")
+        try:
+            numbers = np.loadtxt(lines, delimiter=mark, comments=None, ndmin=2)
+        except ValueError:
+            return None
+        if len(numbers) < len(lines):  # numpy passes over blank lines
+            return None
+        return NumberRows(head, lines, mark, numbers)
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @overload
+    def __getitem__(self, index: int) -> list[str]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[list[str]]: ...
+    def __getitem__(self, index: int | slice) -> list[str] | list[list[str]]:
+        if isinstance(index, slice):
+            return [self._cells(line) for line in self.lines[index]]
+        return self._cells(self.lines[index])
+
+    def _cells(self, line: str) -> list[str]:
+        return [cell.strip() for cell in line.split(self.mark)]
+
+
+def _bare_numbers(text: str) -> bool:
+    """Whether a text has no character that is not a number's, a separator or a line end, and is not empty."""
+    return bool(text) and text.isascii() and not text.encode().translate(None, _OF_NUMBERS)
+
+
+def first_shorter(rows: Sequence[Sequence[str]], width: int) -> int | None:
+    """The first row with fewer cells than `width`; None where there is none."""
+    if isinstance(rows, NumberRows):
+        return 0 if rows.numbers.shape[1] < width else None
+    return next((i for i, row in enumerate(rows) if len(row) < width), None)
+
+
 def number(cell: str) -> float:
     """A cell as a number, NaN where it is blank.
 
@@ -68,6 +145,8 @@ def column(rows: Sequence[Sequence[str]], index: int, *, name: str, where: str, 
     Raises:
         FlightError: where a cell is not a number, naming its line.
     """
+    if isinstance(rows, NumberRows) and index < rows.numbers.shape[1]:
+        return rows.numbers[:, index].copy()
     cells = [row[index] if index < len(row) else "" for row in rows]
     try:
         if "_" not in "".join(cells):  # see `number`

@@ -92,9 +92,9 @@ def untold(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
         lost = ~known & np.isfinite(found.input_power[:, i])
         if found.method == "direct" or name in dead or not lost.any():
             continue
-        teller = "the references tell" if found.method == "joint" else "its sweep tells"
+        weak = "the references are" if found.method == "joint" else "its sweep is"
         words.append(
-            f"{teller} too little of '{name}' at {_bands(found.omega, lost)}, where a loop's answer to gusts rules it: "
+            f"{weak} too weak in '{name}' at {_bands(found.omega, lost)}, where a loop's response to gusts dominates: "
             "no number is given there. Sweep slower or larger."
         )
     return words

@@ -16,7 +16,8 @@ import jax.numpy as jnp
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, commands
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.time.innovations import FilterPlan, filter_record, unpack
+from swashplate.identification.time.innovations import FilterPlan, traced_run, unpack
+from swashplate.identification.time.record_filter import FirstMotion
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 
@@ -27,27 +28,10 @@ def _traced(
     parameters, nuisances, noise = unpack(plan, data, row)
 
     def one(
-        y: jax.Array,
-        u: jax.Array,
-        voltage: jax.Array,
-        value: jax.Array,
-        rate: jax.Array,
-        velocity: jax.Array,
-        starts: jax.Array,
-        nuisance: Nuisance,
+        y: jax.Array, u: jax.Array, voltage: jax.Array, seen: FirstMotion, starts: jax.Array, nuisance: Nuisance
     ) -> Any:
-        _, _, states = filter_record(
-            plan.model,
-            y,
-            u,
-            voltage,
-            value=value,
-            rate=rate,
-            velocity=velocity,
-            parameters=parameters,
-            noise=noise,
-            nuisance=nuisance,
-        )
+        numbers = {"parameters": parameters, "noise": noise, "nuisance": nuisance}
+        _, _, states = traced_run(plan.model, y, u, voltage, seen, **numbers)
         reaching = commands(plan.model.vehicle, plan.model.dt, u, nuisance)
 
         def run(start: jax.Array) -> Any:
@@ -56,7 +40,7 @@ def _traced(
 
         return jax.vmap(run)(starts)
 
-    own = (data["outputs"], data["inputs"], data["voltage"], data["value"], data["rate"], data["velocity"])
+    own = (data["outputs"], data["inputs"], data["voltage"], FirstMotion(*data["seen"]))
     return jax.vmap(one)(*own, starts, nuisances)
 
 

@@ -303,7 +303,7 @@ def _compiled(chosen: Callable[[jax.Array, jax.Array], jax.Array]) -> Any:
             x, pushed = state
             return phi @ x + pushed
 
-        errors, states = filtered(x, measured, drive, correct=correct, predict=predict)
+        _, (errors, states) = filtered(x, measured, drive, correct=correct, predict=predict)
         return chosen(errors, states[0] @ phi.T + states[1])
 
     return jax.jit(jax.vmap(one, in_axes=(0, 0, 0, 0, 1, 1)))

@@ -16,7 +16,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import SEPARATE, Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
+from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
@@ -26,9 +26,10 @@ from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time import innovations_ahead
-from swashplate.identification.time.innovations import FilterPlan, innovations, tangents, traced_cost, unpack
+from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost, unpack
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.start_states import mean_velocity, slopes
+from swashplate.identification.time.record_filter import seen_at_start
+from swashplate.identification.time.start_states import slopes
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
@@ -153,28 +154,31 @@ class PredictionError:
             )
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
-        first = [slopes(piece, np.array([0])) for piece in pieces]
+        seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
         self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
-        self._data = {
+        self._data: dict[str, Any] = {
             **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
-            "value": jnp.asarray(np.stack([value[0] for value, _ in first])),
-            "rate": jnp.asarray(np.stack([rate[0] for _, rate in first])),
-            "velocity": jnp.asarray(np.stack([mean_velocity(table.vehicle, piece) for piece in pieces])),
+            "seen": tuple(jnp.asarray(np.stack(rows)) for rows in zip(*seen, strict=True)),
             "card": jnp.asarray(table.card_row),
             "log": jnp.asarray(self._log),
             "scale": jnp.asarray(self.row.scale),
             "noise": jnp.asarray([float(value) for value in self.noise]),
         }
-        late = np.arange(stacked["mask"].shape[1]) >= round(SETTLING / self.model.dt)
-        self.counted = np.asarray(stacked["mask"], dtype=bool) & late
+        self._runs = tuple(
+            RecordRun(self._plan, int(log), piece.outputs, piece.inputs, piece.voltage, first)
+            for log, piece, first in zip(self._log, pieces, seen, strict=True)
+        )
+        settled = round(SETTLING / self.model.dt)
+        self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
 
     def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
         """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
         return unpack(self._plan, self._data, jnp.asarray(row))
 
-    def innovations(self, row: Array) -> tuple[Any, Any, FilterState]:
-        """Innovations (records, n, outputs), their covariances (records, outputs, outputs) and the filtered states."""
-        return innovations(self._plan, self._data, jnp.asarray(row))  # type: ignore[no-any-return]
+    def runs(self, row: Array) -> list[Filtered]:
+        """The filter's run along every record."""
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+        return [run.filtered(*given) for run in self._runs]
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
@@ -202,44 +206,52 @@ class PredictionError:
     # ---- likelihood --------------------------------------------------------------------------------------------
     def cost(self, row: Array) -> float:
         """Negative log-likelihood of the counted innovations (without its constant)."""
-        found, covariances, _ = self.innovations(row)
-        return self._cost(np.asarray(found), np.asarray(covariances))
+        return self._cost(self.runs(row))
 
-    def _cost(self, found: Array, covariances: Array) -> float:
+    def _cost(self, runs: Sequence[Filtered]) -> float:
         total = 0.0
-        for nu, S, counted in zip(found, covariances, self.counted, strict=True):
-            nu = nu[counted]
+        for run, counted in zip(runs, self.counted, strict=True):
+            nu, S = run.innovations[counted], np.asarray(run.begin.gain.covariance)
             if not (np.isfinite(nu).all() and np.isfinite(S).all()):
                 return np.inf
             try:
                 L = np.linalg.cholesky(S)
             except np.linalg.LinAlgError:
                 return np.inf
-            total += robust.huber(np.linalg.solve(L, nu.T)) + nu.shape[0] * float(np.log(np.diag(L)).sum())
+            total += robust.huber(np.asarray(np.linalg.solve(L, nu.T), dtype=np.float64)) + nu.shape[0] * float(
+                np.log(np.diag(L)).sum()
+            )
         return total
 
     def scores(self, row: Array) -> tuple[float, Array, Array]:
         """Cost, gradient and Fisher information (the covariance's part included; Ljung 1999, sec. 9.4)."""
-        gradient, information, values, _ = self._accumulate(row)
-        return self._cost(*values), gradient, information
+        gradient, information, runs, _ = self._accumulate(row)
+        return self._cost(runs), gradient, information
 
     def traced(self) -> TracedCost:
         """The cost as a function that JAX differentiates."""
-        return TracedCost(traced_cost, self._plan, self._data | {"counted": jnp.asarray(self.counted)})
+        plan, data = self.traced_at()
+        counted = np.zeros(data["voltage"].shape, dtype=bool)
+        for padded, here in zip(counted, self.counted, strict=True):
+            padded[: here.size] = here
+        return TracedCost(traced_cost, plan, data | {"counted": jnp.asarray(counted)})
 
-    def _accumulate(self, row: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
-        given = (self._plan, self._data, jnp.asarray(row))
-        *found, states = innovations(*given)
-        values = (np.asarray(found[0]), np.asarray(found[1]))
-        p = len(self.row)
+    def traced_at(self) -> tuple[FilterPlan, dict[str, Any]]:
+        """What the traceable functions of `innovations` take beside a row."""
+        return self._plan, self._data
+
+    def _accumulate(self, row: Array) -> tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]:
+        p, runs = len(self.row), self.runs(row)
+        moved: list[tuple[Array, Array]] = []
         gradient, information = np.zeros(p), np.zeros((p, p))
-        by_row = tangents(*given, states)
-        moved = (np.asarray(by_row[0]), np.asarray(by_row[1]))
-        for r, counted in enumerate(self.counted):
-            nu, S = values[0][r][counted], values[1][r]
+        for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
+            nu, S = run.innovations[counted], np.asarray(run.begin.gain.covariance)
             if not np.isfinite(nu).all():
-                return gradient, information, values, moved
-            d_nu, dS = moved[0][:, r][:, counted], moved[1][:, r]
+                return gradient, information, runs, moved
+            scale = self.row.scale
+            by_row = mine.moved(run, self.table.card_row, row * scale)
+            d_nu, dS = by_row[0][:, counted] * scale[:, None, None], by_row[1] * scale[:, None, None]
+            moved.append((d_nu, dS))
             Li = np.linalg.inv(np.linalg.cholesky(S))
             white = nu @ Li.T
             weight = robust.weights(white)
@@ -252,7 +264,7 @@ class PredictionError:
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
             information += (flat * weight.ravel()) @ flat.T
             information += _by_covariance(dM, nu.shape[0])
-        return gradient, information, values, moved
+        return gradient, information, runs, moved
 
     def refresh(self, row: Array) -> None:
         """Nothing is held between iterations: the noise is part of the row."""
@@ -280,34 +292,30 @@ class PredictionError:
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its one-step predictions."""
-        found, covariances, states = self.innovations(row)
         kept = [self.table.vehicle.index(name) for name in PREDICTED]
-        made = []
-        for number, piece in enumerate(self.pieces):
-            n = piece.time.size
-            made.append(
-                Comparison(
-                    record=piece,
-                    counted=self.counted[number][:n],
-                    model=piece.outputs - self.unturned(np.asarray(found)[number][:n], piece),
-                    sigma=np.sqrt(np.diag(np.asarray(covariances)[number])),
-                    states=np.asarray(states.x)[number][:n][:, kept],
-                )
+        return tuple(
+            Comparison(
+                record=piece,
+                counted=counted.astype(np.float64),
+                model=piece.outputs - self.unturned(run.innovations, piece),
+                sigma=np.sqrt(np.diag(run.begin.gain.covariance)),
+                states=run.states.x[:, kept],
             )
-        return tuple(made)
+            for piece, run, counted in zip(self.pieces, self.runs(row), self.counted, strict=True)
+        )
 
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
         """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
 
         The last is the information (p, p) that lies in the innovations' covariance instead.
         """
-        _, _, values, moved = self._accumulate(row)
+        _, _, runs, moved = self._accumulate(row)
         white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
-        for r, counted in enumerate(self.counted):
-            Li = np.linalg.inv(np.linalg.cholesky(values[1][r]))
-            white.append(values[0][r][counted] @ Li.T)
-            sensitivities.append(moved[0][:, r][:, counted] @ Li.T)
-            rest += _by_covariance(Li @ moved[1][:, r] @ Li.T, int(counted.sum()))
+        for run, (d_nu, dS), counted in zip(runs, moved, self.counted, strict=True):
+            Li = np.linalg.inv(np.linalg.cholesky(run.begin.gain.covariance))
+            white.append(run.innovations[counted] @ Li.T)
+            sensitivities.append(d_nu @ Li.T)
+            rest += _by_covariance(Li @ dS @ Li.T, int(counted.sum()))
         return white, sensitivities, rest
 
 

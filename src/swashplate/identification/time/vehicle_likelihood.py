@@ -265,7 +265,7 @@ def _filter(plan: _Plan, given: Mapping[str, jax.Array], data: Mapping[str, jax.
 def _traced_errors(plan: _Plan, given: Any, data: Any, numbers: Any) -> Any:
     """Errors of one record (n, n_outputs): measured less predicted from earlier samples (output error: from none)."""
     f = _filter(plan, given, data, numbers)
-    return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[0]
+    return filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1][0]
 
 
 def _traced_cost(plans: tuple[_Plan, ...], data: Mapping[str, Any], row: jax.Array) -> Any:
@@ -289,7 +289,7 @@ def _traced_ahead(
 ) -> Any:
     """Measured less predicted, `steps` samples after the filter's state at each start (starts, horizons, outputs)."""
     f = _filter(plan, given, data, numbers)
-    states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
+    _, states = filtered(f.start, data["outputs"], f.along, correct=f.correct, predict=f.predict)[1]
 
     def run(start: jax.Array) -> Any:
         def sample(x: jax.Array, k: jax.Array) -> tuple[Any, Any]:

@@ -81,11 +81,11 @@ def place(frames: Frames, sender: Address, count: int, now: float) -> tuple[Fram
         return here, PacketAction.START
     if sender != frames.sender:
         return _claimed(frames, here)
-    frames = frames._replace(heard=now, claim=None)  # whatever it says, the owner is there
-    if count == frames.last:
-        return here, PacketAction.RESEND
     if count == frames.last + 1:
         return here, PacketAction.NEXT
+    if count == frames.last:
+        return here, PacketAction.RESEND
+    frames = frames._replace(heard=now, claim=None)  # whatever it says, the owner is there
     if frames.last < count <= frames.last + AHEAD:
         return here, PacketAction.SKIP
     fallen = frames.last - count

@@ -60,11 +60,13 @@ def parse(data: bytes, used: Iterable[int] = ()) -> ServoPacket | Refusal:
         return Refusal(
             "length", f"a servo packet with magic {magic} has {len(data)} bytes, expected {form.size}; it is ignored."
         )
-    _, rate, count, *pulses = form.unpack(data)
+    fields = form.unpack(data)
+    rate, count, pulses = fields[1], fields[2], fields[3:]
     if not RATES[0] <= rate <= RATES[1]:
         return Refusal(
             "rate", f"a servo packet asks for {rate} Hz, expected {RATES[0]} to {RATES[1]}; set SIM_RATE_HZ. Ignored."
         )
+    least, most = PULSES
     for number in used:
         if number > len(pulses):
             return Refusal(
@@ -73,10 +75,10 @@ def parse(data: bytes, used: Iterable[int] = ()) -> ServoPacket | Refusal:
                 "SERVO_32_ENABLE 1 or change the mapping. Ignored.",
             )
         pulse = pulses[number - 1]
-        if pulse != NO_PULSE and not PULSES[0] <= pulse <= PULSES[1]:
+        if not least <= pulse <= most and pulse != NO_PULSE:
             return Refusal(
                 "pulse",
                 f"a servo packet has a pulse of {pulse} us on output {number}, expected {PULSES[0]} to {PULSES[1]}; "
                 "it is ignored.",
             )
-    return ServoPacket(rate, count, tuple(pulses))
+    return ServoPacket(rate, count, pulses)

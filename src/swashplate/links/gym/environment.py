@@ -34,7 +34,7 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         vehicle: a vehicle, its name or a file.
         task: "hover", "trajectory", "sweep" or a `Task`.
         task_options: for the task by name, e.g. {"duration": 5.0}.
-        options: see `flying`: rate, substeps, authority, spread, randomize, wind, inner.
+        options: see `flying`: rate, substeps, authority, spread, randomize, wind, inner, ground.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (Gymnasium's own declaration)

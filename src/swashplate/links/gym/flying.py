@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -31,6 +32,8 @@ from swashplate.simulation.dynamics import (
     row_rates,
 )
 from swashplate.simulation.runge_kutta import rk4_steps
+from swashplate.simulation.standing import at_rest, standing
+from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, trim
 
@@ -49,6 +52,8 @@ INNER_LIMIT = 1000.0
 _BODY = len(OBSERVED)
 SPREAD = {"place": 0.3, "velocity": 0.2, "attitude": 0.05, "rates": 0.1}
 """Half width of the uniform distribution about the trim that episodes start from [m, m/s, rad, rad/s]."""
+ABOVE = 2.0
+"""m above the ground that a task's place is for a vehicle that starts on it."""
 CRASH = -10.0
 """Reward of the step that ends an episode by leaving the limits."""
 EFFORT = 0.01
@@ -69,6 +74,7 @@ class Flying:
         scatter: relative standard deviations of parameters, drawn anew for each episode; by place in the row.
         spread: scale of the start's distribution.
         inner: whether states beyond the rigid body's are observed as well, less the trim's.
+        rest: the state row that episodes start from instead, on the ground with its rotors stopped; None for the trim.
     """
 
     vehicle: Vehicle
@@ -84,6 +90,7 @@ class Flying:
     scatter: Mapping[int, float]
     spread: float
     inner: bool = False
+    rest: Array | None = None
 
     @property
     def observed(self) -> tuple[str, ...]:
@@ -97,9 +104,13 @@ class Flying:
 
     def start(self, random: np.random.Generator) -> tuple[Array, Array]:
         """A state row and a parameter row of a new episode."""
-        x = np.array(self.trim.state)
-        for first, name in zip((0, 3, 6, 9), SPREAD, strict=True):
-            x[first : first + 3] += self.spread * SPREAD[name] * random.uniform(-1.0, 1.0, 3)
+        if self.rest is None:
+            x = np.array(self.trim.state)
+            for first, name in zip((0, 3, 6, 9), SPREAD, strict=True):
+                x[first : first + 3] += self.spread * SPREAD[name] * random.uniform(-1.0, 1.0, 3)
+        else:
+            x = np.array(self.rest)
+            x[8] = self.spread * SPREAD["attitude"] * random.uniform(-1.0, 1.0)
         p = self.parameters.copy()
         for place, sigma in self.scatter.items():
             p[place] *= 1.0 + sigma * float(np.clip(random.standard_normal(), -3.0, 3.0))
@@ -152,12 +163,13 @@ def flying(
     task: Task,
     *,
     rate: float = 50.0,
-    substeps: int = 5,
+    substeps: int | None = None,
     authority: float = 0.2,
     spread: float = 1.0,
     randomize: Mapping[str, float] | None = None,
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
     inner: bool = False,
+    ground: bool = False,
 ) -> Flying:
     """A vehicle with a task, ready to step.
 
@@ -165,20 +177,26 @@ def flying(
         vehicle: a vehicle, its name or a card's or model's file.
         task: see `tasks`.
         rate: actions per second [Hz].
-        substeps: Runge-Kutta steps between actions.
+        substeps: Runge-Kutta steps between actions; None for 5, or as many as skids on the ground need.
         authority: share of an input's whole range that an action of 1 adds to its trim.
         spread: scale of `SPREAD`; 0 starts every episode at the trim.
         randomize: relative standard deviation by parameter name, drawn anew for each episode, cut at three.
         wind: north, east and down [m/s].
         inner: observe the states of rotors, bar and inflow too.
+        ground: there is ground at z = 0 (`standing`), and episodes start on it with the rotors stopped and the heading
+            spread; the task's place is `ABOVE` it. A throttle that a trim holds is then an action like the others.
 
     Raises:
-        SwashError: for numbers that make no sense, or a parameter that the vehicle does not have.
+        SwashError: for numbers that make no sense, a parameter that the vehicle does not have, or one without ground.
         TrimError: where there is no hover.
     """
     enable_double_precision()
     enable_compilation_cache()
     chosen = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    if ground:
+        chosen = standing(chosen)
+    if substeps is None:
+        substeps = max(1, math.ceil(1.0 / (rate * LONGEST_STEP) - 1e-9)) if ground and rate > 0.0 else 5
     if not (rate > 0.0 and substeps >= 1 and 0.0 < authority <= 1.0 and spread >= 0.0):
         raise SwashError(
             f"rate is {rate:g}, substeps {substeps}, authority {authority:g} and spread {spread:g}; expected positive "
@@ -188,24 +206,28 @@ def flying(
     for name in randomize or {}:
         if name not in chosen.parameter_names:
             raise SwashError("is no parameter of the vehicle.", where=chosen.name, channel=f"randomize {name}")
-    held = dict(chosen.trim_held)
+    held = {} if ground else dict(chosen.trim_held)  # who spools up has the throttle
     free = tuple(i for i, name in enumerate(chosen.input_names) if name not in held)
     steps = round(task.duration * rate)
     low, high = np.array(chosen.input_limits).T
+    hover = trim(chosen, height=ABOVE if ground else None, environment=surroundings)
+    table = task.targets(np.arange(steps + 1) / rate)
+    table[:, :3] += hover.state[:3]
     return Flying(
         chosen,
         task,
-        trim(chosen, environment=surroundings),
+        hover,
         free,
         authority * (high - low)[list(free)],
         1.0 / rate,
         substeps,
         steps,
-        task.targets(np.arange(steps + 1) / rate),
+        table,
         parameter_row(chosen, surroundings),
         {chosen.parameter_names.index(name): float(sigma) for name, sigma in (randomize or {}).items()},
         spread,
         inner,
+        at_rest(chosen, surroundings) if ground else None,
     )
 
 

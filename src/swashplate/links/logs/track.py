@@ -8,7 +8,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
-from swashplate.flights.conditioning.attitude import euler_from_quaternion, quaternion_from_euler, rotation
+from swashplate.flights.conditioning.attitude import euler_from_quaternion, quaternion_from_euler, to_body
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION
 from swashplate.links.live.picture import picture
@@ -53,7 +53,7 @@ def track(opened: Opened) -> dict[str, Any]:
         angles = np.stack([np.interp(time, angled[0], np.unwrap(column)) for column in angled[1].T], axis=-1)
     # Velocity along the body axes, of the track itself: what the instruments show is what is drawn.
     drift = np.gradient(places, time, axis=0)
-    speeds = rotation(quaternion_from_euler(angles)).inv().apply(drift)
+    speeds = to_body(quaternion_from_euler(angles), drift)
     notes = []
     if len(placed) < len(POSITION):
         notes.append("The log has no place: the attitude is drawn at one point.")

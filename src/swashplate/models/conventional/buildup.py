@@ -59,18 +59,20 @@ def build_up(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> 
             where=vehicle.name,
             hint="Use inflow 'glauert' or 'uniform', or automatic differentiation.",
         )
-    if options.delta3 or options.stabilator:
-        raise SwashError(
-            "delta3 or stabilator have no closed-form build-up.",
-            where=vehicle.name,
-            hint="Leave these options out, or use automatic differentiation.",
-        )
-    if options.tip_loss or options.induced_factor or options.ground_effect != "none":
-        raise SwashError(
-            "tip_loss, induced_factor or ground_effect have no closed-form build-up.",
-            where=vehicle.name,
-            hint="Leave these options out, or use automatic differentiation.",
-        )
+    without = {
+        "delta3 or stabilator": options.delta3 or options.stabilator,
+        "tip_loss, induced_factor or ground_effect": options.tip_loss
+        or options.induced_factor
+        or options.ground_effect != "none",
+        "aerofoil tables": options.aerofoil is not None,
+    }
+    for words, chosen in without.items():
+        if chosen:
+            raise SwashError(
+                f"{words} have no closed-form build-up.",
+                where=vehicle.name,
+                hint="Leave these options out, or use automatic differentiation.",
+            )
     state: HelicopterState = rebuild(vehicle.state, [float(value) for value in x])
     par, density = vehicle.values(), float(environment.air_density)
     body = state.body

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from swashplate.models.conventional import drive
 from swashplate.models.conventional.airframe import airframe
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
-from swashplate.models.conventional.main_rotor import Contribution, main_rotor
+from swashplate.models.conventional.main_rotor import Contribution, MainRotor, main_rotor
 from swashplate.physics import bell_hiller, ground_contact
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.bell_hiller import Bar
@@ -110,6 +110,7 @@ class HelicopterLoads(NamedTuple):
     grip: Grip | None
     induced: Scalar
     power: Scalar
+    main: MainRotor
 
     def contributions(self) -> dict[str, Contribution]:
         """The contributors that there are, by name."""
@@ -224,6 +225,7 @@ def loads(
         bending,
         rotor.induced,
         load * turning,
+        rotor,
     )
 
 

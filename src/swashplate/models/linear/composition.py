@@ -180,7 +180,7 @@ def _behind_actuators(
 def _trust(names: Sequence[str]) -> str:
     holds = list(dict.fromkeys(PARTS[name].holds for name in names if PARTS[name].holds))
     text = "; ".join(holds) or "about hover"
-    return f"{text[0].upper()}{text[1:]}. Take out what is not told (--reduce)."
+    return f"{text[0].upper()}{text[1:]}. Remove what the responses do not determine (--reduce)."
 
 
 def _parameters(found: dict[str, Any]) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def test_axes_move_the_right_inputs() -> None:
     assert [heave[name][0] for name in INPUTS] == [0.1, 0.1, 0.0, 0.0]
     assert [yaw[name][0] for name in INPUTS] == [-0.1, 0.1, 0.0, 0.0]
     assert [named[name][0] for name in INPUTS] == [0.0, 0.1, 0.0, 0.0]
-    with pytest.raises(ManeuverError, match="moves 'rudder'"):
+    with pytest.raises(ManeuverError, match="the vehicle has no axis and no input 'rudder'"):
         parse("step:rudder,1s").offsets(time, inputs=INPUTS, axes=axes)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import swashplate as sp
+from swashplate.compiler import compiler, shared_library
 from swashplate.errors import FlightError, IdentificationError
-from swashplate.export.compiler import compiler, shared_library
 from swashplate.filtering.sensor_suite import suite
 from swashplate.flights.flight import Flight
 from swashplate.identification.recursive.fourier_regression import CLOCK, GAP, NO_NUMBER

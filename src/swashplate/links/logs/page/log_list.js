@@ -5,6 +5,7 @@ import { get, post } from "./server.js";
 import { logs, offset, offsets, on, ready, say } from "./state.js";
 import { attempt, trouble } from "./trouble.js";
 
+const entries = new Map(); // by log, what the list shows of it
 let timer = 0;
 
 function shift(log, seconds) {
@@ -23,9 +24,7 @@ const align = attempt(async (log) => {
 });
 
 function clock(log) {
-  const [first] = ready();
-  if (ready().length < 2 || log.state !== "ready" || log.id === first.id) return null;
-  const seconds = make("input", { type: "number", step: "0.01", "aria-label": `offset of ${log.name} in seconds`, value: +offset(log).toFixed(4),
+  const seconds = make("input", { type: "number", step: "0.01", "aria-label": `offset of ${log.name} in seconds`,
     onchange: (event) => shift(log, event.target.valueAsNumber) });
   return make("div", { class: "offset" }, make("label", {}, "shifted by ", seconds, " s"),
     make("button", { onclick: () => align(log), title: "match the motion that both have seen" }, "Align by motion"));
@@ -38,15 +37,25 @@ function facts(log) {
   return make("small", {}, words.filter(Boolean).join(" · "));
 }
 
+function entry(log) {
+  const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
+  const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, log.name), off);
+  return { item: make("li", { "data-log": log.id }, name, told), clock: clock(log), line, told };
+}
+
+// What is on the page stays there and is changed: the list is shown anew while logs are read, and someone may be typing in it.
 function show() {
   const order = ready().map((log) => log.id);
-  $("logs").replaceChildren(
-    ...[...logs.values()].map((log) => {
-      const k = order.indexOf(log.id), style = k >= 0 ? sample(ink("ink"), DASHES[k % DASHES.length]) : "";
-      const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
-      return make("li", { "data-log": log.id }, make("div", { class: "name" }, style, make("span", {}, log.name), off), facts(log), clock(log) ?? "");
-    }),
-  );
+  for (const [id, { item }] of entries) if (!logs.has(id)) item.remove(), entries.delete(id);
+  for (const log of logs.values()) {
+    if (!entries.has(log.id)) entries.set(log.id, entry(log));
+    const kept = entries.get(log.id), { item, clock } = kept, k = order.indexOf(log.id), box = clock.querySelector("input");
+    const now = { line: k >= 0 ? sample(ink("ink"), DASHES[k % DASHES.length]) : document.createTextNode(""), told: facts(log) };
+    for (const part in now) kept[part].replaceWith(now[part]), (kept[part] = now[part]);
+    if (box !== document.activeElement) box.value = +offset(log).toFixed(4);
+    if (k > 0 !== clock.isConnected) k > 0 ? item.append(clock) : clock.remove();
+    if (!item.isConnected) $("logs").append(item);
+  }
 }
 
 const close = attempt(async (log) => {

@@ -1,0 +1,397 @@
+"""The filter along one record, and how it moves with its numbers, in pieces that are compiled once for a kind.
+
+XLA compiles for seconds whatever has another shape. So all that differs from fit to fit stays outside the compiled
+pieces: which numbers are free, how many records there are and how long they run. A piece takes whole rows of numbers,
+a block of directions in which they move, and a stretch of samples.
+
+Slopes in two passes. The states that the filter went through are known; the equations' slopes at all samples are then
+independent of each other, and are taken many samples at a time. The second pass is the same filter with each sample's
+step replaced by its tangent plane at that state: there its slopes are those of the filter itself, and it only
+multiplies matrices (measured: half the time of carrying every slope through the equations sample by sample).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial, wraps
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.records import Record
+from swashplate.identification.time.start_states import mean_velocity, slopes, start_state, steady_flight
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
+
+STRETCH = 256
+"""Samples that a compiled piece runs along."""
+
+_DIRECTIONS = 8
+"""Directions come in whole blocks of so many."""
+
+_TOGETHER = 32
+"""Samples whose slopes are taken side by side: what stays in a core's cache."""
+
+_RUNS = 64
+"""Predictions that run side by side."""
+
+
+class FilterNumbers(NamedTuple):
+    """What a filter's run depends on, as rows; or directions in which they move, with one more axis in front.
+
+    Attributes:
+        parameters: of the equations.
+        noise, nuisance: in the order of `Noise` and of `Nuisance`.
+        inputs: mean of the commands that reach the vehicle while it starts.
+    """
+
+    parameters: Any
+    noise: Any
+    nuisance: Any
+    inputs: Any
+
+
+class FirstMotion(NamedTuple):
+    """What a record shows of its beginning.
+
+    Attributes:
+        value, rate: of every measured channel at the first sample.
+        velocity: mean ahead, right and down [m/s] that the gain is for (`start_states.mean_velocity`).
+        voltage: of the battery at the first sample, and its mean [V].
+    """
+
+    value: Any
+    rate: Any
+    velocity: Any
+    voltage: Any
+
+
+class Begun(NamedTuple):
+    """The constant gain of a run, and the state that it begins with."""
+
+    gain: FilterGain
+    x: Any
+
+
+class Planes(NamedTuple):
+    """The steps of a stretch of samples.
+
+    Attributes:
+        place: where each began (n, states and disturbances). following: where it led (n, states).
+        slopes: by the place, the commands and some directions of the parameters side by side (n, states, moves).
+    """
+
+    place: Any
+    following: Any
+    slopes: Any
+
+
+def seen_at_start(vehicle: Vehicle, record: Record) -> FirstMotion:
+    """What a record shows of its beginning."""
+    value, rate = slopes(record, np.array([0]))
+    voltage = np.array([record.voltage[0], np.mean(record.voltage)])
+    return FirstMotion(value[0], rate[0], mean_velocity(vehicle, record), voltage)
+
+
+# ---- where it begins -----------------------------------------------------------------------------------------------
+def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
+    """The gain and the start of a run."""
+    still = FilterNumbers(*(np.zeros((_DIRECTIONS, *np.shape(row))) for row in numbers))
+    return _begun(model, numbers, seen, still)[0]  # type: ignore[no-any-return]
+
+
+def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
+    """Slopes of `begun` along directions, which come first."""
+    blocks = [_begun(model, numbers, seen, block)[1] for block in _blocks(directions)]
+    return _whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _begun(
+    model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers
+) -> tuple[Begun, Begun]:
+    def begin(moved: FilterNumbers) -> Begun:
+        return traced_begin(model, moved, seen)
+
+    return jax.vmap(lambda d: jax.jvp(begin, (numbers,), (d,)), out_axes=(None, 0))(directions)
+
+
+def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
+    """The gain and the start of a run (traceable)."""
+    parameters = model.vehicle.parameters(*numbers.parameters)
+    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+    first, mean = seen.voltage
+    around, held = steady_flight(model.vehicle, parameters, mean, seen.velocity)
+    gain = model.gain(around, held, parameters, mean, noise, nuisance)
+    x = start_state(
+        model.vehicle,
+        model.output_names,
+        parameters,
+        nuisance,
+        value=seen.value,
+        rate=seen.rate,
+        inputs=numbers.inputs,
+        voltage=first,
+    )
+    return Begun(gain, x)
+
+
+def starting_samples(dt: float) -> int:
+    """How many of a record's first samples the commands are averaged over, for the state that it begins with."""
+    return max(1, round(0.5 / dt))
+
+
+# ---- along the record ----------------------------------------------------------------------------------------------
+def along(
+    model: StochasticModel, begin: Begun, numbers: FilterNumbers, readings: Array, commands: Array, voltage: Array
+) -> tuple[Array, FilterState]:
+    """Innovations (n, n_outputs) and the states after each reading.
+
+    Args:
+        model, numbers: of the filter.
+        begin: of `begun`.
+        readings, commands, voltage: by sample.
+    """
+    state, n, parts = first_state(model, begin.x), len(readings), []
+    for rows in _stretches(readings, commands, voltage):
+        state, found = _along(model, state, begin.gain, numbers, *rows)
+        parts.append(found)
+    innovations, states = _whole(parts, n)
+    return innovations, states
+
+
+@partial(jax.jit, static_argnums=0)
+def _along(
+    model: StochasticModel,
+    state: FilterState,
+    gain: FilterGain,
+    numbers: FilterNumbers,
+    readings: Any,
+    commands: Any,
+    voltage: Any,
+) -> tuple[FilterState, tuple[Any, FilterState]]:
+    parameters = model.vehicle.parameters(*numbers.parameters)
+
+    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
+        return model.step(x, acting, now[0], parameters, now[1])
+
+    told = (commands, voltage)
+    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+    return model.run(state, readings, advance, told, noise, nuisance, gain)
+
+
+def ahead_of(
+    model: StochasticModel,
+    states: FilterState,
+    numbers: FilterNumbers,
+    commands: Array,
+    voltage: Array,
+    starts: NDArray[np.intp],
+    ahead: int,
+) -> Array:
+    """States predicted 1, 2, ... samples after some starts, with nothing measured any more (starts, ahead, states).
+
+    Args:
+        model, numbers: of the filter.
+        states: after each reading, of `along`.
+        commands, voltage: by sample, `ahead` of them beyond the last start.
+        starts: samples. ahead: how many samples to predict.
+    """
+    parts = [np.zeros((0, ahead, len(model.vehicle.state_names)))]
+    for first in range(0, len(starts), _RUNS):
+        here = np.pad(starts[first : first + _RUNS], (0, max(0, first + _RUNS - len(starts))), mode="edge")
+        rows = here[:, None] + np.arange(ahead)
+        begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], states)
+        parts.append(_ahead_of(model, begin, numbers, commands[rows], voltage[rows]))
+    return _whole(parts, len(starts))  # type: ignore[no-any-return]
+
+
+@partial(jax.jit, static_argnums=0)
+def _ahead_of(model: StochasticModel, begin: FilterState, numbers: FilterNumbers, commands: Any, voltage: Any) -> Any:
+    parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
+
+    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
+        return model.step(x, acting, now[0], parameters, now[1])
+
+    def sample(state: FilterState, now: tuple[Any, Any]) -> tuple[FilterState, Any]:
+        following = model.predict(state, noise, advance, now)
+        return following, following.x
+
+    return jax.vmap(lambda state, told: jax.lax.scan(sample, state, told)[1])(begin, (commands, voltage))
+
+
+# ---- slopes --------------------------------------------------------------------------------------------------------
+def planes(
+    model: StochasticModel, states: FilterState, commands: Array, voltage: Array, parameters: Array, directions: Array
+) -> list[Planes]:
+    """Each sample's tangent plane, by stretch.
+
+    Args:
+        model: of the filter.
+        states: after each reading, of `along`.
+        commands, voltage: by sample. parameters: of the equations.
+        directions: of the parameters (k, parameters).
+    """
+    place = np.concatenate([states.x, _acting(model, states)], axis=1)
+    first = place.shape[1] + commands.shape[1]
+    moves = np.zeros((first + len(directions), first + len(parameters)))
+    moves[:first, :first] = np.eye(first)
+    moves[first:, first:] = directions
+    moves = _filled(moves)
+    return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in _stretches(place, commands, voltage)]
+
+
+def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiled for speed; a helicopter's many times as many operations, to be compiled soon."""
+    swiftly = jax.jit(function, static_argnums=0)
+    soon = jax.jit(function, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+
+    @wraps(function)
+    def chosen(model: StochasticModel, *rest: Any) -> Any:
+        return (soon if model.vehicle.traits.heavy else swiftly)(model, *rest)
+
+    return chosen
+
+
+@_chosen
+def _planes(
+    model: StochasticModel, place: Any, commands: Any, voltage: Any, parameters: Any, moves: Any
+) -> tuple[Any, Any]:
+    """Where each step leads (n, states), and its slopes along the moves (n, states, moves)."""
+    n = len(model.vehicle.state_names)
+    s, m = place.shape[1], place.shape[1] + commands.shape[1]
+
+    def one(sample: tuple[Any, Any, Any]) -> Any:
+        here, u, volts = sample
+
+        def step(z: Any) -> Any:
+            return model.step(z[:n], z[n:s], z[s:m], model.vehicle.parameters(*z[m:]), volts)
+
+        at = jnp.concatenate([here, u, parameters])
+        return jax.vmap(lambda move: jax.jvp(step, (at,), (move,)), out_axes=(None, -1))(moves)
+
+    return jax.lax.map(one, (place, commands, voltage), batch_size=_TOGETHER)  # type: ignore[no-any-return]
+
+
+def along_moved(
+    model: StochasticModel,
+    begin: Begun,
+    begin_moved: Begun,
+    numbers: FilterNumbers,
+    directions: FilterNumbers,
+    readings: Array,
+    steps: list[Planes],
+    pushes: tuple[Array, Array],
+) -> Array:
+    """Slopes of the innovations along directions (directions, n, n_outputs).
+
+    Args:
+        model, begin, numbers, readings: as of `along`.
+        begin_moved: of `begun_moved`.
+        directions: in which the numbers move.
+        steps: of `planes`.
+        pushes: how each direction moves the commands by sample (directions, n, inputs), and how far it goes along
+            each of the directions that the planes know (directions, k).
+    """
+    moved, to = (jax.tree.map(_filled, part) for part in (begin_moved, directions))
+    state, moving = first_state(model, begin.x), jax.vmap(lambda x: first_state(model, x))(moved.x)
+    commands, further = pushes
+    room = steps[0].slopes.shape[-1] - steps[0].place.shape[-1] - commands.shape[-1] - further.shape[-1]
+    further = _filled(np.pad(further, ((0, 0), (0, room))))
+    parts = []
+    for step, (read,), pushed in zip(steps, _stretches(readings), _stretches_of(_filled(commands)), strict=True):
+        pushing = (pushed, further)
+        state, moving, found = _along_moved(
+            model, (state, begin.gain), (moving, moved.gain), numbers, to, read, step, pushing
+        )
+        parts.append(found)
+    return np.concatenate(parts, axis=1)[: len(directions.parameters), : len(readings)]
+
+
+@partial(jax.jit, static_argnums=0)
+def _along_moved(
+    model: StochasticModel,
+    here: tuple[FilterState, FilterGain],
+    moved: tuple[FilterState, FilterGain],
+    numbers: FilterNumbers,
+    directions: FilterNumbers,
+    readings: Any,
+    step: Planes,
+    pushes: tuple[Any, Any],
+) -> tuple[FilterState, FilterState, Any]:
+    """The state at the end, how it moves, and how the innovations move."""
+
+    def run(state: FilterState, gain: FilterGain, noise: Any, nuisance: Any, commands: Any, further: Any) -> Any:
+        place = step.place.shape[-1]
+        last = place + commands.shape[-1]
+        by_place, by_command, by_number = jnp.split(step.slopes, (place, last), axis=-1)
+        led = step.following + jnp.einsum("nij,nj->ni", by_command, commands) + by_number @ further
+
+        def advance(x: Any, acting: Any, now: tuple[Any, Any, Any]) -> Any:
+            led, place, by_place = now
+            return led + by_place @ (jnp.concatenate([x, acting]) - place)
+
+        told = (led, step.place, by_place)
+        end, (found, _) = model.run(state, readings, advance, told, Noise(*noise), Nuisance(*nuisance), gain)
+        return end, found
+
+    still = jax.tree.map(lambda rows: jnp.zeros(rows.shape[1:]), pushes)
+    at = (*here, numbers.noise, numbers.nuisance, *still)
+    to = (*moved, directions.noise, directions.nuisance, *pushes)
+    (end, _), (end_moved, found) = jax.vmap(lambda d: jax.jvp(run, at, d), out_axes=((None, None), 0))(to)
+    return end, end_moved, found
+
+
+# ---- blocks and stretches ------------------------------------------------------------------------------------------
+def _filled(rows: Any) -> Any:
+    """Rows with zeros behind them up to the next whole block."""
+    rows = np.asarray(rows)
+    rest = -len(rows) % _DIRECTIONS
+    return np.concatenate([rows, np.zeros((rest, *rows.shape[1:]))]) if rest else rows
+
+
+def _blocks(directions: Any) -> Iterator[Any]:
+    """Directions in blocks of `_DIRECTIONS`, the last one filled with zeros."""
+    whole = jax.tree.map(_filled, directions)
+    for first in range(0, len(jax.tree.leaves(whole)[0]), _DIRECTIONS):
+        yield jax.tree.map(lambda rows, at=first: rows[at : at + _DIRECTIONS], whole)
+
+
+def _stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
+    """Series cut into stretches of `STRETCH` samples, the last one lengthened by its last sample."""
+    n = len(rows[0])
+    for first in range(0, n, STRETCH):
+        yield tuple(lengthened(np.asarray(part[first : first + STRETCH]), STRETCH) for part in rows)
+
+
+def _stretches_of(moved: Array) -> Iterator[Array]:
+    """The same of slopes, whose samples come second; nothing moves beyond the last."""
+    rest = -moved.shape[1] % STRETCH
+    moved = np.concatenate([moved, np.zeros((len(moved), rest, *moved.shape[2:]))], axis=1)
+    for first in range(0, moved.shape[1], STRETCH):
+        yield moved[:, first : first + STRETCH]
+
+
+def _whole(parts: Any, n: int) -> Any:
+    """Stretches or blocks one after the other, the first n of their rows."""
+    return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
+
+
+def first_state(model: StochasticModel, x: Any) -> FilterState:
+    """A state row with nothing known of the air yet."""
+    return FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
+
+
+def _acting(model: StochasticModel, states: FilterState) -> Array:
+    """The disturbances that act at every sample (n, disturbances)."""
+    drift = np.asarray(states.drift)
+    wind = np.zeros((len(drift), model.n_gusts - N_DISTURBANCES))
+    acting: Array = np.asarray(states.gust) + np.concatenate([drift, wind], axis=1)
+    return acting
