@@ -110,7 +110,7 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
     """Slopes of `begun` along directions, which come first."""
     blocks = [_begun(model, numbers, seen, block)[1] for block in _blocks(directions)]
-    return _whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
+    return whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
@@ -160,10 +160,10 @@ def along(
         readings, commands, voltage: by sample.
     """
     state, n, parts = first_state(model, begin.x), len(readings), []
-    for rows in _stretches(readings, commands, voltage):
+    for rows in stretches(readings, commands, voltage):
         state, found = _along(model, state, begin.gain, numbers, *rows)
         parts.append(found)
-    innovations, states = _whole(parts, n)
+    innovations, states = whole(parts, n)
     return innovations, states
 
 
@@ -210,7 +210,7 @@ def ahead_of(
         rows = here[:, None] + np.arange(ahead)
         begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], states)
         parts.append(_ahead_of(model, begin, numbers, commands[rows], voltage[rows]))
-    return _whole(parts, len(starts))  # type: ignore[no-any-return]
+    return whole(parts, len(starts))  # type: ignore[no-any-return]
 
 
 @partial(jax.jit, static_argnums=0)
@@ -245,7 +245,7 @@ def planes(
     moves[:first, :first] = np.eye(first)
     moves[first:, first:] = directions
     moves = _filled(moves)
-    return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in _stretches(place, commands, voltage)]
+    return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in stretches(place, commands, voltage)]
 
 
 def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -306,7 +306,7 @@ def along_moved(
     room = steps[0].slopes.shape[-1] - steps[0].place.shape[-1] - commands.shape[-1] - further.shape[-1]
     further = _filled(np.pad(further, ((0, 0), (0, room))))
     parts = []
-    for step, (read,), pushed in zip(steps, _stretches(readings), _stretches_of(_filled(commands)), strict=True):
+    for step, (read,), pushed in zip(steps, stretches(readings), _stretches_of(_filled(commands)), strict=True):
         pushing = (pushed, further)
         state, moving, found = _along_moved(
             model, (state, begin.gain), (moving, moved.gain), numbers, to, read, step, pushing
@@ -364,7 +364,7 @@ def _blocks(directions: Any) -> Iterator[Any]:
         yield jax.tree.map(lambda rows, at=first: rows[at : at + _DIRECTIONS], whole)
 
 
-def _stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
+def stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
     """Series cut into stretches of `STRETCH` samples, the last one lengthened by its last sample."""
     n = len(rows[0])
     for first in range(0, n, STRETCH):
@@ -379,7 +379,7 @@ def _stretches_of(moved: Array) -> Iterator[Array]:
         yield moved[:, first : first + STRETCH]
 
 
-def _whole(parts: Any, n: int) -> Any:
+def whole(parts: Any, n: int) -> Any:
     """Stretches or blocks one after the other, the first n of their rows."""
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
 
