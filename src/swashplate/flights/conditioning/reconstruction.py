@@ -24,6 +24,7 @@ from swashplate.flights.conditioning.regression import regress
 from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, channel
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 _FORCES = ("ax", "ay", "az")
@@ -53,7 +54,7 @@ class SensorErrorEstimate:
 
 
 @dataclass(frozen=True)
-class Reconstruction:
+class Reconstruction(Shown):
     """What flight-path reconstruction found.
 
     Attributes:

@@ -374,7 +374,7 @@ def _time(
     scale = Decimal(repr(float(units.to_inside(1.0, (since["unit"] if since else unit) or "s"))))
     factor, offset = Decimal(repr(place.factor)), Decimal(repr(place.offset))
     stamps = map(Decimal, tables.texts(rows, place.index))
-    as_written = (factor, offset, scale) == (1, 0, 1)  # the products of a million stamps are not free
+    as_written = factor == scale == 1 and offset == 0  # the products of a million stamps are not free
     times, first = epoch.small([*stamps] if as_written else [(stamp * factor + offset) * scale for stamp in stamps])
     return times, float(first + zero)
 
