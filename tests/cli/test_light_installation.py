@@ -49,6 +49,10 @@ except ImportError as error:
     assert "swashplate[plot]" in str(error)
 from pathlib import Path
 from swashplate.links.logs.app import logs_app
+try:
+    sp.open_logs("nowhere.bin")
+except sp.SwashError as error:
+    assert "there is no such file" in str(error), "the verb itself runs without JAX"
 from swashplate.links.logs.desk import Desk
 desk = Desk()
 try:
