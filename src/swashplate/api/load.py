@@ -35,7 +35,7 @@ def load(
     """
     ending = Path(path).suffix.lower()
     if equations is not None and ending in (".nc", ".toml"):
-        raise SwashError("are for a fit's .json only.", where=path, channel="equations")
+        raise SwashError("are for a fit's .json only.", where=Path(path), channel="equations")
     if ending == ".toml":
         return vehicle(Path(path))
     if ending == ".nc":
