@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from swashplate.api.identification import identify_and_validate
     from swashplate.api.link import link_ardupilot, link_px4, write_ardupilot_parameters
     from swashplate.api.live import live, show_replay
+    from swashplate.api.load import load
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.nested import identify_nested
     from swashplate.api.observability import observability
@@ -77,7 +78,6 @@ if TYPE_CHECKING:
     from swashplate.flights.rotor_speed import rotor_speed
     from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
-    from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
     from swashplate.identification.frequency.state_space_fit import fit_state_space
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function

@@ -49,7 +49,7 @@ _LIGHT: Mapping[str, str] = {
     "handling_qualities": "swashplate.identification.frequency.handling_readings:handling_lines",
     "harmonics": "swashplate.flights.spectrum:harmonics",
     "inspect": "swashplate.flights.inspect:inspect",
-    "load": "swashplate.identification.core.result_file:load",
+    "load": "swashplate.api.load:load",
     "maneuver": "swashplate.flights.maneuvers.series:parse",
     "merge": "swashplate.flights.conditioning.synchronise:merge",
     "new_card": "swashplate.models.conventional.new_card:new_card",

@@ -14,6 +14,7 @@ from swashplate.reporting.case_parts import bode_overlay
 from swashplate.reporting.html import write_page
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table
 from swashplate.reporting.versions import date, versions
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 ACCEPTANCE_FILES = ("report.html", "acceptance.json")
@@ -21,7 +22,7 @@ ACCEPTANCE_FILES = ("report.html", "acceptance.json")
 
 
 @dataclass(frozen=True, repr=False)
-class Acceptance:
+class Acceptance(Shown):
     """A trial of a SITL binary.
 
     Attributes:

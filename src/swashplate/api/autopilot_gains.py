@@ -25,6 +25,9 @@ from swashplate.links.px4.gains import px4_file, px4_gains, px4_law
 from swashplate.links.px4.parameters import parameters as px4_parameters
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.figures.of_results import plain_page, section_of_loops
+from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
@@ -58,7 +61,7 @@ class FlownMode:
 
 
 @dataclass(frozen=True)
-class AutopilotGains:
+class AutopilotGains(Shown):
     """Gains of a whole autopilot for a vehicle.
 
     Attributes:
@@ -123,6 +126,21 @@ class AutopilotGains:
             "flown": [asdict(flight) for flight in self.flown],
             "problems": list(self.problems),
         }
+
+    def page(self, *, title: str | None = None) -> Report:
+        """The page of `sp.report`, under a heading, its own where None."""
+        worth = {
+            loop.name: f"{loop.gain:.1f} dB, {loop.phase:.1f} deg, {1e3 * loop.delay:.1f} ms, rejects to "
+            f"{loop.rejection:.2f} rad/s, max |S| {loop.peak:.2f}"
+            for loop in self.found.loops
+        }
+        numbers = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self.gains if name not in RENAMED)
+        return plain_page(
+            title or f"Gains for {self.title}",
+            summary={"Commands are late by": self.late, **worth, "Parameters": numbers},
+            sections=[section_of_loops(self.found.loops)],
+            problems=self.problems,
+        )
 
     def __repr__(self) -> str:
         law = self.found.law

@@ -57,11 +57,11 @@ app = typer.Typer(
 def _version(wanted: bool) -> None:
     if wanted:
         import platform
-        from importlib import metadata
 
-        versions = {name: metadata.version(name) for name in ("jax", "numpy", "scipy")}
-        told = ", ".join([f"Python {platform.python_version()}", *(f"{k} {v}" for k, v in versions.items())])
-        typer.echo(f"swashplate {metadata.version('swashplate')} ({told})")
+        from swashplate.extras import version_of
+
+        told = ", ".join(f"{name} {version_of(name)}" for name in ("jax", "numpy", "scipy"))
+        typer.echo(f"swashplate {version_of('swashplate')} (Python {platform.python_version()}, {told})")
         raise typer.Exit
 
 

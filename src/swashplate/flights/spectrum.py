@@ -16,6 +16,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import channel as schema_of
+from swashplate.shown import Shown
 
 WINDOWS = 16
 """Windows that an average has at least, where the record is long enough for any."""
@@ -30,7 +31,7 @@ _WIDTH = 0.04  # of a harmonic's frequency, to each side: the rotor's speed is n
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Shown):
     """A channel's power spectral density.
 
     Attributes:
@@ -65,7 +66,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True)
-class Spectrogram:
+class Spectrogram(Shown):
     """Densities over time: `density` has shape (len(frequency), len(time)), in unit^2/Hz."""
 
     channel: str
@@ -116,7 +117,7 @@ class Notches:
 
 
 @dataclass(frozen=True)
-class Harmonics:
+class Harmonics(Shown):
     """Rotor vibration in a channel.
 
     Attributes:

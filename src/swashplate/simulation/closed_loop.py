@@ -155,7 +155,8 @@ def simulate_closed_loop(
     )
     states, inputs = np.asarray(states)[:n], np.asarray(inputs)[:n]
     time, rows = np.arange(n) / rate, np.concatenate([inputs, around], axis=1)
-    flight = simulated_flight(vehicle, time, states, rows, details={"rate": rate, "controller_rate": controller.rate})
+    details = {"rate": rate, "controller_rate": controller.rate, "gravity": float(surroundings.gravity)}
+    flight = simulated_flight(vehicle, time, states, rows, details=details)
     check_divergence(vehicle, time, states, flight)
     return flight
 
