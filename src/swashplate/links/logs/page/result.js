@@ -11,6 +11,9 @@ function pm([value, sigma], unit) {
   return `${value.toFixed(decimals)} ± ${sigma.toFixed(decimals)} ${unit}`;
 }
 
+/** A number with its bound, and its unit: long delays in seconds. */
+const shown = (pair, unit) => (pair && unit === "ms" && pair[0] >= 1000 ? [pair.map((number) => number === null ? null : number / 1000), "s"] : [pair, unit]);
+
 const percent = (answer) => make("td", { class: "number" }, answer ? (answer.stable ? `${(100 * answer.overshoot).toFixed(0)} %` : "unstable") : "–");
 const overshoot = (axis) => make("tr", {}, make("td", {}, "overshoot of a step"), percent(axis.before), percent(axis.after));
 
@@ -19,7 +22,7 @@ function gains(home, found) {
     const head = make("tr", {}, make("th", {}, "parameter"), make("th", { class: "number" }, "flown"), make("th", { class: "number" }, "suggested"));
     const number = (value) => make("td", { class: "number" }, value === null ? "–" : String(+(+value).toPrecision(4)));
     const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
-    const margin = (name, key, unit) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key], unit)) : "–")));
+    const margin = (name, key, unit) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(...shown(axis[when][key], unit))) : "–")));
     home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
       margin("phase margin", "phase_margin", "°"), margin("gain margin", "gain_margin", "dB"), margin("delay margin", "delay_margin", "ms"), margin("crossover", "crossover", "rad/s"), margin("largest sensitivity", "peak", ""), margin("bandwidth [rad/s]", "bandwidth", ""), margin("disturbance rejection [rad/s]", "rejection", ""), overshoot(axis))));
     home.append(make("p", {}, axis.words));
