@@ -17,6 +17,7 @@ from swashplate.control.controller_file import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.parameters import RENAMED
 from swashplate.errors import ControllerError, DivergenceError, SwashError
+from swashplate.identification.frequency.handling import delay_words
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, read_parameter_file, written_gains
 from swashplate.links.ardupilot.parameters import parameter_file
 from swashplate.links.ardupilot.parameters import parameters as ardupilot_parameters
@@ -146,11 +147,12 @@ class AutopilotGains(Shown):
         law = self.found.law
         lines = [f"{self.title}: {'ArduPilot' if self.autopilot == 'ardupilot' else 'PX4'}, loops at {law.rate:g} Hz"]
         lines.append(f"late: {self.late}")
-        head = ("loop", "gain [dB]", "phase [deg]", "delay [ms]", "crossover", "bandwidth", "rejects to", "max |S|")
+        head = ("loop", "gain [dB]", "phase [deg]", "delay", "crossover", "bandwidth", "rejects to", "max |S|")
         rows = [
             (
                 loop.name,
-                *(f"{value:.1f}" for value in (loop.gain, loop.phase, 1e3 * loop.delay)),
+                *(f"{value:.1f}" for value in (loop.gain, loop.phase)),
+                delay_words(loop.delay),
                 *(f"{value:.2f}" for value in (loop.crossover, loop.bandwidth, loop.rejection, loop.peak)),
             )
             for loop in self.found.loops
