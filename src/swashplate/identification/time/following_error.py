@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
@@ -181,11 +182,11 @@ def _begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) ->
 def _along(
     model: StochasticModel,
     state: FilterState,
-    covariance: Any,
+    covariance: Float[jax.Array, "lanes joined joined"],
     numbers: FilterNumbers,
-    readings: Any,
-    commands: Any,
-    voltage: Any,
+    readings: Float[jax.Array, "samples outputs"],
+    commands: Float[jax.Array, "lanes samples inputs"],
+    voltage: Float[jax.Array, " samples"],
 ) -> tuple[FilterState, Any, Followed]:
     def one(state: FilterState, P: Any, numbers: FilterNumbers, commands: Any) -> Any:
         def sample(carry: tuple[FilterState, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Followed]:
@@ -200,7 +201,11 @@ def _along(
 
 
 def _corrected(
-    model: StochasticModel, state: FilterState, P: Any, y: Any, numbers: FilterNumbers
+    model: StochasticModel,
+    state: FilterState,
+    P: Float[jax.Array, "joined joined"],
+    y: Float[jax.Array, " outputs"],
+    numbers: FilterNumbers,
 ) -> tuple[FilterState, Any, Any, Any]:
     """State and covariance after a reading, the innovation and its covariance."""
     n, g = state.x.shape[0], model.n_gusts
@@ -215,7 +220,12 @@ def _corrected(
 
 
 def _predicted(
-    model: StochasticModel, state: FilterState, P: Any, u: Any, volts: Any, numbers: FilterNumbers
+    model: StochasticModel,
+    state: FilterState,
+    P: Float[jax.Array, "joined joined"],
+    u: Float[jax.Array, " inputs"],
+    volts: Float[jax.Array, ""],
+    numbers: FilterNumbers,
 ) -> tuple[FilterState, Any]:
     """State and covariance one sample later, averaged over what is not known of the air speed."""
     n, g, d = state.x.shape[0], model.n_gusts, N_DISTURBANCES
