@@ -210,7 +210,7 @@ def _asked(
     sigmas = np.abs(change) / np.sqrt(1.0 + spread**2)
     matters = (np.abs(change) * loudest > UNSEEN) & (np.abs(change) * shares > MATERIAL)
     found = []
-    for i in np.flatnonzero((sigmas > DOUBTED * SIGMAS) & matters):
+    for i in map(int, np.flatnonzero((sigmas > DOUBTED * SIGMAS) & matters)):
         p = model.parameters[bounded[i]]
         wanted = float(p.value + change[i] * p.cramer_rao)
         found.append(AskedChange(bounded[i], p.value, wanted, float(sigmas[i]), float(abs(change[i]) * shares[i])))

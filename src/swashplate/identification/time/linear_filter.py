@@ -117,7 +117,8 @@ class GustErrors(FilterErrors):
 
 def _filter(a: Any, intensity: Any, c: Any, sensors: Any, dt: float) -> tuple[Any, Any]:
     """Kalman gains (n_batch, n, m) and innovations' covariances of a batch of models, both noises' diagonals."""
-    return tuple(np.asarray(part) for part in _filters()(a, intensity, c, sensors, dt))
+    gain, covariance = _filters()(a, intensity, c, sensors, dt)
+    return np.asarray(gain), np.asarray(covariance)
 
 
 @cache

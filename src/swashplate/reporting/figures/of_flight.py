@@ -182,13 +182,14 @@ def spectrum(flights: Sequence[Flight], *, channels: Sequence[str] | None = None
         unit = unit_words(next(unit_of(flight, name) for flight in flights if name in flight)) or "1"
         titles.append(f"{name} [({unit})²/Hz]")
     layout = over_frequency(titles, height=_PANEL + 20, unit="Hz")
-    traces, keys = [], {}
+    traces, keys, told = [], {}, []
     for i, (name,) in enumerate(panels):
         layout[f"yaxis{_number(i)}"] |= {"type": "log", "exponentformat": "power"}
         for k, flight in enumerate(flights):
             if name not in flight:
                 continue
             found = spectra.spectrum(flight, name)
+            told.append(str(found) if len(flights) == 1 else f"{label(flight, k)}: {found}")
             key = Key(label(flight, k), _COLORS[k % len(_COLORS)])
             keys[key.words] = key
             hover = f"{name}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
@@ -207,7 +208,7 @@ def spectrum(flights: Sequence[Flight], *, channels: Sequence[str] | None = None
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
-        f"Power spectra of {', '.join(name for (name,) in panels)}.",
+        f"Power spectra of {', '.join(name for (name,) in panels)}. {'; '.join(told)}.",
         keys=tuple(keys.values()) if len(flights) > 1 else (),
     )
 
