@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
     from swashplate.identification.identify import identify
     from swashplate.identification.posterior import posterior
+    from swashplate.identification.responses.arithmetic import combine
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
@@ -143,6 +144,7 @@ __all__ = [
     "campaign_results",
     "check_autopilot",
     "check_controller",
+    "combine",
     "compare",
     "compare_derivatives",
     "coupling",

@@ -37,6 +37,7 @@ _LIGHT: Mapping[str, str] = {
     "resume_campaign": "swashplate.api.campaigns.verbs:resume_campaign",
     "datasets": "swashplate.flights.datasets:listing",
     "equation_error": "swashplate.identification.time.equation_error:equation_error",
+    "combine": "swashplate.identification.responses.arithmetic:combine",
     "evaluate_bench": "swashplate.api.bench:evaluate_bench",
     "export_controller": "swashplate.api.export:export_controller",
     "export_flight": "swashplate.api.export:export_flight",

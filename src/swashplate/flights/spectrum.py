@@ -58,10 +58,19 @@ class Spectrum(Shown):
         inside = (self.frequency >= low) & (self.frequency <= high)
         return float(np.sqrt(np.sum(self.density[inside]) * step))
 
+    @property
+    def cutoff(self) -> float:
+        """Frequency [Hz] below which half of the mean square lies (Tischler and Remple 2012, ch. 5); NaN at rest."""
+        power = np.cumsum(self.density[1:])
+        if not power[-1] > 0.0:
+            return float("nan")
+        return float(np.interp(0.5 * power[-1], power, self.frequency[1:]))
+
     def __str__(self) -> str:
         return (
             f"{self.channel}: {self.windows} windows of {self.seconds:.3g} s from {self.start:.2f} to {self.stop:.2f} s"
             f", up to {0.5 * self.rate:.4g} Hz; rms {self.rms(self.frequency[1], self.frequency[-1]):.4g} {self.unit}"
+            f", cut-off {self.cutoff:.3g} Hz"
         )
 
 

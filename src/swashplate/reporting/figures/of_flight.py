@@ -191,6 +191,7 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
         names: of all flights, in the order of their colours.
     """
     drawn = [next(iter(panel.values())) for panel in panels]
+    told = [f"{name}: {found}" if len(names) > 1 else str(found) for panel in panels for name, found in panel.items()]
     titles = [f"{one.channel} [({unit_words(one.unit) or '1'})²/Hz]" for one in drawn]
     layout = over_frequency(titles, height=_PANEL + 20, unit="Hz")
     colors = {name: _COLORS[k % len(_COLORS)] for k, name in enumerate(names)}
@@ -206,7 +207,7 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
-        f"Power spectra of {', '.join(one.channel for one in drawn)}.",
+        f"Power spectra of {', '.join(one.channel for one in drawn)}. {'; '.join(told)}.",
         keys=tuple(Key(name, color) for name, color in colors.items()) if len(names) > 1 else (),
     )
 
