@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
@@ -173,9 +174,9 @@ def _along(
     state: FilterState,
     gain: FilterGain,
     numbers: FilterNumbers,
-    readings: Any,
-    commands: Any,
-    voltage: Any,
+    readings: Float[jax.Array, "samples outputs"],
+    commands: Float[jax.Array, "samples inputs"],
+    voltage: Float[jax.Array, " samples"],
 ) -> tuple[FilterState, tuple[Any, FilterState]]:
     parameters = model.vehicle.parameters(*numbers.parameters)
 
@@ -214,7 +215,13 @@ def ahead_of(
 
 
 @partial(jax.jit, static_argnums=0)
-def _ahead_of(model: StochasticModel, begin: FilterState, numbers: FilterNumbers, commands: Any, voltage: Any) -> Any:
+def _ahead_of(
+    model: StochasticModel,
+    begin: FilterState,
+    numbers: FilterNumbers,
+    commands: Float[jax.Array, "runs samples inputs"],
+    voltage: Float[jax.Array, "runs samples"],
+) -> Any:
     parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
 
     def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
@@ -262,7 +269,12 @@ def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @_chosen
 def _planes(
-    model: StochasticModel, place: Any, commands: Any, voltage: Any, parameters: Any, moves: Any
+    model: StochasticModel,
+    place: Float[jax.Array, "samples place"],
+    commands: Float[jax.Array, "samples inputs"],
+    voltage: Float[jax.Array, " samples"],
+    parameters: Float[jax.Array, " parameters"],
+    moves: Float[jax.Array, "moves directions"],
 ) -> tuple[Any, Any]:
     """Where each step leads (n, states), and its slopes along the moves (n, states, moves)."""
     n = len(model.vehicle.state_names)
@@ -322,7 +334,7 @@ def _along_moved(
     moved: tuple[FilterState, FilterGain],
     numbers: FilterNumbers,
     directions: FilterNumbers,
-    readings: Any,
+    readings: Float[jax.Array, "samples outputs"],
     step: Planes,
     pushes: tuple[Any, Any],
 ) -> tuple[FilterState, FilterState, Any]:
