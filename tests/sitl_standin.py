@@ -39,7 +39,7 @@ PREARM = common.MAV_SYS_STATUS_PREARM_CHECK
 
 def parameters_of(files: list[str]) -> dict[str, float]:
     """NAME,value or NAME value a line, the last file counts."""
-    found = {"SCHED_LOOP_RATE": float(FAST), "ANGLE_MAX": 3000.0}
+    found = {"SCHED_LOOP_RATE": float(FAST), "ANGLE_MAX": 3000.0, "FRAME_CLASS": 6.0}
     for file in files:
         for line in Path(file).read_text(encoding="utf-8").splitlines():
             words = line.partition("#")[0].replace(",", " ").split()
@@ -55,7 +55,7 @@ class Firmware(HeliAutopilot):
         faults: "never-ekf"; "nowhere" (its checks pass, the EKF has no place); "warm" (ready after 12 s);
             "reboot" (in the sweep); "crash" (a floating point exception at lift-off); "frozen" (stops sending at
             lift-off); "sweepless" (System ID is refused); "frame" (FRAME_CLASS 8 whatever the file says); "old"
-            (version 4.1); "plane"; "mute" (no MAVLink); "stubborn" (ignores SIGTERM).
+            (version 4.1); "plane"; "mute" (no MAVLink); "backwards" (yaw of a coaxial); "stubborn" (ignores SIGTERM).
     """
 
     def boot(self, parameters: dict[str, float], ports: tuple[int, int, int], faults: set[str]) -> None:
@@ -89,7 +89,7 @@ class Firmware(HeliAutopilot):
         self.send, self.rate = self.over_udp, CRAWL
         g = parameters
         self.gains = Gains(
-            tuple(g[f"ATC_ANG_{a}_P"] for a in ("RLL", "PIT", "YAW")),
+            tuple(g.get(f"ATC_ANG_{a}_P", 4.5) for a in ("RLL", "PIT", "YAW")),
             *(tuple(g.get(f"ATC_RAT_{a}_{k}", 0.0) for a in ("RLL", "PIT", "YAW")) for k in ("FF", "P", "I")),
             tuple(g.get(f"ATC_RAT_{a}_ILMI", 1.0) for a in ("RLL", "PIT")),  # 1: a multicopter's do not leak
             tuple(g.get(f"ATC_RAT_{a}_D", 0.0) for a in ("RLL", "PIT", "YAW")),
@@ -237,6 +237,7 @@ class Firmware(HeliAutopilot):
         if not self.coaxial:
             return super()._mixed(mixer, collective)
         roll, pitch, yaw = map(float, mixer)
+        yaw = -yaw if "backwards" in self.faults else yaw
         if not self.lift_off:
             idle = SPIN_ARM if self.armed else 0.0
             flaps, motors = (roll, pitch), (idle, idle)
@@ -340,7 +341,11 @@ def main() -> None:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
     shift = 10 * int(given["-I"])
     firmware = Firmware(lambda data: None)
-    firmware.boot(parameters_of(given["--defaults"].split(",")), (5760 + shift, 5501 + shift, 9002 + shift), faults)
+    firmware.boot(
+        parameters_of(given["--defaults"].split(",") if "--defaults" in given else []),
+        (5760 + shift, 5501 + shift, 9002 + shift),
+        faults,
+    )
     firmware.state = firmware.exchange()
     beaten = told = -1.0
     while True:

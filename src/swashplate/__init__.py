@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from swashplate.api.identification import identify_and_validate
     from swashplate.api.link import link_ardupilot, link_px4, write_ardupilot_parameters
     from swashplate.api.live import live, show_replay
+    from swashplate.api.load import load
     from swashplate.api.monte_carlo import monte_carlo
     from swashplate.api.nested import identify_nested
     from swashplate.api.observability import observability
@@ -77,12 +78,12 @@ if TYPE_CHECKING:
     from swashplate.flights.rotor_speed import rotor_speed
     from swashplate.flights.spectrum import harmonics, spectrogram, spectrum
     from swashplate.identification.core.result import Result
-    from swashplate.identification.core.result_file import load
     from swashplate.identification.frequency.handling_readings import handling_lines as handling_qualities
     from swashplate.identification.frequency.state_space_fit import fit_state_space
     from swashplate.identification.frequency.transfer_function_fit import fit_transfer_function
     from swashplate.identification.identify import identify
     from swashplate.identification.posterior import posterior
+    from swashplate.identification.responses.arithmetic import combine
     from swashplate.identification.responses.frequency_response import FrequencyResponse
     from swashplate.identification.responses.respond import respond
     from swashplate.identification.time.equation_error import equation_error, stepwise
@@ -143,6 +144,7 @@ __all__ = [
     "campaign_results",
     "check_autopilot",
     "check_controller",
+    "combine",
     "compare",
     "compare_derivatives",
     "coupling",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,14 @@ EXTRA_OF: Mapping[str, str] = {
     "distributed": "scale",
 }
 """Extras of `pyproject.toml` by the module that they bring; `all` brings every one."""
+
+
+def version_of(distribution: str) -> str:
+    """The version of an installed distribution, "not installed" where it is not."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def install(module: str) -> str:

@@ -343,3 +343,27 @@ def test_an_option_of_one_value_is_not_given_twice() -> None:
     assert "--speed: is given more than once" in one_message(swash("trim", "coax", "--speed", "1", "--speed=2"))
     twice = ("fit-ss", "--search", "responses", "--rename", "lateral=a", "--rename", "longitudinal=b")
     assert "--rename: is given more than once. Give its values once, by commas." in one_message(swash(*twice))
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("respond none.bin", "none.bin: there is no such file"),
+        ("identify --flight none.bin@2-9", "none.bin: there is no such file"),
+        ("identify --vehicle raptor5", "Did you mean 'raptor50'?"),
+        ("export raptor5", "Did you mean 'raptor50'?"),
+        ("control check raptor5", "Did you mean 'raptor50'?"),
+        ("fit-tf none", "none: there is no such file"),
+        ("stitch none.toml", "none.toml: there is no such file"),
+        ("campaign run none.toml", "none.toml: there is no such file"),
+        ("campaign report none", "none: there is no such file"),
+        ("link accept none --vehicle raptor50", "none: there is no such file"),
+        ("respond coax56/none", "has no file 'none'"),
+        ("export raptor50", "Missing option '--format'"),
+        ("respond", "Missing argument 'LOG...'"),
+    ],
+)
+def test_what_was_typed_is_judged_before_what_was_not(line: str, named: str) -> None:
+    done = swash(*line.split())
+    assert done.code == 2
+    assert named in done.err

@@ -24,6 +24,9 @@ def test_what_is_refused(tmp_path: Path) -> None:
     given = [*command[:2], BINARY, *command[3:], "--defaults", tmp_path / "no.parm", "--instance", "61"]
     assert "no.parm: --defaults: there is no such file" in one_message(swash(*given))
     assert not (tmp_path / "out").exists()
+    ended = one_message(swash(*command[:2], "/bin/true", *command[3:], "--instance", "61"))
+    assert "/bin/true: the binary ended with exit code 0; it said nothing." in ended
+    assert "gains" not in ended
 
 
 @pytest.mark.proof

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,19 @@ def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
         sp.nonsense  # type: ignore[attr-defined]  # noqa: B018
 
 
-def test_version() -> None:
+def test_version(monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = swash("--version")
     assert (outcome.code, outcome.out.split()[1]) == (0, sp.__version__)
+
+    def of(name: str) -> str:
+        if name == "jax":
+            raise metadata.PackageNotFoundError(name)
+        return "1.2.3"
+
+    monkeypatch.setattr(metadata, "version", of)
+    told = swash("--version")
+    assert told.code == 0, "the plain package has no JAX"
+    assert "jax not installed, numpy 1.2.3" in told.out
 
 
 def test_without_a_verb_there_is_help_and_a_usage_error() -> None:

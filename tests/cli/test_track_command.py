@@ -49,4 +49,4 @@ def test_what_cannot_be_told_ends_with_a_message(log: Path) -> None:
         assert words in one_message(done)
     short = swash("track", f"{log}@0-0.5", "--equation", EQUATION)
     assert short.code == 2
-    assert "was not told apart" in short.err
+    assert "has coefficients that the log does not separate" in short.err

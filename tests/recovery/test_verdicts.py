@@ -116,6 +116,8 @@ def other_structures(fit: StateSpaceFit) -> dict[str, StateSpaceModel]:
     }
     made = {}
     for name, out in lacking.items():
+        if not any(fit.solution.parameters[n].value for n in out):
+            continue  # in cruise flapping does not act on heave: without it the structure is the one that flew
         model = fit.solution.with_values(dict.fromkeys(out, 0.0), free=False)
         # A response that such a model does not have at all has no decibels to be fitted.
         h = {
@@ -142,6 +144,17 @@ def test_a_dozen_models_within_their_own_bounds_are_not(
 ) -> None:
     models = [truth, fit.solution, *(drawn(fit, seed) for seed in range(10))]
     assert [said(model, unseen).verdict for model in models] == [STANDS] * 12
+
+
+def test_the_parameter_that_is_wrong_is_named_with_what_the_records_ask_for(
+    truth: StateSpaceModel, fit: StateSpaceFit, unseen: list[Piece]
+) -> None:
+    """Half of a delay hides in every band; all records together ask for it back, within a tenth."""
+    judged = said(changed(fit, tau_col=0.5), unseen)
+    asked = {c.name: c.wanted for c in judged.changes}
+    assert asked["tau_col"] == pytest.approx(truth.parameters["tau_col"].value, rel=0.1)
+    assert "tau_col" in " ".join(judged.reasons)
+    assert said(fit.solution, unseen).changes == ()
 
 
 def test_what_the_record_cannot_tell_is_said(truth: StateSpaceModel, fit: StateSpaceFit, unseen: list[Piece]) -> None:
@@ -191,7 +204,10 @@ def test_an_unstable_model_gets_the_same_stretches_as_any_other(truth: StateSpac
 
 
 @pytest.mark.proof
-@pytest.mark.parametrize(("flight", "size", "seed"), [("hover", 1.0, 1000), ("cruise", 0.5, 1100)])
+@pytest.mark.parametrize(
+    ("flight", "size", "seed"),
+    [("hover", 1.0, 1000), ("hover", 1.0, 1200), ("cruise", 0.5, 1100), ("cruise", 0.5, 1300)],
+)
 def test_a_hundred_wrong_models_and_a_hundred_right_ones(
     shared_data: Path, flight: str, size: float, seed: int
 ) -> None:
@@ -224,7 +240,7 @@ def test_a_hundred_wrong_models_and_a_hundred_right_ones(
     if folder:
         kinds = Counter(kind for kind, _ in verdicts.values())
         document = {
-            "title": f"Verdicts on wrong and on right models of a helicopter in gusts, {flight}",
+            "title": f"Verdicts on wrong and on right models of a helicopter in gusts, {flight}, seed {seed}",
             "text": f"An R-50 ({flight}) in gusts of {GUST:g} m/s, four unseen sweeps of 40 s. Of {len(verdicts)} "
             f"wrong models {refuted} are refuted, of {len(right)} drawn within their own bounds {spared} are not "
             f"({right.count(OPEN)} cannot be judged). Not refuted: "
@@ -238,6 +254,6 @@ def test_a_hundred_wrong_models_and_a_hundred_right_ones(
             + [["within their own bounds", len(right), *(right.count(v) for v in (REFUTED, STANDS, OPEN))]],
             "passed": refuted >= 95 and spared >= 95,
         }
-        (Path(folder) / f"verdicts_{flight}.json").write_text(json.dumps(document, indent=2), encoding="utf-8")
+        (Path(folder) / f"verdicts_{flight}_{seed}.json").write_text(json.dumps(document, indent=2), encoding="utf-8")
     assert refuted >= 95, {n: v for n, v in verdicts.items() if v[1] != REFUTED}
     assert spared >= 95

@@ -20,11 +20,12 @@ from swashplate.arrays import Array, Complex
 from swashplate.atomic import write_text
 from swashplate.control.laws.ardupilot.law import GRAVITY
 from swashplate.control.laws.ardupilot.parameters import known
-from swashplate.errors import LinkError, SwashError
+from swashplate.errors import SwashError
 from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.readers.read import read
+from swashplate.links.ardupilot.first_answer import OLDEST_WORDS, naming_the_end, who_it_is
 from swashplate.links.ardupilot.gains import ardupilot_law, read_parameter_file
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
 from swashplate.links.ardupilot.parameters import Parameters, as_written, parameter_file, parameters
@@ -34,6 +35,7 @@ from swashplate.links.ardupilot.sitl import Sitl
 from swashplate.links.ardupilot.trial import Background, Piloted, Trial, TrialEndedError, TrialLine, TrialPlan
 from swashplate.links.ardupilot.trial_parameters import trial_parameters
 from swashplate.links.ardupilot.trial_pilot import PLACE, SPEED, TrialPilot
+from swashplate.links.ardupilot.trial_sweeps import gentle_sweep
 from swashplate.links.mavlink.commanding import Commanding
 from swashplate.links.mavlink.comparison import compared, rate_problems
 from swashplate.links.mavlink.connection import Connection
@@ -51,18 +53,10 @@ from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.standing import airborne, standing
 from swashplate.simulation.trim import trim
 
-OLDEST = (4, 5)
-"""ArduCopter whose parameters these are."""
 _RATE = 100.0
 """Hz of the records: what the System ID mode logs by default."""
 _LOOP = 400.0
 """Hz of ArduCopter's loops, where it does not say."""
-_GENTLE: Mapping[str, tuple[float, float]] = {"p": (0.4, 0.1), "q": (0.4, 0.1), "r": (1.2, 0.4), "az": (2.5, 0.7)}
-"""Most rate [rad/s] and angle [rad] that a sweep may make, or acceleration [m/s^2] and speed [m/s]."""
-_MOST = 0.2
-"""Of a mixer's command."""
-
-
 _MIXING = ("MOT_", "H_C")
 """What a mixer's parameters begin with."""
 _COMPENSATED = ("MOT_BAT_VOLT_MAX", "MOT_BAT_V_MAX")
@@ -87,18 +81,21 @@ def accept_autopilot(
     environment: Environment | None = None,
     instance: int = 0,
     speedup: float = 10.0,
-    timeout: float = 60.0,
+    timeout: float = 15.0,
     say: Say = silent,
 ) -> Acceptance:
     """Start a SITL binary with a vehicle's files, fly it by itself, and put truth beside what its log says.
 
-    Cold start, wait for the EKF, arming, hover in STABILIZE, ALT_HOLD and LOITER, a sweep of each axis in System ID
-    mode, landing; then the log through `respond`, `fit_tf` and `fit_ss`. Whatever happens, the binary is ended.
+    First the binary is started beside a vehicle that only stands, and asked who it is: any other program is refused
+    before anything is computed. Then, from a cold start: wait for the EKF, arm, hover in STABILIZE, ALT_HOLD and
+    LOITER, sweep each axis in System ID mode, land; then the log through `respond`, `fit_tf` and `fit_ss`. A sweep
+    begins higher than `band` where the loops leave less of it than whole microseconds resolve. Whatever happens, the
+    binary is ended.
 
     Args:
         vehicle: in free flight; what flies.
         binary: of ArduCopter for SITL (`arducopter-heli`; `arducopter` for a coaxial).
-        out: folder where it runs and where its log stays; its `sitl` must not be there yet.
+        out: folder where it runs: `first-start`, then `sitl`, which must not be there yet and keeps its log.
         name, servos: as of `link_ardupilot`.
         truth: whose linearisation the estimates are held against; the vehicle's own where None.
         axes: that are swept, of roll, pitch, yaw and heave.
@@ -108,7 +105,7 @@ def accept_autopilot(
         defaults: parameter files of yours, read last. Without an ATC_RAT_ gain in them the gains are searched.
         environment: wind and air.
         instance: of SITL; each has ports of its own. speedup: most simulated seconds a second.
-        timeout: wall clock until the binary has opened its port and says who it is [s].
+        timeout: wall clock until the binary has opened its port, is heard, and says who it is, each [s].
         say: told what is being done.
 
     Raises:
@@ -130,9 +127,11 @@ def accept_autopilot(
     called, around = name or vehicle.card.called, environment_of(vehicle, environment)
     above = standard_altitude(float(around.air_density))
     sitl = Sitl(binary, folder, files, instance=instance, speedup=speedup, altitude=above)
-    listen_udp("127.0.0.1", sitl.physics_port).close()
     aircraft, flying = standing(vehicle), airborne(vehicle)
     mapping = mapping_of(aircraft, servos, name=name, suffix="")
+    say("asking the binary who it is")
+    first = Sitl(binary, folder.with_name("first-start"), (), instance=instance, speedup=speedup, altitude=above)
+    version = who_it_is(first, aircraft, mapping, around, timeout=timeout)
     say("trimming and linearising the vehicle")
     level = trim(flying, environment=environment)
     model = linearize(flying, level)
@@ -147,14 +146,17 @@ def accept_autopilot(
         say("searching gains with margins")
         gains = gains_to_write(mapping, flying, level, notice=lambda text: say(text))
     used, pull = {**law.parameters, **gains, **yours}, float(around.gravity)
-    chirps = {axis: _chirp(model, moves[axis], axis, used, band, seconds, pull) for axis in axes}
-    first = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
+    chirps = {
+        axis: gentle_sweep(model, moves[axis], axis, used, band=band, seconds=seconds, gravity=pull, mapping=mapping)
+        for axis in axes
+    }
+    shown = next(iter(chirps.values()), Chirp.planned(10, 0.05, band, record=seconds, fade=1.0))
     with listen_udp("127.0.0.1", sitl.physics_port) as bound:
         say("compiling the vehicle")
         plant = Plant(aircraft, mapping, Surroundings(around), engine=link_engine(lambda text: say(text)))
         plant.prepare()
         session = ArduPilotSession(plant, Sensing(plant), Notices(lambda text: say(text)))
-        _write_files(folder, files, expected | gains, first, defaults, called)
+        _write_files(folder, files, expected | gains, shown, defaults, called)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
             pilot = TrialPilot(
                 lambda pulses: radio.sendto(pulses, ("127.0.0.1", sitl.rc_port)),
@@ -166,8 +168,8 @@ def accept_autopilot(
             plan = TrialPlan(chirps, run_up, height=height, hover=hover, ekf=ekf)
             piloted = Piloted(session, pilot)
             with Background(lambda go_on: serve(bound, piloted, go_on=go_on)) as physics, sitl:
-                lines, version, flown, speed, values = _flown(
-                    sitl, session, pilot, plan, expected, timeout=timeout, say=say, physics=physics
+                lines, flown, speed, values = _flown(
+                    sitl, session, pilot, plan, expected, timeout=timeout, say=say, physics=physics, version=version
                 )
     say("reading the log")
     logs = sitl.logs()
@@ -183,35 +185,6 @@ def accept_autopilot(
         found = _judged(logs, swept, partial(response, other), partial(response, model), pilot, lines)
     log = logs[-1] if logs else None
     return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), found, log, folder, speed)
-
-
-def _chirp(
-    model: LinearModel,
-    moved: Array,
-    axis: str,
-    gains: Mapping[str, float],
-    band: tuple[float, float],
-    seconds: float,
-    gravity: float,
-) -> Chirp:
-    """The largest sweep that stays gentle, by the linear model under the autopilot's loops without their filters."""
-    a = MIXER_AXES[axis]
-    omega = 2.0 * np.pi * np.geomspace(*band, 60)
-    answer = mixer_response(model, moved, a.output, omega, late=0.0, gravity=gravity)
-    answer = np.abs(answer / (1.0 + answer * _feedback(axis, gains, omega)))
-    quick, far = _GENTLE[a.output]
-    most = min(_MOST, quick / float(answer.max()), far / float((answer / omega).max()))
-    return Chirp.planned(a.number, float(f"{most:.2g}"), band, record=seconds, fade=1.0)
-
-
-def _feedback(axis: str, gains: Mapping[str, float], omega: Array) -> Complex:
-    """What the loops add to the mixer's command against a rate, per rad/s; none against heave in STABILIZE."""
-    if axis == "heave":
-        return np.zeros(omega.size, dtype=complex)
-    name, s = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}[axis], 1j * omega
-    p, i, forward = (gains[f"ATC_RAT_{name}_{end}"] for end in ("P", "I", "FF"))
-    angle = gains[f"ATC_ANG_{name}_P"] / s
-    return np.asarray((p + i / s) * (1.0 + angle) + forward * angle)
 
 
 def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
@@ -246,8 +219,9 @@ def _flown(
     timeout: float,
     say: Say,
     physics: Background,
-) -> tuple[list[TrialLine], str, list[str], float, Mapping[str, float]]:
-    """Lines, version, axes flown, simulated seconds a second, and the parameters that it has.
+    version: str,
+) -> tuple[list[TrialLine], list[str], float, Mapping[str, float]]:
+    """Lines, axes flown, simulated seconds a second, and the parameters that it has.
 
     Raises:
         LinkError: who answers is no ArduCopter that can be tried, or nobody does.
@@ -257,20 +231,15 @@ def _flown(
     with Connection(f"tcp:127.0.0.1:{sitl.mavlink_port}", timeout=timeout) as connection:
         autopilot = Commanding(connection)
         trial = Trial(session, pilot, autopilot, sitl, plan)
-        version, values, begun = "version not known", dict[str, float](), time.monotonic()
+        values, begun = dict[str, float](), time.monotonic()
         try:
-            try:
+            with naming_the_end(sitl):
                 kind = greet(connection, ARDUPILOT, timeout)
-                version = _version(autopilot, timeout, sitl)
                 say("reading the parameters back")
                 reading = read_parameters(connection, packed=False)
                 ask_by_name(connection, reading, expected, packed=False)
-            except LinkError as error:
-                if told := sitl.ended(patience=2.0):
-                    raise LinkError(told, where=sitl.binary, hint=f"All it printed is in {sitl.output}.") from None
-                raise error
             said = f"{version}, MAVLink type {kind}"
-            trial.lines.append(TrialLine("binary", said, f"ArduCopter {_dotted(OLDEST)} or later", True))
+            trial.lines.append(TrialLine("binary", said, f"ArduCopter {OLDEST_WORDS} or later", True))
             values = reading.values
             pilot.lean_max, pilot.keep = _lean_max(reading), _keep(values)
             if _parameters_right(reading, expected, trial.lines):
@@ -280,28 +249,7 @@ def _flown(
         if physics.failed:
             trial.lines.append(TrialLine("physics", str(physics.failed[0]), "answers to the end", False))
         wall = time.monotonic() - begun
-    return trial.lines, version, trial.flown, session.plant.time / max(wall, 1e-9), values
-
-
-def _dotted(numbers: Sequence[int]) -> str:
-    return ".".join(map(str, numbers))
-
-
-def _version(autopilot: Commanding, timeout: float, sitl: Sitl) -> str:
-    until = asked = time.monotonic()
-    until += timeout
-    while autopilot.version is None and time.monotonic() < until and not sitl.ended():
-        if time.monotonic() >= asked:
-            autopilot.ask_version()
-            asked += 0.5
-        autopilot.hear(0.1)
-    if autopilot.version is None:
-        raise LinkError("does not say which version it is.", where=sitl.binary)
-    if autopilot.version[:2] < OLDEST:
-        raise LinkError(
-            f"is version {_dotted(autopilot.version)}, expected {_dotted(OLDEST)} or later.", where=sitl.binary
-        )
-    return f"version {_dotted(autopilot.version)}"
+    return trial.lines, trial.flown, session.plant.time / max(wall, 1e-9), values
 
 
 def _lean_max(reading: ParameterReading) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,10 @@ from swashplate.api.truth_beside import TruthBeside, at_three
 from swashplate.links.ardupilot.trial import TrialLine
 from swashplate.reporting.case_parts import bode_overlay
 from swashplate.reporting.html import write_page
+from swashplate.reporting.sections_responses import parameter_table
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table
 from swashplate.reporting.versions import date, versions
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 ACCEPTANCE_FILES = ("report.html", "acceptance.json")
@@ -21,7 +23,7 @@ ACCEPTANCE_FILES = ("report.html", "acceptance.json")
 
 
 @dataclass(frozen=True, repr=False)
-class Acceptance:
+class Acceptance(Shown):
     """A trial of a SITL binary.
 
     Attributes:
@@ -78,6 +80,10 @@ class Acceptance:
             "lines": [line._asdict() for line in self.lines],
             "truth_beside_estimate": beside,
             "models": [] if self.truth is None else self.truth.models,
+            "structures": {
+                axes: {each.name: [each.value, each.sigma, each.unit] for each in estimates}
+                for axes, estimates in ({} if self.truth is None else self.truth.structures).items()
+            },
             "remarks": [] if self.truth is None else self.truth.remarks,
             "log": None if self.log is None else str(self.log),
             "real_time": self.real_time,
@@ -95,17 +101,22 @@ class Acceptance:
         """What `sp.report` writes."""
         tone, word = ("good", "Accepted") if self.passed else ("bad", "Not accepted")
         judged = [line for line in self.lines if line.passed is not None]
-        failed = sum(line.passed is False for line in judged)
+        failed = [line.what for line in judged if line.passed is False]
         rows = tuple(
             (Cell(line.what), Cell(line.found), Cell(line.expected), Cell(*_said(line.passed))) for line in self.lines
         )
         steps = Table("Every step and its verdict", ("what", "found", "expected", "verdict"), rows)
         sections = [Section("steps", "Steps", (steps,))]
         if self.truth is not None and self.truth.curves:
-            blocks: tuple[Block, ...] = (_beside(self.truth.curves), bode_overlay(self.truth.curves))
+            blocks: tuple[Block, ...] = (
+                _beside(self.truth.curves),
+                bode_overlay(self.truth.curves, whose="Truth and estimates"),
+            )
             sections.append(Section("truth", "Truth beside estimate", blocks))
-            models = (Points(tuple(self.truth.models)),)
-            sections.append(Section("models", "Models that were fitted", models, folded=True))
+            models: list[Block] = [Points(tuple(self.truth.models))]
+            for axes, estimates in self.truth.structures.items():
+                models.append(replace(parameter_table(estimates), caption=f"Parameters of {axes} by fit-ss"))
+            sections.append(Section("models", "Models that were fitted", tuple(models), folded=True))
             if self.truth.remarks:
                 remarks = (Points(tuple(dict.fromkeys(self.truth.remarks))),)
                 sections.append(Section("remarks", "What the estimates warn of", remarks, folded=True))
@@ -113,11 +124,12 @@ class Acceptance:
         sections.append(Section("command", "How it was started", (command,), folded=True))
         return Report(
             title=title or f"Acceptance of {Path(self.binary).name} with {self.vehicle}",
-            banners=((tone, f"{word}: {len(judged) - failed} of {len(judged)} lines pass."),),
+            banners=((tone, f"{word}: {len(judged) - len(failed)} of {len(judged)} lines pass."),),
             summary=(
                 ("Binary", f"{self.binary}, {self.version}", "plain"),
                 ("Vehicle", self.vehicle, "plain"),
-                ("Verdict", f"{word}; {failed} of {len(judged)} lines fail", tone),
+                ("Verdict", f"{word}; {len(failed)} of {len(judged)} lines fail", tone),
+                *((("Fails", "; ".join(failed), tone),) if failed else ()),
                 ("Speed", f"{self.real_time:.1f} times real time", "plain"),
             ),
             picture=None,
@@ -139,7 +151,7 @@ class Acceptance:
 
 def _said(passed: bool | None) -> tuple[str, bool, str]:
     """Word, whether it is a number, and tone of a verdict's cell."""
-    return {True: ("pass", False, "good"), False: ("FAIL", False, "bad"), None: ("-", False, "quiet")}[passed]
+    return {True: ("pass", False, "good"), False: ("FAIL", False, "bad"), None: ("not judged", False, "quiet")}[passed]
 
 
 def _beside(pairs: Mapping[tuple[str, str], Mapping[str, Any]]) -> Table:
@@ -150,7 +162,11 @@ def _beside(pairs: Mapping[tuple[str, str], Mapping[str, Any]]) -> Table:
             cells = [_polar(values.get(name)) for name in names]
             rows.append((Cell(f"{output} / {input}"), Cell(f"{frequency:.2f}", number=True), *cells))
     columns = ("response", "Hz", *(f"{name} [dB, deg]" for name in names))
-    return Table("Gain and phase", columns, tuple(rows))
+    return Table(
+        "Gain and phase of rates [rad/s] and specific force [m/s²] per unit of the mixer's command",
+        columns,
+        tuple(rows),
+    )
 
 
 def _polar(value: tuple[float, float] | None) -> Cell:

@@ -17,6 +17,7 @@ from swashplate.control.controller_file import save_controller
 from swashplate.control.laws.ardupilot.law import FLIGHT_MODES, RATE_OF_LOOPS, ArduPilotLaw, FlightMode
 from swashplate.control.laws.ardupilot.parameters import RENAMED
 from swashplate.errors import ControllerError, DivergenceError, SwashError
+from swashplate.identification.frequency.handling import delay_words
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, read_parameter_file, written_gains
 from swashplate.links.ardupilot.parameters import parameter_file
 from swashplate.links.ardupilot.parameters import parameters as ardupilot_parameters
@@ -25,6 +26,9 @@ from swashplate.links.px4.gains import px4_file, px4_gains, px4_law
 from swashplate.links.px4.parameters import parameters as px4_parameters
 from swashplate.models.delays import complete_delays, input_delays
 from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.figures.of_results import plain_page, section_of_loops
+from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.closed_loop import simulate_closed_loop
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
@@ -58,7 +62,7 @@ class FlownMode:
 
 
 @dataclass(frozen=True)
-class AutopilotGains:
+class AutopilotGains(Shown):
     """Gains of a whole autopilot for a vehicle.
 
     Attributes:
@@ -124,15 +128,31 @@ class AutopilotGains:
             "problems": list(self.problems),
         }
 
+    def page(self, *, title: str | None = None) -> Report:
+        """The page of `sp.report`, under a heading, its own where None."""
+        worth = {
+            loop.name: f"{loop.gain:.1f} dB, {loop.phase:.1f} deg, {1e3 * loop.delay:.1f} ms, rejects to "
+            f"{loop.rejection:.2f} rad/s, max |S| {loop.peak:.2f}"
+            for loop in self.found.loops
+        }
+        numbers = ", ".join(f"{name} {self.parameters[name]:.4g}" for name in self.gains if name not in RENAMED)
+        return plain_page(
+            title or f"Gains for {self.title}",
+            summary={"Commands are late by": self.late, **worth, "Parameters": numbers},
+            sections=[section_of_loops(self.found.loops)],
+            problems=self.problems,
+        )
+
     def __repr__(self) -> str:
         law = self.found.law
         lines = [f"{self.title}: {'ArduPilot' if self.autopilot == 'ardupilot' else 'PX4'}, loops at {law.rate:g} Hz"]
         lines.append(f"late: {self.late}")
-        head = ("loop", "gain [dB]", "phase [deg]", "delay [ms]", "crossover", "bandwidth", "rejects to", "max |S|")
+        head = ("loop", "gain [dB]", "phase [deg]", "delay", "crossover", "bandwidth", "rejects to", "max |S|")
         rows = [
             (
                 loop.name,
-                *(f"{value:.1f}" for value in (loop.gain, loop.phase, 1e3 * loop.delay)),
+                *(f"{value:.1f}" for value in (loop.gain, loop.phase)),
+                delay_words(loop.delay),
                 *(f"{value:.2f}" for value in (loop.crossover, loop.bandwidth, loop.rejection, loop.peak)),
             )
             for loop in self.found.loops

@@ -18,6 +18,9 @@ from swashplate.links.mavlink.health import Health, listen_to_health
 from swashplate.links.mavlink.parameter_reading import ask_by_name, read_parameters
 from swashplate.links.px4.parameters import parameters as for_px4
 from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.figures.of_results import plain_page
+from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.simulation.trim import trim
 from swashplate.text_table import text_table
 
@@ -35,7 +38,7 @@ _STILL = 1e-3
 
 
 @dataclass(frozen=True)
-class AutopilotCheck:
+class AutopilotCheck(Shown):
     """A running autopilot beside the vehicle that it is to fly.
 
     Attributes:
@@ -69,6 +72,13 @@ class AutopilotCheck:
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""
         return asdict(self) | {"passed": self.passed}
+
+    def page(self, *, title: str | None = None) -> Report:
+        """The page of `sp.report`, under a heading, its own where None."""
+        verdict, *lines = repr(self).split("\n")
+        told = (line.partition(": ") for line in lines if not line.startswith("problem: "))
+        summary = {name.strip(): words.strip() for name, _, words in told}
+        return plain_page(title or verdict, summary=summary, problems=self.problems)
 
     def __repr__(self) -> str:
         right = sum(p.verdict == "right" for p in self.parameters)

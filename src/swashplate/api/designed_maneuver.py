@@ -18,6 +18,9 @@ from swashplate.flights.maneuvers.composed import ComposedMultisine
 from swashplate.flights.maneuvers.maneuver_design import sampled
 from swashplate.flights.maneuvers.series import FADE, Maneuver
 from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.figures.of_results import plain_page, section_of_pieces
+from swashplate.reporting.structure import Report
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 LEAD = 3.0
@@ -49,7 +52,7 @@ class Offer:
 
 
 @dataclass(frozen=True, repr=False)
-class DesignedManeuver:
+class DesignedManeuver(Shown):
     """What to fly for some parameters.
 
     Attributes:
@@ -186,6 +189,18 @@ class DesignedManeuver:
             "draws": self.draws,
             "spread": self.spread,
         }  # fmt: skip
+
+    def page(self, *, title: str | None = None) -> Report:
+        """The page of `sp.report`, under a heading, its own where None."""
+        head, rows = self.rows()
+        ways = {
+            row[0]: ", ".join(f"{name} {cell}" for name, cell in zip(head[1:], row[1:], strict=True)) for row in rows
+        }
+        return plain_page(
+            title or f"Maneuver for {', '.join(self.unknown)} of {self.vehicle.name}",
+            summary={"Best": self.best.kind, **ways},
+            sections=[section_of_pieces(self.best.pieces, rate=self.rate)],
+        )
 
     def __repr__(self) -> str:
         told = (

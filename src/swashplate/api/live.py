@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 
+from swashplate.api.saying import announce
 from swashplate.control.controller_file import read_controller
 from swashplate.errors import SwashError
 from swashplate.links.live.replay import Replay, as_json
@@ -97,10 +97,3 @@ def show_replay(
         check_page()
         announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)
         serving.serve(server.replay_app(as_json(made), remote=allow_remote), listening)
-
-
-def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
-    """Tell where a page is, and open it where that was asked for."""
-    ready(address)
-    if open_page and not webbrowser.open(address):
-        say(f"No browser was found; open {address} yourself.")

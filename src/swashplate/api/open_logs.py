@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from swashplate.api.live import announce
+from swashplate.api.saying import announce
 from swashplate.errors import FlightError
 from swashplate.flights import datasets
 

@@ -1,7 +1,9 @@
-"""How a verb that takes long tells what it is doing."""
+"""How a verb says what it is doing, and where its page is."""
 
 from __future__ import annotations
 
+import webbrowser
+from collections.abc import Callable
 from typing import Protocol
 
 
@@ -13,3 +15,10 @@ class Say(Protocol):
 
 def silent(what: str, *, done: float = 0.0, total: float | None = None, note: str = "") -> None:
     """Says nothing."""
+
+
+def announce(address: str, *, open_page: bool, ready: Callable[[str], None], say: Callable[[str], None]) -> None:
+    """Say where a page is, and open it where that was asked for."""
+    ready(address)
+    if open_page and not webbrowser.open(address):
+        say(f"No browser was found; open {address} yourself.")

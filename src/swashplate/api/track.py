@@ -69,7 +69,9 @@ class Tracking(ReportFolder):
     @property
     def problems(self) -> tuple[str, ...]:
         """Equations whose coefficients the stream never told apart, or lost again."""
-        return tuple(f"'{e.text}' was not told apart." for e in self.followed if e.final is None)
+        return tuple(
+            f"'{e.text}' has coefficients that the log does not separate." for e in self.followed if e.final is None
+        )
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""
@@ -115,7 +117,7 @@ class Tracking(ReportFolder):
         for one in self.followed:
             parts.append(f"\n{one.text}   ({one.counted:.1f} s counted)")
             if one.final is None:
-                parts.append("  not told apart by this stream")
+                parts.append("  not separated by this stream")
                 continue
             for i, name in enumerate(one.names):
                 unit = one.units[i]

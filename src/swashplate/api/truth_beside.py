@@ -16,6 +16,7 @@ from swashplate.flights.conditioning.uniform_records import uniform_records
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
 from swashplate.flights.maneuvers.sweeps import Sweep, sweeps
+from swashplate.identification.core.result import Estimate
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
 from swashplate.identification.responses.respond import respond
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES
@@ -24,6 +25,7 @@ from swashplate.models.linear.transfer_function import TransferFunction
 
 GAIN, PHASE, SIGMAS = 1.0, 7.0, 3.0
 """dB and degrees that an estimate may be off the truth, or so many random errors where those are more."""
+_WITHIN = f"within {GAIN:g} dB and {PHASE:g} deg, or {SIGMAS:g} random errors"
 COHERENT = 0.8
 """Coherence from which on a line is judged."""
 _SWEPT = "sid_target"
@@ -56,13 +58,15 @@ class TruthBeside:
     Attributes:
         lines: verdicts.
         curves: by (output, input), by name ("truth", "respond", ...): frequencies [rad/s] and the response.
-        models: what was fitted, in words.
+        models: transfer functions that were fitted, in words.
+        structures: parameters of the state-space structures that were fitted, by their axes.
         remarks: what the estimates themselves warn of.
     """
 
     lines: list[TrialLine] = field(default_factory=list)
     curves: dict[tuple[str, str], dict[str, tuple[Array, Complex]]] = field(default_factory=dict)
     models: list[str] = field(default_factory=list)
+    structures: dict[str, Sequence[Estimate]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
 
@@ -138,9 +142,10 @@ def _judge(
     simple = [_fitted(responses, axis, form) for axis, form in zip(axes, forms, strict=True)]
     found.models += [f"{axis}, fit-tf: {each!r}" for axis, each in zip(axes, simple, strict=True)]
     name = STRUCTURES.get(tuple(axes))
-    fitted = None if name is None else fit_ss(name, responses).structure
-    if fitted is not None:
-        found.models.append(f"{' and '.join(axes)}, fit-ss: {fitted!r}")
+    fit = None if name is None else fit_ss(name, responses)
+    fitted = None if fit is None else fit.structure
+    if fit is not None and fit.fit is not None:
+        found.structures[" and ".join(axes)] = fit.fit.estimates
     for place, (axis, a) in enumerate(zip(axes, named, strict=True)):
         h, coherence, error = responses.pair(a.output, a.input)
         good = np.isfinite(h) & (coherence >= COHERENT)
@@ -203,7 +208,7 @@ def _follows(exact: FrequencyResponse, axis: str, estimate: Complex) -> bool:
 
 
 def _told(line: TrialLine, who: str) -> TrialLine:
-    words = f"not judged: {who} the vehicle's own linearisation within {_FOLLOWS * GAIN:g} dB"
+    words = f"{who} the vehicle's own linearisation within {_FOLLOWS * GAIN:g} dB and {_FOLLOWS * PHASE:g} deg"
     return line._replace(expected=words, passed=None)
 
 
@@ -216,13 +221,13 @@ def _distance(estimate: Complex, true: Complex) -> tuple[Array, Array]:
 def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: NDArray[np.bool_]) -> TrialLine:
     """The largest distance over the coherent lines; the random errors there widen what is allowed."""
     if not good.any():
-        return TrialLine(what, "nothing coherent", f"within {GAIN:g} dB and {PHASE:g} deg", False)
+        return TrialLine(what, "nothing coherent", _WITHIN, False)
     gain, phase = _distance(estimate[good], true[good])
     sigma = np.nan_to_num(error[good])
     allowed = np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma), np.maximum(PHASE, SIGMAS * np.degrees(sigma))
     passed = bool(np.all(gain <= allowed[0]) and np.all(phase <= allowed[1]))
     found = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
-    return TrialLine(what, found, f"within {GAIN:g} dB and {PHASE:g} deg", passed)
+    return TrialLine(what, found, _WITHIN, passed)
 
 
 def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: NDArray[np.bool_]) -> TrialLine:

@@ -12,6 +12,7 @@ import typer
 from swashplate.cli import (
     bench,
     campaign,
+    combine,
     compare,
     control,
     data,
@@ -57,11 +58,11 @@ app = typer.Typer(
 def _version(wanted: bool) -> None:
     if wanted:
         import platform
-        from importlib import metadata
 
-        versions = {name: metadata.version(name) for name in ("jax", "numpy", "scipy")}
-        told = ", ".join([f"Python {platform.python_version()}", *(f"{k} {v}" for k, v in versions.items())])
-        typer.echo(f"swashplate {metadata.version('swashplate')} ({told})")
+        from swashplate.extras import version_of
+
+        told = ", ".join(f"{name} {version_of(name)}" for name in ("jax", "numpy", "scipy"))
+        typer.echo(f"swashplate {version_of('swashplate')} (Python {platform.python_version()}, {told})")
         raise typer.Exit
 
 
@@ -98,6 +99,7 @@ app.command("reconstruct", short_help="Find biases and scale factors of a flight
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
+app.command("combine", short_help="Multiply, divide, invert responses; close or open a loop.")(combine.combine)
 app.command("compare", short_help="Responses, models or fits side by side.")(compare.compare)
 app.command("derivatives", short_help="Stability and control derivatives, by contributor.")(derivatives.derivatives)
 app.command("export", short_help="Write a model as C, an FMU, an S-function, .mat or JSON.")(export.export)

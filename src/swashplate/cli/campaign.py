@@ -65,6 +65,7 @@ def run(
             typer.echo(as_json(made.to_document()) if json else repr(made))
             return
         if out is None:
+            sp.plan_campaign(file)  # what is wrong in what was typed comes first
             raise SwashError("is missing.", channel="--out", hint="Say where results are kept: -o FOLDER.")
         found = sp.campaign(file, out, workers=workers, scheduler=scheduler, engine=_engine(engine),
                             accept_changes=accept_changes, say=line.say)  # fmt: skip

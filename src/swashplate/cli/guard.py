@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.cli.spelling import spelled
+from swashplate.cli.typed_first import refuse_wrong_names
 from swashplate.errors import SwashError
 from swashplate.extras import EXTRA_OF, missing
 
@@ -61,10 +62,19 @@ class Guarded(TyperGroup):
         name, command, rest = super().resolve_command(ctx, args)
         return name, command, rest if command is None else spelled(command, rest)
 
+    def _judged(self, ctx: Any) -> Any:
+        """The verb; where an option is missing, the names that were typed are judged first."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            if type(error).__name__ == "MissingParameter" and error.ctx is not None:
+                refuse_wrong_names(error.ctx.command, error.ctx.params)
+            raise
+
     def invoke(self, ctx: Any) -> Any:
         debug = bool(ctx.params.get("debug")) or os.environ.get("SWASHPLATE_DEBUG", "") not in ("", "0")
         try:
-            return super().invoke(ctx)
+            return self._judged(ctx)
         except (typer.Exit, typer.Abort, typer.TyperException, BrokenPipeError):
             raise  # typer knows what to do with these: usage errors are 2 already
         except KeyboardInterrupt:

@@ -57,7 +57,7 @@ def accept(
     ] = 10.0,
     timeout: Annotated[
         float, typer.Option("--timeout", help="Seconds until the binary answers.", min=0.5, max=600.0)
-    ] = 60.0,
+    ] = 15.0,
     wind: given.Wind = "0,0,0",
     altitude: given.Altitude = 0.0,
     changed: given.Set = None,
@@ -67,7 +67,8 @@ def accept(
 ) -> None:
     """Start a SITL binary with a vehicle's files, fly it from a cold start, and compare its log with the truth.
 
-    It waits for the EKF, arms, hovers in STABILIZE, ALT_HOLD and LOITER, sweeps each axis in System ID mode, lands, and
+    First the binary is started once and asked for its version, so that a wrong one is refused within seconds. Then it
+    waits for the EKF, arms, hovers in STABILIZE, ALT_HOLD and LOITER, sweeps each axis in System ID mode, lands, and
     takes the log through respond, fit-tf and fit-ss. Every line has a verdict; the exit code is 2 if one fails. Needs
     the extra `link`. The binary is ended in every case.
     """

@@ -150,37 +150,50 @@ class StochasticModel:
             sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
             along = jnp.sqrt(2.0) * sigma * np.eye(n)[self._disturbed[:2]]
             places = jnp.concatenate([x + along, x - along])
-        rates = self._rates(parameters)
-
-        def slopes(x: Any) -> Any:
-            return jax.jacfwd(lambda x, w: rates(x, self._driving(w, u, voltage)) + self._push(w), argnums=(0, 1))(
-                x, jnp.zeros(g)
-            )
-
-        by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(slopes)(places))
+        still = jnp.zeros(g)
+        by_x, by_gust = (
+            jnp.mean(part, axis=0)
+            for part in jax.vmap(lambda x: self.slopes(x, still, u=u, parameters=parameters, voltage=voltage))(places)
+        )
         by_x, held = held_series(by_x, self.dt, jnp.eye(n))  # as `step` makes it of a linear system
         by_gust = self.dt * held @ by_gust
         by_push = by_gust[:, :d]
         A = jnp.block(
             [
                 [by_x, by_gust, by_push],
-                [jnp.zeros((g, n)), jnp.diag(self._fade(noise)), jnp.zeros((g, d))],
+                [jnp.zeros((g, n)), jnp.diag(self.fade(noise)), jnp.zeros((g, d))],
                 [jnp.zeros((d, n + g)), jnp.eye(d)],
             ]
         )
         by_state = jax.jacfwd(lambda x: self.measure(x, nuisance))(x)
         C = jnp.concatenate([by_state, jnp.zeros((self.n_outputs, g + d))], 1)
+        return A, C, self.process_noise(by_push, noise), jnp.diag(self.sensor_variances(noise))
+
+    def slopes(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> tuple[Any, Any]:
+        """Slopes of the rates by the state (states, states) and by the disturbances (states, gusts)."""
+        rates = self._rates(parameters)
+
+        def pushed(x: Any, w: Any) -> Any:
+            return rates(x, self._driving(w, u, voltage)) + self._push(w)
+
+        by_x, by_gust = jax.jacfwd(pushed, argnums=(0, 1))(x, gust)
+        return by_x, by_gust
+
+    def process_noise(self, by_push: Any, noise: Noise) -> Any:
+        """Covariance of what a sample adds to states, gusts and drifts.
+
+        Args:
+            by_push: how an acceleration that is held over the sample moves the states (states, accelerations).
+            noise: intensities.
+        """
         tilt, yaw, horizontal, vertical = noise[:4]
         white = jnp.stack(on_axes(horizontal, vertical, tilt, yaw))
         tilt, yaw, horizontal, vertical = noise[4:8]
-        gust = jnp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind])[:g]
+        gust = jnp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind])[: self.n_gusts]
         drift = jnp.stack(on_axes(*_shared_or_own(noise, "drift")))
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
-        spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T
-        Q = jax.scipy.linalg.block_diag(
-            spread + self._floor(n), jnp.diag(gust**2 * self.dt), jnp.diag(drift**2 * self.dt)
-        )
-        return A, C, Q, jnp.diag(self._sensor_variances(noise))
+        spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T + self._floor(by_push.shape[0])
+        return jax.scipy.linalg.block_diag(spread, jnp.diag(gust**2 * self.dt), jnp.diag(drift**2 * self.dt))
 
     def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
@@ -188,7 +201,7 @@ class StochasticModel:
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
         return FilterGain(K[:n], K[n : n + g], K[n + g :], S)
 
-    def _fade(self, noise: Noise) -> Any:
+    def fade(self, noise: Noise) -> Any:
         """What is left of each gust after one sample."""
         taus = [*on_axes(*_shared_or_own(noise, "tau_gust")), noise.tau_wind, noise.tau_wind]
         return jnp.exp(-self.dt / jnp.stack(taus[: self.n_gusts]))
@@ -198,7 +211,8 @@ class StochasticModel:
         speeds = [name.startswith("omega") for name in self.vehicle.state_names]
         return jnp.diag(jnp.where(jnp.array(speeds), 1e-4, 1e-10)[:n])
 
-    def _sensor_variances(self, noise: Noise) -> Any:
+    def sensor_variances(self, noise: Noise) -> Any:
+        """Variances of the measured channels."""
         sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
         return jnp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names])
 
@@ -220,7 +234,7 @@ class StochasticModel:
 
     def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
         """The state one sample later."""
-        return FilterState(advance(state.x, self.acting(state), now), self._fade(noise) * state.gust, state.drift)
+        return FilterState(advance(state.x, self.acting(state), now), self.fade(noise) * state.gust, state.drift)
 
     def run(
         self,

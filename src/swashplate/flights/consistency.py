@@ -16,7 +16,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous, interpolate, quaternion_from_euler, to_body
-from swashplate.flights.conditioning.derive import body_rates, differentiate
+from swashplate.flights.conditioning.derive import GRAVITY, body_rates, differentiate
 from swashplate.flights.conditioning.filters import within
 from swashplate.flights.conditioning.resample import common, unbroken
 from swashplate.flights.flight import Flight
@@ -45,7 +45,6 @@ _QUIET = 0.15  # of its usual motion: a window in which an axis moves less is no
 _STEEPEST = 0.5 * np.pi + 0.02  # rad: no pitch angle is larger
 _MAX_GAP = 0.25  # s
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the weight along body z says little
-_GRAVITY = 9.80665
 
 _DOWN = np.array([0.0, 0.0, 1.0])
 
@@ -379,7 +378,7 @@ def _unit_of(ratio: float, kind: _Kind) -> str | None:
 
 def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[Inconsistency]:
     """The accelerometers' mean along body z: what neither falls nor climbs away feels its weight, -9.81 m/s^2 level."""
-    found = []
+    found, gravity = [], flight.gravity or GRAVITY
     for (name,) in _families(flight, ("az",), made):
         stamps, values = _thinned(*_series(flight, name))
         if values.size < _SHORTEST:
@@ -389,11 +388,11 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
             # Third row, third column of body to local: how much of body z points down.
             down = to_body(interpolate(attitude.time, attitude.quaternion, stamps), _DOWN)[:, 2]
         upright = np.abs(down) > _UPRIGHT
-        felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= _SHORTEST else _GRAVITY
-        for unit, weight in (("m/s^2", _GRAVITY), ("g", 1.0)):
+        felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= _SHORTEST else gravity
+        for unit, weight in (("m/s^2", gravity), ("g", 1.0)):
             if abs(abs(felt) - weight) < 0.3 * weight and (unit, felt > 0.0) != ("m/s^2", True):
                 words = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
-                text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected -9.81 m/s^2"
+                text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
                 sign, looks_like = "-" if felt < 0.0 else "", "" if unit == "m/s^2" else unit
                 mend = _unit_to_give(flight, name, sign=sign, looks_like=looks_like)
                 # Without an attitude it may have lain on its back.

@@ -261,6 +261,11 @@ class Flight:
         """
         return Flight(*storage.load(path))
 
+    @property
+    def gravity(self) -> float | None:
+        """Gravity [m/s^2] that it was simulated or conditioned with; None where the log does not say."""
+        return next((float(step.details["gravity"]) for step in self.history if "gravity" in step.details), None)
+
     def condition(
         self,
         *,

@@ -311,8 +311,8 @@ def _stream_problems(stream: StreamSummary) -> list[str]:
     problems = []
     if stream.gaps:
         problems.append(
-            f"{stream.name}: {stream.gaps} gaps in the time stamps, the longest {1e3 * stream.longest_gap:.0f} ms "
-            f"(usual step {1e3 / stream.rate:.1f} ms)"
+            f"{stream.name}: {stream.gaps} gap{'s' * (stream.gaps != 1)} in the time stamps, the longest "
+            f"{1e3 * stream.longest_gap:.0f} ms (usual step {1e3 / stream.rate:.1f} ms)"
         )
     if stream.jitter * stream.rate > _JITTER:
         problems.append(

@@ -16,6 +16,7 @@ from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import channel as schema_of
+from swashplate.shown import Shown
 
 WINDOWS = 16
 """Windows that an average has at least, where the record is long enough for any."""
@@ -30,7 +31,7 @@ _WIDTH = 0.04  # of a harmonic's frequency, to each side: the rotor's speed is n
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Shown):
     """A channel's power spectral density.
 
     Attributes:
@@ -57,15 +58,24 @@ class Spectrum:
         inside = (self.frequency >= low) & (self.frequency <= high)
         return float(np.sqrt(np.sum(self.density[inside]) * step))
 
+    @property
+    def cutoff(self) -> float:
+        """Frequency [Hz] below which half of the mean square lies (Tischler and Remple 2012, ch. 5); NaN at rest."""
+        power = np.cumsum(self.density[1:])
+        if not power[-1] > 0.0:
+            return float("nan")
+        return float(np.interp(0.5 * power[-1], power, self.frequency[1:]))
+
     def __str__(self) -> str:
         return (
             f"{self.channel}: {self.windows} windows of {self.seconds:.3g} s from {self.start:.2f} to {self.stop:.2f} s"
             f", up to {0.5 * self.rate:.4g} Hz; rms {self.rms(self.frequency[1], self.frequency[-1]):.4g} {self.unit}"
+            f", cut-off {self.cutoff:.3g} Hz"
         )
 
 
 @dataclass(frozen=True)
-class Spectrogram:
+class Spectrogram(Shown):
     """Densities over time: `density` has shape (len(frequency), len(time)), in unit^2/Hz."""
 
     channel: str
@@ -116,7 +126,7 @@ class Notches:
 
 
 @dataclass(frozen=True)
-class Harmonics:
+class Harmonics(Shown):
     """Rotor vibration in a channel.
 
     Attributes:

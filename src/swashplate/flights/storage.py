@@ -14,14 +14,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
-import h5py
 import numpy as np
 import xarray as xr
 
 from swashplate import documents
 from swashplate.atomic import write_bytes
 from swashplate.errors import FlightError
-from swashplate.flights import hdf5
 from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import SCHEMA_VERSION
 
@@ -87,6 +85,10 @@ def _text(value: Any) -> str:
 
 def _checked_attributes(path: Path) -> dict[str, str]:
     """The root's attributes, after the file has been looked through."""
+    import h5py  # a twentieth of a second that a log of another format need not wait
+
+    from swashplate.flights import hdf5
+
     with h5py.File(path, "r") as file:
         root = dict(file.attrs)
         if "swashplate_schema" not in root:

@@ -61,28 +61,29 @@ class FloatBackend:
 
 
 class ArrayBackend:
-    """NumPy arrays: a whole record at once."""
+    """Arrays: a whole record at once by NumPy, or simulation, fitting and batches by JAX (`JaxBackend`).
 
-    def __init__(self) -> None:
-        self.arrays: Any = np
-        self.sin, self.cos, self.tan, self.sqrt = np.sin, np.cos, np.tan, np.sqrt
-        self.atan2, self.abs, self.where = np.arctan2, np.abs, np.where
-        self.minimum, self.maximum = np.minimum, np.maximum
-        self.detached = _same
+    Args:
+        arrays: `numpy` or `jax.numpy`.
+        detached: hides a value's origin from differentiation, where there is one.
+    """
+
+    def __init__(self, arrays: Any = np, detached: Callable[[Scalar], Scalar] | None = None) -> None:
+        self.arrays = arrays
+        self.sin, self.cos, self.tan, self.sqrt = arrays.sin, arrays.cos, arrays.tan, arrays.sqrt
+        self.atan2, self.abs, self.where = arrays.arctan2, arrays.abs, arrays.where
+        self.minimum, self.maximum = arrays.minimum, arrays.maximum
+        self.detached = detached or _same
 
 
-class JaxBackend:
-    """JAX arrays and tracers: simulation, fitting, batches."""
+class JaxBackend(ArrayBackend):
+    """JAX arrays and tracers."""
 
     def __init__(self) -> None:
         import jax
         import jax.numpy as jnp
 
-        self.arrays: Any = jnp
-        self.sin, self.cos, self.tan, self.sqrt = jnp.sin, jnp.cos, jnp.tan, jnp.sqrt
-        self.atan2, self.abs, self.where = jnp.arctan2, jnp.abs, jnp.where
-        self.minimum, self.maximum = jnp.minimum, jnp.maximum
-        self.detached = jax.lax.stop_gradient
+        super().__init__(jnp, jax.lax.stop_gradient)
 
 
 class CasadiBackend:

@@ -46,8 +46,11 @@ Curve = tuple[Array, Complex]
 """Frequencies [rad/s] and a response at them."""
 
 
-def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]]) -> Figure:
-    """Magnitude and phase of pairs (output, input), a line for each case that has it; phases by whole turns alike."""
+def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]], *, whose: str = "") -> Figure:
+    """Magnitude and phase of pairs (output, input), a line for each case that has it; phases by whole turns alike.
+
+    `whose` they are is said below; cases by default.
+    """
     shown = dict(list(pairs.items())[:MOST_PAIRS])
     names = list(dict.fromkeys(name for curves in shown.values() for name in curves))
     titles = [f"{o} / {i}, {what}" for o, i in shown for what in ("magnitude [dB]", "phase [deg]")]
@@ -77,7 +80,7 @@ def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]]) -> Figure
         "overlay",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        f"Responses of {len(names)} cases over each other.{more}",
+        f"{whose or f'Responses of {len(names)} cases'} over each other.{more}",
         f"Bode diagrams of {', '.join(f'{o} over {i}' for o, i in shown)} for {', '.join(names)}.",
         keys=tuple(Key(n, *STYLES[k % len(STYLES)]) for k, n in enumerate(names)),
     )

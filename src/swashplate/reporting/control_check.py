@@ -18,6 +18,7 @@ from swashplate.control.analysis.requirements import (
     Boundary,
 )
 from swashplate.flights.schema import channel
+from swashplate.identification.frequency.handling import delay_words
 from swashplate.reporting import figures_control as figures
 from swashplate.reporting.structure import Block, Cell, Points, Report, Section, Table, Text
 from swashplate.reporting.theme import unit_words
@@ -75,10 +76,6 @@ def _axis_level(a: AxisMargins, check: ControlCheck) -> int | None:
     return max(known) if known else None
 
 
-def _delay(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms" if math.isfinite(seconds) else "any amount"
-
-
 def _margins_line(check: ControlCheck) -> tuple[str, str]:
     if check.margins is None:
         return "none: the loop does not stand.", "bad"
@@ -88,8 +85,8 @@ def _margins_line(check: ControlCheck) -> tuple[str, str]:
     short = check.margins.least_delay < 1e-3 * check.delay_boundary.level1
     return (
         f"all loops at once ±{_decibel(t.gain):.1f} dB or ±{math.degrees(t.phase):.0f}° (disc {t.alpha:.2f} at "
-        f"{t.frequency:.3g} rad/s) or {_delay(check.margins.delay)} of further delay; the weakest single loop is "
-        f"{worst.name}, {math.degrees(worst.phase):.0f}° and {_delay(worst.delay)}.",
+        f"{t.frequency:.3g} rad/s) or {delay_words(check.margins.delay)} of further delay; the weakest single loop is "
+        f"{worst.name}, {math.degrees(worst.phase):.0f}° and {delay_words(worst.delay)}.",
         "bad" if short else "good" if levels[worst.name] == 1 else "caution",
     )
 
@@ -133,12 +130,12 @@ def _loops(check: ControlCheck) -> Section:
     if check.margins is not None:
         rows = []
         for a in check.margins.axes:
-            least = f"6 dB, 45°, {check.delay_boundary.level1:.3g} ms"
+            least = f"6 dB, 45°, {delay_words(check.delay_boundary.level1 / 1e3)}"
             good = _axis_level(a, check) == 1
             told = (f"meets {least}", "good") if good else (f"below one of {least}", "caution")
             rows.append(
                 (Cell(a.name), _number(_decibel(a.gain_down), ".1f"), _number(_decibel(a.gain), "+.1f"),
-                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), _number(1e3 * a.delay, ".3g"),
+                 _number(math.degrees(a.phase), ".0f"), _number(a.crossover), Cell(delay_words(a.delay), number=True),
                  _number(a.disc.alpha, ".2f"),
                  _number(_decibel(a.sensitivity), ".1f"),
                  Cell(told[0], tone=told[1]))
@@ -150,14 +147,14 @@ def _loops(check: ControlCheck) -> Section:
             "gain up [dB]",
             "phase [deg]",
             "crossover [rad/s]",
-            "delay [ms]",
+            "delay",
             "disc",
             "max |S| [dB]",
             "",
         )
         note = (
             f"All loops at once: gain ±{_decibel(t.gain):.1f} dB, phase ±{math.degrees(t.phase):.0f}° (disc "
-            f"{t.alpha:.2f} at {t.frequency:.3g} rad/s), {_delay(check.margins.delay)} of further delay; "
+            f"{t.alpha:.2f} at {t.frequency:.3g} rad/s), {delay_words(check.margins.delay)} of further delay; "
             "the disc by the diagonally scaled upper bound of the structured singular "
             "value: it never promises more than there is. Disc margins: Seiler, Packard and Gahinet (2020)."
         )

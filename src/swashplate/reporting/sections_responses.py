@@ -100,8 +100,8 @@ def parameter_table(parameters: Sequence[Estimate]) -> Table:
         ("parameter", "unit", "start", "identified", "Cramér-Rao", "insensitivity", "remarks"),
         tuple(rows),
         note=f"Targets: Cramér-Rao {CR_TARGET:g} %, insensitivity {I_TARGET:g} % of the value; beyond twice of it a "
-        "number is not told by these responses. J is not a likelihood: the true scatter is about √2·σ (dB) times the "
-        "bound (see the proof page for what was measured).",
+        "number cannot be estimated from these responses. J is not a likelihood: the true scatter is about √2·σ (dB) "
+        "times the bound (see the proof page for what was measured).",
     )
 
 
@@ -210,7 +210,7 @@ def _cost_table(targets: Sequence[Target], costs: Sequence[float]) -> Table:
             )
             for t, cost in zip(targets, costs, strict=True)
         ),
-        note=f"J up to {INDISTINGUISHABLE:g} is hardly to be told from the flight, up to {ACCEPTABLE:g} acceptable.",
+        note=f"J up to {INDISTINGUISHABLE:g} is hardly different from the flight, up to {ACCEPTABLE:g} acceptable.",
     )
 
 
@@ -250,7 +250,7 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
                     )
                     for t in m.trials
                 ),
-                note="Suggested: of those whose parameters are told, the fewest that cost hardly more than the best.",
+                note="Suggested: the fewest parameters that can all be estimated and cost hardly more than the best.",
             )
         )
     return Section("transfer-functions", "Transfer functions", tuple(blocks))

@@ -156,11 +156,11 @@ def axis(title: str = "", **more: Any) -> dict[str, Any]:
 
 
 def phase_ticks(values: Any) -> dict[str, Any]:
-    """What a phase axis [deg] has beside its title: marks at multiples of 15 degrees or more, few enough to be read."""
+    """What a phase axis [deg] has beside its title: marks at multiples of 5 degrees or more, few enough to be read."""
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
     span = float(np.ptp(finite)) if finite.size else 200.0
-    return {"tick0": 0, "dtick": next((step for step in (15, 30, 45, 90, 180) if span <= 5 * step), 360)}
+    return {"tick0": 0, "dtick": next((step for step in (5, 15, 30, 45, 90, 180) if span <= 5 * step), 360)}
 
 
 def bands(count: int, *, gap: float) -> list[tuple[float, float]]:

@@ -24,7 +24,7 @@ def compose_tracking(
     banners = (("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),) if simulated else ()
     missing = [one.text for one in found if one.final is None]
     if missing:
-        banners = (("bad", f"Not told apart by this stream: {'; '.join(missing)}."), *banners)
+        banners = (("bad", f"Not separated by this stream: {'; '.join(missing)}."), *banners)
     return Report(
         title=title or f"Identification in flight: {source}",
         banners=banners,

@@ -7,9 +7,9 @@ import json
 import os
 import platform
 from datetime import UTC, datetime
-from importlib import metadata
 from typing import Any
 
+from swashplate.extras import version_of
 from swashplate.models.card import Card
 
 _PACKAGES = ("swashplate", "jax", "jaxlib", "numpy", "scipy", "xarray", "plotly")
@@ -17,13 +17,7 @@ _PACKAGES = ("swashplate", "jax", "jaxlib", "numpy", "scipy", "xarray", "plotly"
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that numbers depend on."""
-    found = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+    return {"python": platform.python_version(), **{name: version_of(name) for name in _PACKAGES}}
 
 
 def date() -> str:

@@ -99,7 +99,9 @@ def _lowpass(d: Mapping[str, Any]) -> str:
 
 def _derive(d: Mapping[str, Any]) -> str:
     made = [str(name) for name in d.get("derived", ())]
-    return f"{listed(made, most=12)} were derived from position and attitude."
+    taken = f" Gravity was taken as {d['gravity']:.4g} m/s²" if "az" in made and "gravity" in d else ""
+    why = ", the standard, because the log does not say it" if d.get("assumed") else ""
+    return f"{listed(made, most=12)} were derived from position and attitude.{f'{taken}{why}.' if taken else ''}"
 
 
 def _between(d: Mapping[str, Any]) -> str:

@@ -74,6 +74,7 @@ def simulate_adaptive(
     if solution.result != diffrax.RESULTS.successful:
         raise SwashError(f"the adaptive integration gave up: {solution.result}")
     states = np.asarray(solution.ys)
-    flight = simulated_flight(vehicle, time, states, rows, details={"method": "Dopri8", "tolerance": tolerance})
+    details = {"method": "Dopri8", "tolerance": tolerance, "gravity": float(surroundings.gravity)}
+    flight = simulated_flight(vehicle, time, states, rows, details=details)
     check_divergence(vehicle, time, states, flight)
     return flight

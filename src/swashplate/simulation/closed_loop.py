@@ -166,7 +166,8 @@ def simulate_closed_loop(
     if not vehicle.traits.linear and steep(states):
         states, inputs = flown(with_quaternion(vehicle, x0))
     time, rows = np.arange(n) / rate, np.concatenate([inputs, around], axis=1)
-    flight = simulated_flight(vehicle, time, states, rows, details={"rate": rate, "controller_rate": controller.rate})
+    details = {"rate": rate, "controller_rate": controller.rate, "gravity": float(surroundings.gravity)}
+    flight = simulated_flight(vehicle, time, states, rows, details=details)
     check_divergence(vehicle, time, states, flight)
     return flight
 

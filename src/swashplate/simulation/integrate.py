@@ -113,7 +113,16 @@ def simulate(
     if earth is None and not vehicle.traits.linear and steep(states):
         states = euler_rows(flown(tumbling(vehicle), from_euler(np.asarray(x0))), np.asarray(x0))
     flight = simulated_flight(
-        vehicle, time, states, rows, details={"rate": rate, "substeps": substeps, "interpolation": interpolation}
+        vehicle,
+        time,
+        states,
+        rows,
+        details={
+            "rate": rate,
+            "substeps": substeps,
+            "interpolation": interpolation,
+            "gravity": float(surroundings.gravity),
+        },
     )
     check_divergence(vehicle, time, states, flight)
     if places is not None:

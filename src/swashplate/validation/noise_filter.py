@@ -25,7 +25,7 @@ _LAGS = 0.25
 _LEAST = 1e-4
 """Innovations below this share of a channel's movement are no noise, but how it was made (derived, or simulated)."""
 
-_INDEPENDENT = 18.0 / 35.0
+INDEPENDENT = 18.0 / 35.0
 """Independent lines behind a Hann window, per line: (mean w^2)^2 / mean w^4."""
 
 _ROWS_PER_NUMBER = 4.0
@@ -188,15 +188,24 @@ class NoiseLevel:
         return self.of_lines(record, np.abs(spectrum(values)) ** 2)
 
     def of_lines(self, record: int, lines: Array) -> Array:
-        """The same of squared lines (n_lines, k)."""
-        inside = self.bands[record]
-        return np.asarray(inside @ lines / np.maximum(self.lines[record], 1)[:, None] / self.colour)
+        """The same of squared lines (n_lines, k, ...)."""
+        divided = np.maximum(self.lines[record], 1)[:, None] * self.colour
+        power = np.tensordot(self.bands[record], lines, 1)
+        return np.asarray(power / divided.reshape(*divided.shape, *[1] * (lines.ndim - 2)))
+
+    def inverse(self, record: int) -> Array:
+        """By what lines are multiplied to have noise of size one (n_lines, k); zero outside the bands."""
+        return np.asarray(self.bands[record].T @ (1.0 / np.sqrt(self.colour)))
+
+    def inside(self, record: int, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which lines lie in some bands and outputs (n_bands, k), as (n_lines, k)."""
+        return np.asarray(self.bands[record].T.astype(int) @ cells > 0)
 
     def largest(self, record: int, chance: float) -> Array:
         """Root mean square by band (n_bands, 1) that P w stays below but for a chance (Fisher's F)."""
         from scipy.stats import f as fisher
 
-        behind = np.maximum(2.0 * _INDEPENDENT * self.free, 1.0)
+        behind = np.maximum(2.0 * INDEPENDENT * self.free, 1.0)
         square = self.floor[record] * fisher.isf(chance, self.freedom[record], behind)
         return np.asarray(np.sqrt(square)[:, None])
 

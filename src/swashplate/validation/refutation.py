@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from swashplate.arrays import Array, Complex
-from swashplate.identification.frequency.response_cost import PHASE_WEIGHT, POINTS
+from swashplate.identification.frequency.response_cost import INDISTINGUISHABLE, PHASE_WEIGHT, POINTS
 from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.validation.asked_changes import AskedChange, ParameterErrors
 from swashplate.validation.noise_filter import NoiseFilter, NoiseLevel, Piece, averaged, moved_by_itself, spectrum
 
 REFUTED, STANDS, OPEN = "refuted", "not refuted", "cannot be judged"
@@ -32,9 +33,11 @@ FALSE_ALARM = 1e-3
 SIGMAS = 3.0
 """Cramér-Rao bounds of its parameters by which a model's answer may be off."""
 
+DOUBTED = 2.0
+"""By so much bounds may be too narrow: a parameter refutes a model only beyond as many times `SIGMAS` of them."""
+
 _DB, _DEG = 20.0 / np.log(10.0), 180.0 / np.pi
-_TELLING_J = 50.0
-MATERIAL = float(np.sqrt(_TELLING_J / POINTS / (0.5 * _DB**2 + 0.5 * PHASE_WEIGHT * _DEG**2)))
+MATERIAL = float(np.sqrt(INDISTINGUISHABLE / POINTS / (0.5 * _DB**2 + 0.5 * PHASE_WEIGHT * _DEG**2)))
 """An error below this share of what the controls do refutes no model (0.19).
 
 It is the relative error of a response whose J is 50, up to which a model can hardly be told from the flight (Tischler
@@ -96,6 +99,7 @@ class Judgement:
         findings: by record, output and band. silent: inputs about which the records say nothing.
         samples, constants: numbers compared, and constants solved for, in all records together.
         share: rms error of the predictions beyond the noise over that of a model without controls; NaN where open.
+        changes: of the model's parameters that the records ask for beyond bounds and noise, and that matter.
     """
 
     verdict: str
@@ -105,6 +109,7 @@ class Judgement:
     samples: int = 0
     constants: int = 0
     share: float = float("nan")
+    changes: tuple[AskedChange, ...] = ()
 
 
 def judge(
@@ -144,7 +149,9 @@ def judge(
     step = longest.dt * every
     noise = NoiseLevel.behind(filter, step, edges)
     grid = 2.0 * np.pi * np.geomspace(low, high, 2 + int(np.log(high / low) / _STEP_OF_SLOPES))
-    slopes = own_bounds(model, outputs, grid)
+    bounded, slopes = own_bounds(model, outputs, grid)
+    told = ParameterErrors(len(bounded))
+    loudest, shares = np.zeros((2, len(bounded)))
     for r, piece in enumerate(pieces):
         if not noise.lines[r].all():
             continue
@@ -153,7 +160,9 @@ def judge(
         left, bare = noise.power(r, seen.error), noise.power(r, seen.measured)
         floor = noise.floor[r][:, None]
         controls = np.sqrt(np.maximum(bare - floor, 0.0))
-        own = SIGMAS * np.sqrt(seen.bounds(grid, slopes, noise, step))
+        moved = seen.moved(grid, slopes, noise, step)
+        by_parameter = noise.of_lines(r, np.abs(moved) ** 2)
+        own = SIGMAS * np.sqrt(by_parameter.sum(axis=2))
         unsure = np.maximum(np.sqrt(noise.power(r, filter.together[r])), UNSEEN)
         largest = noise.largest(r, chance)
         # No sum of errors is larger than the sum of their sizes.
@@ -162,6 +171,11 @@ def judge(
         admitted = noise.known & moved_by_itself(piece, every) & np.ones(left.shape, dtype=bool)
         heard = (bare > limit) & admitted
         claims |= [bool(np.any(noise.power(r, part) > limit)) for part in np.moveaxis(seen.forced, 2, 0)]
+        for share, power in ((loudest, np.ones(controls.shape)), (shares, np.maximum(controls, 1e-300))):
+            apart = np.sqrt(by_parameter) * (heard / power)[:, :, None]
+            np.maximum(share, np.max(apart, axis=(0, 1), initial=0.0), out=share)
+        white = noise.inverse(r)
+        told.add(white[:, :, None] * moved, white * spectrum(seen.error), noise.inside(r, admitted))
         findings += [
             Finding(
                 piece.source,
@@ -179,16 +193,43 @@ def judge(
         ]
     silent = tuple(n for n, told in zip(model.inputs, claims, strict=True) if not told)
     led = any(moved_by_itself(piece, every) for piece in pieces)
-    return _in_words(tuple(findings), silent, samples, constants, led=led)
+    changes = _asked(model, bounded, told, loudest, shares)
+    return _in_words(tuple(findings), changes, silent, samples, constants, led=led)
+
+
+def _asked(
+    model: StateSpaceModel, bounded: Sequence[str], told: ParameterErrors, loudest: Array, shares: Array
+) -> tuple[AskedChange, ...]:
+    """The changes of parameters that are beyond doubt, heard, and matter; the surest first.
+
+    Args:
+        loudest, shares: what one bound of each parameter makes where the controls are heard, at most in any band and
+            output: over the noise, and over what the controls do.
+    """
+    change, spread = told.asked()
+    sigmas = np.abs(change) / np.sqrt(1.0 + spread**2)
+    matters = (np.abs(change) * loudest > UNSEEN) & (np.abs(change) * shares > MATERIAL)
+    found = []
+    for i in map(int, np.flatnonzero((sigmas > DOUBTED * SIGMAS) & matters)):
+        p = model.parameters[bounded[i]]
+        wanted = float(p.value + change[i] * p.cramer_rao)
+        found.append(AskedChange(bounded[i], p.value, wanted, float(sigmas[i]), float(abs(change[i]) * shares[i])))
+    return tuple(sorted(found, key=lambda one: -one.sigmas))
 
 
 def _in_words(
-    findings: tuple[Finding, ...], silent: tuple[str, ...], samples: int, constants: int, *, led: bool
+    findings: tuple[Finding, ...],
+    changes: tuple[AskedChange, ...],
+    silent: tuple[str, ...],
+    samples: int,
+    constants: int,
+    *,
+    led: bool,
 ) -> Judgement:
     telling = [f for f in findings if f.telling]
     against = sorted((f for f in findings if f.against), key=lambda f: f.allowed / f.error)
     quiet = [f"the records say nothing about {', '.join(silent)}."] if silent else []
-    if not against and not telling:
+    if not against and not telling and not changes:
         heard = any(f.heard for f in findings)
         words = (
             "the model's own bounds are so wide that a model without any control would pass too."
@@ -201,7 +242,7 @@ def _in_words(
     told = [f for f in findings if f.heard]
     beyond = sum(max(f.error**2 - f.noise**2, 0.0) for f in told)
     share = float(np.sqrt(beyond / sum(f.controls**2 for f in told))) if told else float("nan")
-    if not against:
+    if not against and not changes:
         words = f"{len(telling)} of {len(findings)} outputs and bands could have refuted it, and none does."
         return Judgement(STANDS, (words, *quiet), findings, silent, samples, constants, share)
     worst = tuple(
@@ -210,8 +251,9 @@ def _in_words(
         "a model without controls."
         for f in against[:3]
     )
-    head = f"{len(against)} of {len(telling)} outputs and bands that can refute it do; the worst:"
-    return Judgement(REFUTED, (head, *worst, *quiet), findings, silent, samples, constants, share)
+    head = [f"{len(against)} of {len(telling)} outputs and bands that can refute it do; the worst:"] if against else []
+    asked = tuple(change.words for change in changes[:3])
+    return Judgement(REFUTED, (*head, *worst, *asked, *quiet), findings, silent, samples, constants, share, changes)
 
 
 class _Seen:
@@ -236,8 +278,8 @@ class _Seen:
         flat = values.reshape(self._constants.shape[0], -1)
         return np.asarray((flat - self._constants @ (self._constants.T @ flat)).reshape(values.shape))
 
-    def bounds(self, grid: Array, slopes: Complex, noise: NoiseLevel, step: float) -> Array:
-        """Sum of the mean squares that one Cramér-Rao bound of each parameter makes, by band and output."""
+    def moved(self, grid: Array, slopes: Complex, noise: NoiseLevel, step: float) -> Complex:
+        """Lines of what one Cramér-Rao bound of each parameter makes, (n_lines, n_outputs, n_parameters)."""
         hertz = np.fft.rfftfreq(len(self._inputs), step)
         used = np.any(noise.bands[self._record], axis=0)
         omega = np.asarray(2.0 * np.pi * hertz[used], dtype=np.float64)
@@ -246,23 +288,23 @@ class _Seen:
         between = (1.0 - share) * slopes[at] + share * slopes[at + 1]
         moved = (between @ spectrum(self._inputs)[used][:, None, :, None])[..., 0]
         seen = np.swapaxes(self._filter.response(omega, step), 1, 2) @ moved
-        lines = np.zeros((used.size, seen.shape[1]))
-        lines[used] = np.sum(np.abs(seen) ** 2, axis=2) / self._filter.noise[self._record] ** 2
-        return noise.of_lines(self._record, lines)
+        lines = np.zeros((used.size, *seen.shape[1:]), dtype=np.complex128)
+        lines[used] = seen / self._filter.noise[self._record][:, None]
+        return lines
 
 
-def own_bounds(model: StateSpaceModel, outputs: Sequence[str], grid: Array) -> Complex:
+def own_bounds(model: StateSpaceModel, outputs: Sequence[str], grid: Array) -> tuple[tuple[str, ...], Complex]:
     """What one Cramér-Rao bound of each free parameter that has any does to the responses at `grid` [rad/s].
 
     Returns:
-        (n, n_outputs, n_parameters, n_inputs).
+        Their names, and (n, n_outputs, n_parameters, n_inputs).
     """
     known = {name: model.parameters[name].cramer_rao for name in model.free}
     known = {name: bound for name, bound in known.items() if np.isfinite(bound) and bound > 0.0}
     rows, m = [model.outputs.index(o) for o in outputs], len(model.inputs)
     if not known:
-        return np.zeros((grid.size, len(rows), 0, m), dtype=np.complex128)
+        return (), np.zeros((grid.size, len(rows), 0, m), dtype=np.complex128)
     values = np.array([model.parameters[name].value for name in known])
     _, slopes = model.sensitivities(tuple(known), values, [(o, j, grid) for o in rows for j in range(m)])
     by_pair = np.array(slopes).reshape(len(rows), m, grid.size, len(known))
-    return np.asarray(by_pair.transpose(2, 0, 3, 1) * np.array(list(known.values()))[:, None])
+    return tuple(known), np.asarray(by_pair.transpose(2, 0, 3, 1) * np.array(list(known.values()))[:, None])

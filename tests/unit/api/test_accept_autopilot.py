@@ -9,6 +9,8 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,11 @@ import swashplate as sp
 from swashplate.api.acceptance import Acceptance
 from swashplate.api.truth_beside import Truth, TruthBeside, beside_truth
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
+from swashplate.flights.maneuvers.sweeps import sweeps
 from swashplate.links.ardupilot import sitl, trial
 from swashplate.links.ardupilot.gains import ardupilot_law
 from swashplate.links.ardupilot.mixer_responses import MIXER_AXES, mixed, mixer_response
+from swashplate.links.ardupilot.trial_sweeps import gentle_sweep, largest_pulse
 from swashplate.links.servos import servo_mapping
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.standing import airborne
@@ -85,10 +89,10 @@ def accept(out: Path, *, faults: str = "", axes: tuple[str, ...] = ("yaw",), **m
         del os.environ["SWASH_STANDIN"]
 
 
-def is_gone(out: Path) -> bool:
+def is_gone(out: Path, folder: str = "sitl") -> bool:
     """Whether the stand-in's process, which wrote down its number, has ended."""
     try:
-        os.kill(int((out / "sitl" / "pid").read_text()), 0)
+        os.kill(int((out / folder / "pid").read_text()), 0)
     except ProcessLookupError:
         return True
     return False
@@ -167,12 +171,14 @@ def truth_of(vehicle: Vehicle, *, name: str, rate: float = 200.0) -> Truth:
 def judged_against(
     vehicle: Vehicle, log: Path, *, own: Vehicle = RAPTOR, name: str = "raptor50", **swept: float
 ) -> TruthBeside:
-    """By axis so many seconds of sweep."""
-    chirps = {
-        axis: Chirp.planned(MIXER_AXES[axis].number, 0.1, (0.4, 8.0), record=seconds, fade=1.0)
-        for axis, seconds in (swept or {"yaw": QUICK["seconds"]}).items()
-    }
-    return beside_truth(sp.read(log), chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0)
+    """By axis so many seconds of sweep, over the band that the log tells."""
+    flight = sp.read(log)
+    bands = {sweep.axis: (sweep.low, sweep.high) for sweep in sweeps(flight) if sweep.source == "log"}
+    chirps = {}
+    for axis, seconds in (swept or {"yaw": QUICK["seconds"]}).items():
+        named = Chirp.planned(MIXER_AXES[axis].number, 0.1, (0.4, 8.0), record=seconds, fade=1.0)
+        chirps[axis] = replace(named, start_hz=bands[named.axis_name][0], stop_hz=bands[named.axis_name][1])
+    return beside_truth(flight, chirps, truth_of(vehicle, name=name), truth_of(own, name=name), rate=100.0)
 
 
 @pytest.mark.parametrize("share", [0.75, 1.0, 1.3])
@@ -240,7 +246,8 @@ def test_who_is_not_arducopter(faults: str, words: str, tmp_path: Path, monkeypa
     monkeypatch.setattr(sitl, "_PATIENCE", 0.3)
     with pytest.raises(sp.SwashError, match=words):
         accept(tmp_path / "t", faults=faults, timeout=2.5 if faults == "mute" else 30.0)
-    assert is_gone(tmp_path / "t")
+    assert is_gone(tmp_path / "t", "first-start")
+    assert not (tmp_path / "t" / "sitl").exists()
 
 
 def program(path: Path, text: str, *, executable: bool = True) -> Path:
@@ -351,21 +358,62 @@ def test_a_coaxial_s_mixer_moves_motors_by_its_thrust_curve_and_flaps_over_its_t
 
 def test_a_coaxial_with_another_frame_is_not_flown(tmp_path: Path) -> None:
     out = tmp_path / "t"
-    os.environ["SWASH_STANDIN"] = "frame"
-    try:
-        found = coaxial(out, axes=("yaw",))
-    finally:
-        del os.environ["SWASH_STANDIN"]
+    found = coaxial(out, axes=("yaw",), faults="frame")
     assert found.problems == (
         "parameters read back: FRAME_CLASS is 8, expected 9. (expected as the vehicle needs them).",
     )
     assert is_gone(out)
 
 
-def coaxial(out: Path, *, axes: tuple[str, ...], seconds: float = 40.0) -> Acceptance:
+@pytest.mark.proof
+def test_a_coaxial_is_accepted_and_no_other_one(tmp_path: Path) -> None:
+    """The whole trial; and the same log beside a coaxial of other inertia or mass, or one that turns the other way."""
+    found = coaxial(tmp_path / "a", axes=tuple(MIXER_AXES))
+    assert found.problems == ()
+    judged = {line.what for line in found.lines if line.passed and "beside truth" in line.what}
+    assert judged >= {f"{axis}: respond beside truth" for axis in MIXER_AXES}
+    assert {"yaw: fit-tf beside truth", "heave: fit-tf beside truth"} <= judged
+    assert found.log is not None
+    values, changes = COAX.card.values(), {"yaw": "inertia_zz", "roll": "inertia_xx", "heave": "mass"}
+    changed = [(axis, COAX.with_values({key: k * values[key]})) for axis, key in changes.items() for k in (0.75, 1.3)]
+    for axis, other in [("yaw", COAX), *changed]:
+        beside = judged_against(other, found.log, own=COAX, name="coax", **{axis: 40.0})
+        verdicts = {line.passed for line in beside.lines if "beside truth" in line.what and line.passed is not None}
+        assert verdicts == {other is COAX}, (axis, beside.lines)
+
+
+@pytest.mark.proof
+def test_a_coaxial_that_yaws_backwards_fails(tmp_path: Path) -> None:
+    found = coaxial(tmp_path / "t", axes=("yaw",), faults="backwards")
+    assert not found.passed
+    assert is_gone(tmp_path / "t")
+
+
+def test_a_sweep_begins_where_its_outputs_are_resolved() -> None:
+    """A coaxial's loops leave a slow sweep of yaw one microsecond, which rounding turns by 6 degrees at 0.5 Hz."""
+    flying = airborne(COAX)
+    hover = sp.trim(flying)
+    mapping, model = servo_mapping("coax", flying), sp.linearize(flying, hover)
+    law = ardupilot_law(mapping, flying, hover, given={})
+    moved = mixed(law.mixer, hover, law.parameters, inputs=flying.input_names)["yaw"]
+    assert largest_pulse(mapping, moved) == pytest.approx(403.0, rel=0.02), "500 us through the thrust curve"
+    planned = partial(gentle_sweep, model, moved, "yaw", seconds=40.0, gravity=9.81, mapping=mapping)
+    held = {**law.parameters, **COAX_GAINS}
+    sweep = planned(held, band=(0.4, 8.0))
+    assert 0.4 < sweep.start_hz < 1.5
+    assert planned(held, band=(3.0, 8.0)).start_hz == 3.0
+    with pytest.raises(sp.SwashError, match="no gentle sweep of yaw moves an output by 4 us"):
+        planned({**held, "ATC_RAT_YAW_P": 3.0}, band=(0.4, 2.0))
+
+
+def coaxial(out: Path, *, axes: tuple[str, ...], seconds: float = 40.0, faults: str = "") -> Acceptance:
     gains = out.parent / "coax-gains.parm"
     gains.write_text("".join(f"{name},{value}\n" for name, value in COAX_GAINS.items()))
-    return sp.accept_autopilot(
-        COAX, BINARY, out=out, name="coax", axes=axes, instance=instance(), defaults=[gains],
-        seconds=seconds, hover=3.0, height=3.0, timeout=60.0, speedup=100.0,
-    )  # fmt: skip
+    os.environ["SWASH_STANDIN"] = faults
+    try:
+        return sp.accept_autopilot(
+            COAX, BINARY, out=out, name="coax", axes=axes, instance=instance(), defaults=[gains],
+            seconds=seconds, hover=3.0, height=3.0, timeout=60.0, speedup=100.0,
+        )  # fmt: skip
+    finally:
+        del os.environ["SWASH_STANDIN"]

@@ -59,7 +59,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 """Names of `swashplate` by verb, where a verb has another name there or several; `fit-ss` is `sp.fit_ss`."""
 
 STUDIES = (
-    "campaign", "campaign_results", "check_controller", "compare", "decouple", "decouple_axes", "demo",
+    "campaign", "campaign_results", "check_controller", "combine", "compare", "decouple", "decouple_axes", "demo",
     "derivatives", "design_controller", "evaluate_bench", "fit_ss", "fit_tf", "fit_time", "fly_maneuver",
     "identify_and_validate", "monte_carlo", "observability", "respond", "resume_campaign", "track",
     "trim_curve", "validate_linear",

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 import swashplate as sp
 from report_samples import fit, flight, modes, validation
+from shown_results import MAKE, autopilot, responses, sweep
 from swashplate.errors import SwashError
 from swashplate.extras import library
-from swashplate.flights.flight import Flight
 from swashplate.reporting.compose import compose
 from swashplate.reporting.figures import of_flight
 from swashplate.reporting.figures.interactive import interactive
@@ -26,24 +26,12 @@ from swashplate.reporting.theme import axis, base_layout, line
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim_curve import trim_curve
 
+_WAYS = ("plot", "explore", "_repr_html_")
 _UNIT = re.compile(r"\[[^\]]+\]")
 
 
-def _sweep() -> Flight:
-    rng = np.random.default_rng(3)
-    u = rng.standard_normal((2, 3000))
-    p = lfilter([0.1], [1, -0.9], u[0]) + 0.1 * rng.standard_normal(3000)
-    q = lfilter([0.2], [1, -0.8], u[1]) + 0.1 * rng.standard_normal(3000)
-    channels = {"servo_roll": u[0], "servo_pitch": u[1], "p": p, "q": q}
-    return Flight.from_arrays(np.arange(3000) / 50.0, channels, source="sweep.csv")
-
-
-def _responses() -> Any:
-    return sp.respond(_sweep(), inputs=["servo_roll", "servo_pitch"], outputs=["p", "q"])
-
-
 def _study() -> Any:
-    return sp.fit_tf(_responses(), input="servo_roll", outputs=["p"], form="0/1")
+    return sp.fit_tf(responses(), input="servo_roll", outputs=["p"], form="0/1")
 
 
 def _linear() -> LinearModel:
@@ -55,8 +43,8 @@ def _linear() -> LinearModel:
 def _spectra() -> dict[str, Figure]:
     flown = flight(8.0)
     drawn = [
-        of_flight.over_time([flown, _sweep()], channels=["p", "q"], shifts=(0.0, 1.0)),
-        of_flight.spectrum([flown, _sweep()], channels=["p"]),
+        of_flight.over_time([flown, sweep()], channels=["p", "q"], shifts=(0.0, 1.0)),
+        of_flight.spectrum([flown, sweep()], channels=["p"]),
         of_flight.spectrogram(flown, channels=["p", "servo_roll"]),
     ]
     return {figure.identifier: figure for figure in drawn}
@@ -65,20 +53,97 @@ def _spectra() -> dict[str, Figure]:
 MADE: dict[str, Callable[[], dict[str, Figure]]] = {
     "flight": lambda: figures_of(flight(5.0)),
     "inspection": lambda: figures_of(sp.inspect(flight(5.0))),
-    "responses": lambda: figures_of(_responses()),
+    "responses": lambda: figures_of(responses()),
     "transfer function": lambda: figures_of(
-        sp.fit_transfer_function(_responses(), "0/1", input="servo_roll", outputs=["p"])
+        sp.fit_transfer_function(responses(), "0/1", input="servo_roll", outputs=["p"])
     ),
     "study of transfer functions": lambda: figures_of(_study()),
     "linear model": lambda: figures_of(_linear()),
     "trims": lambda: figures_of(trim_curve(sp.vehicle("coax"), (0.0,))),
     "fit and validation": lambda: {f.identifier: f for f in compose(fit(), validation(), modes=modes()).figures},
     "spectra": _spectra,
+    **{name: (lambda make=make: figures_of(make())) for name, make in MAKE.items()},
 }
+
+WITHOUT = {
+    "AxisExcitation": "one line of words",
+    "Autopilot": "a law; `check_controller` shows what it is worth",
+    "Batch": "arrays of many flights: `flight(i)` shows one, `monte_carlo` all",
+    "BenchDetails": "the result shows them",
+    "BenchRecord": "the bench's columns; `evaluate_bench` shows what they say",
+    "CampaignPlan": "cost and size in words",
+    "Card": "a table of numbers in words",
+    "Controller": "a law; `check_controller` shows what it is worth",
+    "DatasetFile": "a file's name",
+    "Decoupling": "a law; `decouple_axes` shows what it is worth",
+    "Export": "files",
+    "Film": "a file",
+    "Hold": "a law; `check_controller` shows what it is worth",
+    "HoverTrim": "a law; `check_controller` shows what it is worth",
+    "Line": "one line of words",
+    "Linked": "counts in words",
+    "Maneuver": "words; `plan_maneuver` shows it",
+    "Margins": "two numbers",
+    "MeasurementPlan": "a list to print",
+    "ObserverTrial": "the flights in it show themselves",
+    "OmissionStudy": "a table in words",
+    "PublishedComparison": "a table in words",
+    "RecursiveRegression": "an estimator that has not begun; `track` shows what it finds",
+    "Replay": "the page shows it: `show_replay`",
+    "Schedule": "linear models, each of which shows itself",
+    "StateHold": "a law; `check_controller` shows what it is worth",
+    "StateSpaceDetails": "the result shows them",
+    "StateSpaceModel": "the result shows it",
+    "Structures": "a list of names",
+    "Synchronisation": "one number and the two flights, which show themselves",
+    "TimeDetails": "the result shows them",
+    "TransferFunctionDetails": "the result shows them",
+    "TransferFunctions": "the result shows it",
+    "Trim": "one point's numbers; `trim_curve` shows many",
+    "Vehicle": "`trim_curve`, `derivatives` and `linearize` show what it does",
+    "WrittenStructure": "words",
+    "Aligned": "flights and shifts beside a figure",
+    "Figure": "a figure",
+}
+"""What the verbs return that does not show itself, and why."""
+
+
+def _returned() -> dict[str, type]:
+    """Every class of ours that a public verb returns, by its name."""
+    found: dict[str, type] = {}
+    for name in sp.__all__:
+        verb = getattr(sp, name)
+        if not inspect.isfunction(verb):
+            continue
+        try:
+            wanted = get_type_hints(verb).get("return")
+        except NameError:  # a name that is imported for type checkers only
+            continue
+        for kind in (wanted, *get_args(wanted), *(part for each in get_args(wanted) for part in get_args(each))):
+            kind = get_origin(kind) or kind
+            ours = inspect.isclass(kind) and not issubclass(kind, Exception)
+            if ours and kind.__module__.startswith("swashplate"):
+                found[kind.__name__] = kind
+    return found
+
+
+def test_what_a_verb_returns_shows_itself_or_has_a_reason() -> None:
+    returned = _returned()
+    shown = {name for name, kind in returned.items() if all(hasattr(kind, way) for way in _WAYS)}
+    assert {"Result", "Validation", "Flight", "ControllerCheck", "AutopilotGains", "Harmonics"} <= shown
+    assert set(returned) - shown == set(WITHOUT)
+
+
+def test_what_has_no_curve_says_so_and_still_shows_its_words(tmp_path: Any) -> None:
+    check = autopilot()
+    assert "it refuses to arm." in sp.report(check, path=tmp_path / "check.html").read_text(encoding="utf-8")
+    assert "it refuses to arm." in check._repr_html_()
+    with pytest.raises(SwashError, match="has nothing to draw"):
+        check.plot()
 
 
 def test_what_an_identifying_verb_returns_stands_for_its_fit() -> None:
-    study, flown = _study(), _sweep()
+    study, flown = _study(), sweep()
     assert "<img" in study._repr_html_()
     assert study.model.to_control(pade=1).ninputs == 1
     alone = sp.compare(study.fit, flown)

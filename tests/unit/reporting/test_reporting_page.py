@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import swashplate as sp
 from report_samples import fit, modes, validation
 from swashplate.errors import SwashError
-from swashplate.reporting.html import render
+from swashplate.reporting.figures.of_flight import over_time
+from swashplate.reporting.html import render, write_page
 from swashplate.reporting.packing import figures_text, read_figures
 from swashplate.reporting.pictures import prediction_picture, score_picture
 from swashplate.reporting.report import report
-from swashplate.reporting.structure import Figure, Report
+from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.theme import line
 
 NASTY = "<script>alert('x')</script><img src=x onerror=alert(1)>.mat"
@@ -124,3 +126,14 @@ def test_pictures_are_written_and_repeatable(tmp_path: Path) -> None:
     with pytest.raises(SwashError, match=r"expected \.png or \.svg"):
         score_picture(sample, path=tmp_path / "a.bmp")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg", "p.png"]
+
+
+def test_a_page_of_many_long_channels_is_small_enough_to_mail(tmp_path: Path) -> None:
+    """Noise compresses worst, and twelve panels are the most that are drawn."""
+    rng = np.random.default_rng(0)
+    rows = {f"channel_{k}": rng.standard_normal(20_000) for k in range(14)}
+    flight = sp.Flight.from_arrays(np.arange(20_000) / 100.0, rows)
+    figure = over_time([flight])
+    report = Report("noise", (), (), None, (Section("channels", "Channels", (figure,)),), "today")
+    assert len(figure.spec["data"]) == 12
+    assert 1.9e6 < write_page(tmp_path / "page.html", report).stat().st_size < 2.5e6

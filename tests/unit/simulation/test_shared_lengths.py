@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import swashplate as sp
-from swashplate.simulation import closed_loop
+from swashplate.simulation import closed_loop, closed_loop_batch
 from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.compilation import lengthened, shared_length
 
@@ -53,3 +53,29 @@ def test_a_batch_keeps_the_samples_that_were_asked_for() -> None:
     control = sp.state_hold(vehicle, sp.trim(vehicle))
     batch = simulate_closed_loops(vehicle, control, duration=0.5, size=2, rate=100.0, keep=4)
     assert len(batch.time) == round(0.5 * control.rate) // 4
+
+
+def test_any_number_of_vehicles_and_any_delay_fly_one_program() -> None:
+    """What is compiled knows neither how many fly, nor how long, nor how late up to the next power of two."""
+    vehicle = sp.vehicle("coax")
+    control, start = sp.state_hold(vehicle, sp.trim(vehicle)), sp.trim(vehicle)
+    places, batches, compiled = np.linspace(-0.3, 0.3, 9), [], []
+    for size, seconds, delay in ((9, 0.6, 0.03), (3, 0.5, 0.04), (1, 0.6, 0.035)):
+        wind = {"wind_north": places[:size]} if size > 1 else {"wind_north": places[0]}
+        wind = {name: np.broadcast_to(values, (100, size)) for name, values in wind.items()}
+        batches.append(
+            simulate_closed_loops(
+                vehicle, control, duration=seconds, size=size, rate=100.0, wind=wind, delays=delay, start=start
+            )
+        )
+        compiled.append(closed_loop_batch._fly_many._cache_size())
+    assert compiled[0] == compiled[1] == compiled[2]
+    nine, three, one = batches
+    assert nine.states.shape[2] == 9
+    assert three.states.shape[2] == 3
+    late = simulate_closed_loops(
+        vehicle, control, duration=0.5, size=9, rate=100.0, wind={"wind_north": np.tile(places, (100, 1))},
+        delays=0.04, start=start,
+    )  # fmt: skip
+    assert np.array_equal(late.states[:, :, :3], three.states)
+    assert one.states.shape[2] == 1

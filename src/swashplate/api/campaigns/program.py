@@ -16,6 +16,7 @@ from pathlib import Path
 
 import swashplate
 from swashplate.errors import CampaignError
+from swashplate.extras import version_of
 
 _LIBRARIES = ("swashplate", "jax", "jaxlib", "numpy", "scipy")
 _OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
@@ -46,12 +47,7 @@ def program() -> dict[str, str]:
 
 @cache
 def _versions() -> tuple[tuple[str, str], ...]:
-    found = {"python": ".".join(platform.python_version_tuple()[:2])}
-    for name in _LIBRARIES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
+    found = {"python": ".".join(platform.python_version_tuple()[:2])} | {name: version_of(name) for name in _LIBRARIES}
     every = metadata.entry_points()
     for group in (name for name in every.groups if name.startswith("swashplate.")):
         for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own

@@ -156,7 +156,7 @@ def _told(f: LoopFigures) -> list[tuple[str, str]]:
     return [
         ("phase margin [deg]", f"{f.margins.phase_margin!r}"),
         ("gain margin [dB]", f"{f.margins.gain_margin!r}"),
-        ("delay margin [ms]", f.margins.delay_in_words()),
+        ("delay margin", f.margins.delay_in_words()),
         ("crossover [rad/s]", f"{f.margins.crossover!r}"),
         ("largest sensitivity", number(f.peak)),
         ("bandwidth [rad/s]", number(f.bandwidth)),
@@ -338,6 +338,8 @@ def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
         for f in (s.figures_flown, s.figures_suggested)
     ]  # fmt: skip
     for (what, unit, scale, larger, least, relative), before, after in zip(_CHANGES, *columns, strict=True):
+        if unit == "ms" and max(before, after) >= 1.0:
+            scale, unit = 1.0, "s"
         change = scale * (after - before)
         if not abs(change) >= (least * abs(scale * before) if relative else least):
             continue  # NaN is no change either

@@ -27,7 +27,7 @@ from swashplate.control.analysis.sampled_loop import SampledLoop
 from swashplate.control.analysis.stability import frequencies_of, margins_of, modes_of
 from swashplate.control.kinds import kind_of
 from swashplate.errors import ControllerError, IdentificationError, SwashError
-from swashplate.identification.frequency.handling import Handling, handling_qualities
+from swashplate.identification.frequency.handling import Handling, delay_words, handling_qualities
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import Controller, flown_delays
 from swashplate.simulation.trim import Trim
@@ -240,9 +240,9 @@ def with_delay_verdict(check: ControlCheck, required: float) -> ControlCheck:
     problems = check.problems
     if check.margins is not None and check.margins.least_delay < required:
         short = [a for a in check.margins.axes if a.delay < required]
-        told = [f"{a.name} {1e3 * a.delay:.3g} ms" for a in short]
+        told = [f"{a.name} {delay_words(a.delay)}" for a in short]
         if check.margins.delay < required:
-            told.append(f"all inputs together {1e3 * check.margins.delay:.3g} ms")
+            told.append(f"all inputs together {delay_words(check.margins.delay)}")
         problems = (*problems, f"Delay margin: {', '.join(told)}; required are {boundary.level1:.3g} ms.")
     return replace(check, problems=problems, delay_boundary=boundary)
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
+from swashplate.identification.frequency.handling import delay_words
 from swashplate.identification.responses.crossing_delays import crossing_delays
 from swashplate.text_table import text_table
 
@@ -93,12 +94,12 @@ class Margins:
         return min(self.delay, *(axis.delay for axis in self.axes))
 
     def __repr__(self) -> str:
-        head = ("loop", "gain [dB]", "phase [deg]", "crossover [rad/s]", "delay [ms]", "disc", "max |S|")
+        head = ("loop", "gain [dB]", "phase [deg]", "crossover [rad/s]", "delay", "disc", "max |S|")
         rows = []
         for a in self.axes:
             with np.errstate(divide="ignore"):
                 down, up = 20.0 * np.log10([a.gain_down, a.gain])
-            numbers = (f"{1e3 * a.delay:.0f}", f"{a.disc.alpha:.2f}", f"{a.sensitivity:.2f}")
+            numbers = (delay_words(a.delay), f"{a.disc.alpha:.2f}", f"{a.sensitivity:.2f}")
             rows.append(
                 (a.name, f"{down:.1f} to {up:+.1f}", f"{np.degrees(a.phase):.0f}", f"{a.crossover:.2f}", *numbers)
             )
@@ -106,7 +107,7 @@ class Margins:
         lines = [text_table(head, rows)]
         lines.append(
             f"all at once: gain +- {20.0 * np.log10(t.gain):.1f} dB, phase +- {np.degrees(t.phase):.0f} deg "
-            f"(disc {t.alpha:.2f} at {t.frequency:.2f} rad/s), delay {1e3 * self.delay:.0f} ms"
+            f"(disc {t.alpha:.2f} at {t.frequency:.2f} rad/s), delay {delay_words(self.delay)}"
         )
         return "\n".join(lines)
 

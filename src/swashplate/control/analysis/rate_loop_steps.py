@@ -18,6 +18,7 @@ from swashplate.errors import ControllerError
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Shown
 
 RATE = 400.0
 """Hz: ArduPilot's loop."""
@@ -26,7 +27,7 @@ _WILD = 50.0
 
 
 @dataclass(frozen=True)
-class RateSteps:
+class RateSteps(Shown):
     """How a rate loop answers.
 
     Attributes:

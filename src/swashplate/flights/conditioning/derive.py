@@ -59,20 +59,23 @@ def body_rates(quaternion: Array, *, rate: float) -> Array:
     return np.asarray(2.0 * (w * dot[:, 1:] - v * dot[:, :1] - np.cross(v, dot[:, 1:])), dtype=np.float64)
 
 
-def derive(flight: Flight, *, gravity: float = GRAVITY) -> Flight:
+def derive(flight: Flight, *, gravity: float | None = None) -> Flight:
     """The flight with phi theta psi, u v w, p q r and the specific force ax ay az of the tracked point.
 
     Channels that the log already has (gyroscopes, accelerometers) stay; the history says which were derived.
 
     Args:
         flight: one uniform stream with position and attitude (or attitude alone: then only angles and rates).
-        gravity: [m/s^2].
+        gravity: [m/s^2]; where it is None the flight's own, and standard gravity where that is not known. The history
+            says which.
 
     Raises:
         FlightError: no attitude, or a segment below five samples.
     """
     rate = uniform_rate(flight)
     like = flight.channels[0]
+    taken = next((one for one in (gravity, flight.gravity) if one is not None), GRAVITY)
+    assumed = flight.gravity is None and taken == GRAVITY
     made: list[str] = []
     q = attitude_of(flight)
     out = with_euler(flight)
@@ -83,14 +86,14 @@ def derive(flight: Flight, *, gravity: float = GRAVITY) -> Flight:
         position = flight.array(POSITION)
         velocity = by_segment(flight, position, lambda part: differentiate(part, rate=rate))
         acceleration = by_segment(flight, position, lambda part: differentiate(part, rate=rate, order=2))
-        force = to_body(q, acceleration - np.array([0.0, 0.0, gravity]))
+        force = to_body(q, acceleration - np.array([0.0, 0.0, taken]))
         derived.update(zip(VELOCITY, to_body(q, velocity).T, strict=True))
         derived.update(zip(("ax", "ay", "az"), force.T, strict=True))
     for name, values in derived.items():
         if name not in flight:
             out = out.with_channel(name, values, like=like)
             made.append(name)
-    return out.done("derive", gravity=gravity, derived=made, points=_POINTS, degree=_DEGREE)
+    return out.done("derive", gravity=taken, assumed=assumed, derived=made, points=_POINTS, degree=_DEGREE)
 
 
 def _padded(quaternion: Array, rate: float) -> Array:

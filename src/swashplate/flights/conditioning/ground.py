@@ -153,7 +153,7 @@ def flying_interval(flight: Flight, *, rule: GroundRule | None = None) -> Flying
     force = seen.array(("ax", "ay", "az"))
     speed = np.linalg.norm(seen.array(("u", "v", "w")), axis=1)
     tilt = np.arccos(np.clip(np.cos(seen.values("phi")) * np.cos(seen.values("theta")), -1.0, 1.0))
-    acceleration = np.abs(np.linalg.norm(force, axis=1) - GRAVITY)
+    acceleration = np.abs(np.linalg.norm(force, axis=1) - (seen.gravity or GRAVITY))
     first, last = 0, time.size - 1
     reasons: list[str] = []
 

@@ -24,6 +24,7 @@ from swashplate.flights.conditioning.regression import regress
 from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION, RATES, channel
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 _FORCES = ("ax", "ay", "az")
@@ -53,7 +54,7 @@ class SensorErrorEstimate:
 
 
 @dataclass(frozen=True)
-class Reconstruction:
+class Reconstruction(Shown):
     """What flight-path reconstruction found.
 
     Attributes:
@@ -196,16 +197,17 @@ def rate_errors(
 
 
 def acceleration_errors(
-    flight: Flight, *, window: float = 5.0, gravity: float = GRAVITY
+    flight: Flight, *, window: float = 5.0, gravity: float | None = None
 ) -> tuple[dict[str, SensorErrorEstimate], dict[str, SensorErrorEstimate]]:
     """Biases [m/s^2] and scale factors of measured specific force ax ay az against position and attitude.
 
     Args:
         flight: one uniform stream with measured specific force at the tracked point, position and attitude.
         window: length [s] over which forces are integrated twice with free initial position and velocity.
-        gravity: [m/s^2].
+        gravity: [m/s^2]; the flight's own where None, and standard gravity where that is not known.
     """
     rate = uniform_rate(flight)
+    taken = next((one for one in (gravity, flight.gravity) if one is not None), GRAVITY)
     pieces = []
     for part in _windows(flight, window):
         matrix = rotation(attitude_of(part)).as_matrix()
@@ -213,7 +215,7 @@ def acceleration_errors(
         time = part.time(POSITION[0]) - part.start
         integrals = _integral(_integral(twice, rate), rate)
         fall = np.zeros((time.size, 3))
-        fall[:, 2] = 0.5 * gravity * time**2
+        fall[:, 2] = 0.5 * taken * time**2
         initial = np.concatenate(
             [np.broadcast_to(np.eye(3), (time.size, 3, 3)), time[:, None, None] * np.eye(3)], axis=-1
         )

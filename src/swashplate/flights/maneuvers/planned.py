@@ -12,11 +12,12 @@ from swashplate.flights.csv_export import as_csv
 from swashplate.flights.maneuvers.ardupilot_chirp import AXES, MIXER, Chirp
 from swashplate.flights.maneuvers.maneuver_design import ExpectedResponse, RuleCheck, checks, sampled
 from swashplate.flights.maneuvers.series import FADE, Maneuver, parse
+from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
 
 @dataclass(frozen=True, repr=False)
-class PlannedManeuver:
+class PlannedManeuver(Shown):
     """An excitation to fly.
 
     Attributes:

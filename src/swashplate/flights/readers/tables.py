@@ -112,10 +112,19 @@ class NumberRows(Sequence[list[str]]):
     def _cells(self, line: str) -> list[str]:
         return [cell.strip() for cell in line.split(self.mark)]
 
+    def texts(self, index: int) -> list[str]:
+        """One column as it stands in the file; nothing to the right of it is split."""
+        return [line.split(self.mark, index + 1)[index].strip() for line in self.lines]
+
 
 def _bare_numbers(text: str) -> bool:
     """Whether a text has no character that is not a number's, a separator or a line end, and is not empty."""
     return bool(text) and text.isascii() and not text.encode().translate(None, _OF_NUMBERS)
+
+
+def texts(rows: Sequence[Sequence[str]], index: int) -> list[str]:
+    """One column's cells as text, of rows that all have it."""
+    return rows.texts(index) if isinstance(rows, NumberRows) else [row[index] for row in rows]
 
 
 def first_shorter(rows: Sequence[Sequence[str]], width: int) -> int | None:

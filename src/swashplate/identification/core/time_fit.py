@@ -54,6 +54,10 @@ class RecordLikelihood(Likelihood, Protocol):
         """Of the output errors, or of the innovations (n_outputs, n_outputs)."""
         ...
 
+    def sized(self, row: Array) -> Array:
+        """A scaled row with what the errors' covariance alone tells."""
+        ...
+
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
         """Per record whitened errors (n, outputs) and sensitivities (p, n, outputs); and all other information."""
         ...
@@ -120,7 +124,7 @@ def solve(
     white, sensitivities, rest = likelihood.whitened(optimum.row)
     corrected = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
     units = np.outer(row.scale, row.scale)
-    named = dict(zip(row.names, map(float, _numbers(row, optimum.row)), strict=True))
+    named = dict(zip(row.names, map(float, _numbers(row, likelihood.sized(optimum.row))), strict=True))
     return Solved(named, likelihood, optimum, plain * units, corrected * units, row, optimum.row)
 
 

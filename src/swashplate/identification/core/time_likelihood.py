@@ -24,7 +24,7 @@ _EXACT = 1e-6
 _GUST = 0.3
 """First guess: share of a state's size by which its rate is disturbed."""
 
-_SPREAD = 2.0
+SPREAD = 2.0
 """Of the prior on the logarithm of a gust's intensity: a factor of seven either way."""
 
 
@@ -44,7 +44,7 @@ def gain_entries(states: Sequence[str], size: Mapping[str, float], spread: Mappi
 def gust_entries(states: Sequence[str], size: Mapping[str, float]) -> list[Entry]:
     """What a Kalman gain is made of beside the sensors' noise: white noise on every state's rate, its logarithm."""
     first = {f"gust {s}": float(np.log(_GUST * size[s])) for s in states}
-    return [Entry(name, "noise", log, 1.0, mean=log, sigma=_SPREAD, logarithmic=True) for name, log in first.items()]
+    return [Entry(name, "noise", log, 1.0, mean=log, sigma=SPREAD, logarithmic=True) for name, log in first.items()]
 
 
 class TimeErrors(ABC):
@@ -146,6 +146,10 @@ class TimeErrors(ABC):
             information[np.ix_(places, places)] += white @ white.T
             every.append(errors)
         return self._cost(np.concatenate(every)), gradient, information
+
+    def sized(self, row: Array) -> Array:
+        """A scaled row with what the errors' covariance alone tells: here nothing."""
+        return row
 
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
     def _by_record(self, every: Array) -> list[Array]:

@@ -32,6 +32,15 @@ class ReadNumber:
         return f"{self.value:.4g}" + (f" +- {self.sigma:.2g}" if np.isfinite(self.sigma) else "")
 
 
+def delay_words(seconds: float, sigma: float = float("nan"), *, digits: int = 3) -> str:
+    """A delay in milliseconds, or in seconds from one on, with its standard deviation where that is known [s]."""
+    if not np.isfinite(seconds):
+        return "none" if np.isnan(seconds) else "any amount"
+    scale, unit = (1.0, "s") if abs(seconds) >= 1.0 else (1e3, "ms")
+    around = f" +- {scale * sigma:.2g}" if np.isfinite(sigma) else ""
+    return f"{scale * seconds:.{digits}g}{around} {unit}"
+
+
 @dataclass(frozen=True)
 class Handling:
     """Bandwidth and phase delay of an attitude response.
@@ -72,9 +81,9 @@ class ResponseMargins:
     delay_margin: ReadNumber
 
     def delay_in_words(self) -> str:
-        """In milliseconds, or that the loop is unstable as it is."""
+        """With its unit, or that the loop is unstable as it is."""
         r = self.delay_margin
-        return "0, it is unstable" if r.value == 0.0 else repr(ReadNumber(1e3 * r.value, 1e3 * r.sigma))
+        return "0, it is unstable" if r.value == 0.0 else delay_words(r.value, r.sigma, digits=4)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Line:
         if isinstance(r, ResponseMargins):
             head += f"crossover {r.crossover!r} rad/s, phase margin {r.phase_margin!r} deg, "
             head += f"gain margin {r.gain_margin!r} dB at {r.omega_180!r} rad/s, "
-            return head + f"delay margin [ms] {r.delay_in_words()}"
+            return head + f"delay margin {r.delay_in_words()}"
         if r is None:
             return head + self.problem
         return head + f"bandwidth {r.bandwidth!r} rad/s, phase delay {r.phase_delay_line!r} s"

@@ -16,13 +16,14 @@ from scipy.stats import f as fisher
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.shown import Shown
 
 ENTER, LEAVE = 0.999, 0.99
 """Confidence of the partial F test for a regressor to come in, and below which it goes again."""
 
 
 @dataclass(frozen=True)
-class EquationError:
+class EquationError(Shown):
     """One equation's coefficients.
 
     Attributes:

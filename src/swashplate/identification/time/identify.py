@@ -25,6 +25,7 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.identification.time import feedback, nelder_mead
 from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
+from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind
@@ -36,6 +37,9 @@ from swashplate.simulation.record import monitored
 
 ITERATIONS = 60
 """At most, where nothing is said."""
+
+_FOLLOWING = 0.2
+"""A gain in log-likelihood that is too small to go on for, where an iteration takes ten seconds."""
 
 FlightLikelihood = PredictionError | OutputError
 LikelihoodOf = Callable[[Parameterization, Sequence[Record], Question], FlightLikelihood]
@@ -91,7 +95,7 @@ def identify_flight(
     likelihood = likelihood_of(table, pieces, question)
     where = ", ".join(piece.name for piece in pieces)
     likelihood.refresh(likelihood.row.starts())
-    accuracy.refuse_unseen(likelihood.row, likelihood.scores(likelihood.row.starts())[2], where=where)
+    accuracy.refuse_unseen(likelihood.row, _quick(likelihood).scores(likelihood.row.starts())[2], where=where)
     most = ITERATIONS if question.iterations is None else question.iterations
     optimum = search(likelihood, most, question.progress)
     found, row = _found(table, likelihood, optimum, horizon, most, question.progress)
@@ -178,7 +182,7 @@ class FlightEstimator:
 
 
 def _prediction_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> PredictionError:
-    return PredictionError(table, pieces, noise=in_wind(pieces) if question.wind else None)
+    return FollowingError(table, pieces, noise=in_wind(pieces)) if question.wind else PredictionError(table, pieces)
 
 
 def _output_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> OutputError:
@@ -186,8 +190,24 @@ def _output_error(table: Parameterization, pieces: Sequence[Record], question: Q
     return OutputError(table, pieces)
 
 
+def _quick(likelihood: FlightLikelihood) -> FlightLikelihood:
+    """What a search may begin with: the same row with less work."""
+    return likelihood.constant if isinstance(likelihood, PredictionError) else likelihood
+
+
 def _scoring(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
-    return minimise_over_valleys(likelihood, iterations=iterations, progress=progress)
+    first = minimise_over_valleys(_quick(likelihood), iterations=iterations, progress=progress)
+    if _quick(likelihood) is likelihood:
+        return first
+    done = len(first.history) - 1
+    last = minimise(
+        likelihood, start=first.row, iterations=iterations, tolerance=_FOLLOWING, progress=_after(done, progress)
+    )
+    return replace(last, history=(*first.history, *last.history[1:]))
+
+
+def _after(done: int, progress: Progress | None) -> Progress | None:
+    return progress and (lambda iteration, cost: progress(done + iteration, cost))
 
 
 def _scoring_together(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:

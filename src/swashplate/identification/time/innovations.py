@@ -85,8 +85,8 @@ class RecordRun:
     voltage: Array
     seen: FirstMotion
 
-    def filtered(self, card: Array, noise: Array, numbers: Array) -> Filtered:
-        """The run at a row of numbers in their units.
+    def placed(self, card: Array, noise: Array, numbers: Array) -> tuple[Array, FilterNumbers]:
+        """Commands as they arrive, and what the filter depends on, at a row of numbers in their units.
 
         Args:
             card: parameters of the card. noise: numbers of `Noise` where they are not estimated.
@@ -100,9 +100,14 @@ class RecordRun:
         reaching, _ = commands_moved(model.vehicle, model.dt, self.inputs, Nuisance(*nuisance), np)
         parameters = np.array(self.plan.layout.values(card, numbers[:k]))
         starting = reaching[: starting_samples(model.dt)].mean(axis=0)
-        at = FilterNumbers(parameters, noise, nuisance, starting)
-        begin = begun(model, at, self.seen)
-        return Filtered(reaching, at, begin, *along(model, begin, at, self.readings, reaching, self.voltage))
+        return reaching, FilterNumbers(parameters, noise, nuisance, starting)
+
+    def filtered(self, card: Array, noise: Array, numbers: Array) -> Filtered:
+        """The run at a row, of arguments as `placed` has them."""
+        reaching, at = self.placed(card, noise, numbers)
+        begin = begun(self.plan.model, at, self.seen)
+        ran = along(self.plan.model, begin, at, self.readings, reaching, self.voltage)
+        return Filtered(reaching, at, begin, *ran)
 
     def moved(self, run: Filtered, card: Array, numbers: Array) -> tuple[Array, Array]:
         """Slopes by every entry of the row: innovations (p, n, n_outputs), covariance (p, n_outputs, n_outputs)."""

@@ -1,9 +1,12 @@
-"""Innovations of a linear model in gusts: the filter error method, its gain from noise of known origin.
+"""Innovations of a linear model in gusts: filter error methods, their gain from noise of known origin.
 
-White noise of unknown intensity disturbs every state's rate; the sensors' noise is taken for what the innovations have,
-and the steady Kalman filter of both gives the gain (Maine and Iliff 1981; Jategaonkar 2015, ch. 5). That is n unknowns
-where a free gain has n m. As in Jategaonkar's program the innovations count by their variances, without
-cross-correlations: on his HFB-320 the covariance that the filter predicts gives a pitch damping 30 % lower.
+`FilterErrors`: white noise of unknown intensity disturbs every state's rate; the sensors' noise is taken for what the
+innovations have, and the steady Kalman filter of both gives the gain (Maine and Iliff 1981; Jategaonkar 2015, ch. 5).
+That is n unknowns where a free gain has n m. As in Jategaonkar's program the innovations count by their variances,
+without cross-correlations: on his HFB-320 the covariance that the filter predicts gives a pitch damping 30 % lower.
+
+`GustErrors`: the air itself moves, for some seconds at a time, and acts wherever the body's velocity does. Gusts that
+last, taken for white, bias the parameters by many times their bounds.
 """
 
 from __future__ import annotations
@@ -17,10 +20,18 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.riccati import kalman_gain
 from swashplate.identification.core.parameter_row import Entry
-from swashplate.identification.core.time_likelihood import gust_entries
+from swashplate.identification.core.time_likelihood import SPREAD, gust_entries
 from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.gathered_noise import gathered_noise
+
+VELOCITIES = ("u", "v", "w")
+"""States that are velocities through the air."""
+
+_LASTS, _MOVES, _SHAKES, _READS = 1.0, 0.3, 0.003, 0.03
+"""First guesses: seconds that a gust lasts; of the air, of other white noise and of the sensors' noise, as shares of a
+state's or an output's size."""
 
 
 class FilterErrors(OutputErrors):
@@ -33,14 +44,86 @@ class FilterErrors(OutputErrors):
         return np.diag(np.diag(super()._covariance(errors)))
 
     def _gain(self, batch: Any, a: Any, c: Any, phi: Any, dt: float) -> Any:
-        intensity = np.exp(2.0 * batch[:, [self._place[f"gust {s}"] for s in self.model.states]])
-        gain = _gains()(a, intensity, c, self.covariance.astype(np.complex128), dt)
-        return np.einsum("pij,pjk->pik", phi, np.asarray(gain))
+        sensors = np.broadcast_to(np.diag(self.covariance), (len(batch), len(self.outputs)))
+        return np.einsum("pij,pjk->pik", phi, _filter(a, self._white(batch), c, sensors.astype(np.complex128), dt)[0])
+
+    def _white(self, batch: Any) -> Any:
+        """Intensity of the white noise on every state's rate."""
+        return np.exp(2.0 * batch[:, [self._place[f"gust {s}"] for s in self.model.states]])
+
+
+class GustErrors(FilterErrors):
+    """The likelihood of innovations where the air's velocity is a state too (arguments: `OutputErrors`).
+
+    Each velocity of the air fades as gusts do, g' = -g / tau + noise, and acts as the body's: x' = A (x - g) + B u.
+    Its deviation "air u" and time "fading u" are unknown, so is white noise on every rate and on every output. The gain
+    tells their ratios; their common size is that of the innovations.
+    """
+
+    @staticmethod
+    def suits(model: StateSpaceModel) -> bool:
+        """Whether the model has a velocity through the air."""
+        return not set(VELOCITIES).isdisjoint(model.states)
+
+    def _air(self) -> tuple[str, ...]:
+        return tuple(f"air {s}" for s in self.model.states if s in VELOCITIES)
+
+    def _noise_entries(self, size: Mapping[str, float], spread: Mapping[str, float]) -> list[Entry]:
+        moving = [name.split()[1] for name in self._air()]
+        lasting = [(f"fading {s}", _LASTS, "nuisance", 1.0) for s in moving]
+        shaking = [(f"air {s}", _MOVES * size[s], "noise", SPREAD) for s in moving]
+        shaking += [(f"gust {s}", _SHAKES * size[s], "noise", SPREAD) for s in self.model.states]
+        shaking += [(f"noise {o}", _READS * around, "noise", SPREAD) for o, around in spread.items()]
+        return [
+            Entry(name, group, float(np.log(first)), 1.0, mean=float(np.log(first)), sigma=sigma, logarithmic=True)
+            for name, first, group, sigma in lasting + shaking
+        ]
+
+    def _covariance(self, errors: Array) -> Array:
+        return OutputErrors._covariance(self, errors)
+
+    def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
+        a, b, c, d, h1 = super()._matrices(numbers)
+        air = self._air()
+        felt = -a[:, [self.model.states.index(name.split()[1]) for name in air]]
+        fading = np.diag([-np.exp(-numbers[self._place[f"fading {name.split()[1]}"]]) for name in air])
+        return (
+            np.block([[a, felt], [np.zeros((len(air), len(a))), fading]]),
+            np.vstack([b, np.zeros((len(air), b.shape[1]))]),
+            np.hstack([c, h1 @ felt]),
+            d,
+            np.hstack([h1, np.zeros((len(h1), len(air)))]),
+        )
+
+    def _kalman(self, batch: Any, a: Any, c: Any, dt: float) -> tuple[Any, Any]:
+        moving = [name.split()[1] for name in self._air()]
+        size, last = (batch[:, [self._place[f"{what} {s}"] for s in moving]] for what in ("air", "fading"))
+        intensity = np.concatenate([self._white(batch), 2.0 * np.exp(2.0 * size - last)], axis=1)
+        sensors = np.exp(2.0 * batch[:, [self._place[f"noise {o}"] for o in self.outputs]])
+        return _filter(a, intensity, c, sensors, dt)
+
+    def _gain(self, batch: Any, a: Any, c: Any, phi: Any, dt: float) -> Any:
+        return np.einsum("pij,pjk->pik", phi, self._kalman(batch, a, c, dt)[0])
+
+    def sized(self, row: Array) -> Array:
+        numbers = np.asarray(row * self.row.scale)
+        a, _, c, _, _ = self._systems(self._stepped(row, np.array([], dtype=np.intp)))
+        told = np.real(self._kalman(numbers[None] + 0j, a, c, self.records[0].dt)[1][0])
+        errors = np.linalg.solve(told, self.covariance)
+        larger = 0.5 * np.log(np.trace(errors) / len(told))
+        noises = [i for i, entry in enumerate(self.row.entries) if entry.group == "noise"]
+        return np.asarray(row + larger * np.isin(np.arange(row.size), noises))
+
+
+def _filter(a: Any, intensity: Any, c: Any, sensors: Any, dt: float) -> tuple[Any, Any]:
+    """Kalman gains (n_batch, n, m) and innovations' covariances of a batch of models, both noises' diagonals."""
+    gain, covariance = _filters()(a, intensity, c, sensors, dt)
+    return np.asarray(gain), np.asarray(covariance)
 
 
 @cache
-def _gains() -> Any:
-    """Kalman gains of a batch, compiled for its shapes."""
+def _filters() -> Any:
+    """`_filter`, compiled for its shapes."""
     import jax
     import jax.numpy as jnp
 
@@ -48,6 +131,6 @@ def _gains() -> Any:
 
     def gain(a: Any, intensity: Any, c: Any, sensors: Any, dt: Any) -> Any:
         phi, gathered = gathered_noise(a, jnp.diag(intensity), dt)
-        return kalman_gain(phi, c, gathered, sensors)[0]
+        return kalman_gain(phi, c, gathered, jnp.diag(sensors))
 
-    return jax.jit(jax.vmap(gain, in_axes=(0, 0, 0, None, None)))
+    return jax.jit(jax.vmap(gain, in_axes=(0, 0, 0, 0, None)))

@@ -59,6 +59,7 @@ class OutputErrors(TimeErrors):
     ) -> None:
         self.delays = delays
         self.model, self._gained = model, gain
+        self._states = (*model.states, *self._air())
         self.rows_of = [model.outputs.index(o) for o in outputs]
         entries = [
             Entry(n, "parameter", p.value, _size(p), p.lower, p.upper)
@@ -68,6 +69,10 @@ class OutputErrors(TimeErrors):
         super().__init__(
             entries, states=model.states, outputs=outputs, records=records, rest={}, shifts=shifts, biases=biases
         )
+
+    def _air(self) -> tuple[str, ...]:
+        """States of the air that stand behind those of the model."""
+        return ()
 
     def begun(self) -> Array:
         """A scaled row to begin with: the starts, with a free gain made better while all else is held."""
@@ -214,14 +219,14 @@ class OutputErrors(TimeErrors):
 
     def _coefficients(self, number: int, batch: Batch, systems: tuple[Any, ...]) -> Coefficients:
         """What makes one record's errors, for a batch of rows."""
-        n, m = len(self.model.states), len(self.model.inputs)
+        n, m = len(self._states), len(self.model.inputs)
         a, b, c, d, h1 = systems
         dt = self.records[number].dt
-        shift = self._column(batch, f"shift {{}}[{number}]", self.model.states)
+        shift = self._column(batch, f"shift {{}}[{number}]", self._states)
         held = np.concatenate([b, np.broadcast_to(np.eye(n), (len(batch), n, n))], axis=2)
         phi, g0, g1 = first_order_hold(a, held, dt)
         return Coefficients(
-            x=self._column(batch, f"start {{}}[{number}]", self.model.states),
+            x=self._column(batch, f"start {{}}[{number}]", self._states),
             phi=phi,
             c=c,
             gain=self._gain(batch, a, c, phi, dt),

@@ -27,7 +27,7 @@ from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.core.time_fit import Solved, TimeDetails, ahead_of, check_method, result_of, solve
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
-from swashplate.identification.time.linear_filter import FilterErrors
+from swashplate.identification.time.linear_filter import FilterErrors, GustErrors
 from swashplate.identification.time.linear_likelihood import OutputErrors
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.linear_vehicle import structure_of
@@ -59,7 +59,8 @@ def fit_in_time(
         shifts: constants in the states' rates, per record.
         biases: outputs with a constant of their own, per record.
         method: "output-error"; for records with gusts or an unstable aircraft "filter-error" (the gain by the gusts'
-            intensities) or "prediction-error" (any gain).
+            intensities) or "prediction-error" (gusts that last; any
+            gain where no state is a velocity through the air).
         iterations: at most this many.
         horizon: (FIRST, LAST) seconds ahead of errors to make small after maximum likelihood, see `identify`.
         progress: called with the iteration and the cost.
@@ -76,7 +77,9 @@ def fit_in_time(
     ahead = ahead_of(horizon, method)
     refuse_lowpassed(flights)
     pieces, delays = linear_records(model, flights, names, biases=biases)
-    kind = FilterErrors if method == "filter-error" else OutputErrors
+    kind: type[OutputErrors] = {"filter-error": FilterErrors}.get(method, OutputErrors)
+    if method == "prediction-error" and GustErrors.suits(model):
+        kind = GustErrors
     likelihood = kind(model, names, pieces, shifts, tuple(biases), delays=delays, gain=method != "output-error")
     # Of a model that no fit has brought near, the errors would be taken for gusts and the gain led astray.
     near = method == "prediction-error" and all(np.isfinite(model.parameters[n].cramer_rao) for n in model.free)

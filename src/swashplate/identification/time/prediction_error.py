@@ -171,6 +171,11 @@ class PredictionError:
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
 
+    @property
+    def constant(self) -> PredictionError:
+        """The likelihood of the same row with a constant gain."""
+        return self
+
     def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
         """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
         return unpack(self._plan, self._data, jnp.asarray(row))

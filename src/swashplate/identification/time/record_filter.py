@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
@@ -110,7 +111,7 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
     """Slopes of `begun` along directions, which come first."""
     blocks = [_begun(model, numbers, seen, block)[1] for block in _blocks(directions)]
-    return _whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
+    return whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
@@ -160,10 +161,10 @@ def along(
         readings, commands, voltage: by sample.
     """
     state, n, parts = first_state(model, begin.x), len(readings), []
-    for rows in _stretches(readings, commands, voltage):
+    for rows in stretches(readings, commands, voltage):
         state, found = _along(model, state, begin.gain, numbers, *rows)
         parts.append(found)
-    innovations, states = _whole(parts, n)
+    innovations, states = whole(parts, n)
     return innovations, states
 
 
@@ -173,9 +174,9 @@ def _along(
     state: FilterState,
     gain: FilterGain,
     numbers: FilterNumbers,
-    readings: Any,
-    commands: Any,
-    voltage: Any,
+    readings: Float[jax.Array, "samples outputs"],
+    commands: Float[jax.Array, "samples inputs"],
+    voltage: Float[jax.Array, " samples"],
 ) -> tuple[FilterState, tuple[Any, FilterState]]:
     parameters = model.vehicle.parameters(*numbers.parameters)
 
@@ -210,11 +211,17 @@ def ahead_of(
         rows = here[:, None] + np.arange(ahead)
         begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], states)
         parts.append(_ahead_of(model, begin, numbers, commands[rows], voltage[rows]))
-    return _whole(parts, len(starts))  # type: ignore[no-any-return]
+    return whole(parts, len(starts))  # type: ignore[no-any-return]
 
 
 @partial(jax.jit, static_argnums=0)
-def _ahead_of(model: StochasticModel, begin: FilterState, numbers: FilterNumbers, commands: Any, voltage: Any) -> Any:
+def _ahead_of(
+    model: StochasticModel,
+    begin: FilterState,
+    numbers: FilterNumbers,
+    commands: Float[jax.Array, "runs samples inputs"],
+    voltage: Float[jax.Array, "runs samples"],
+) -> Any:
     parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
 
     def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
@@ -245,7 +252,7 @@ def planes(
     moves[:first, :first] = np.eye(first)
     moves[first:, first:] = directions
     moves = _filled(moves)
-    return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in _stretches(place, commands, voltage)]
+    return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in stretches(place, commands, voltage)]
 
 
 def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -262,7 +269,12 @@ def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @_chosen
 def _planes(
-    model: StochasticModel, place: Any, commands: Any, voltage: Any, parameters: Any, moves: Any
+    model: StochasticModel,
+    place: Float[jax.Array, "samples place"],
+    commands: Float[jax.Array, "samples inputs"],
+    voltage: Float[jax.Array, " samples"],
+    parameters: Float[jax.Array, " parameters"],
+    moves: Float[jax.Array, "moves directions"],
 ) -> tuple[Any, Any]:
     """Where each step leads (n, states), and its slopes along the moves (n, states, moves)."""
     n = len(model.vehicle.state_names)
@@ -306,7 +318,7 @@ def along_moved(
     room = steps[0].slopes.shape[-1] - steps[0].place.shape[-1] - commands.shape[-1] - further.shape[-1]
     further = _filled(np.pad(further, ((0, 0), (0, room))))
     parts = []
-    for step, (read,), pushed in zip(steps, _stretches(readings), _stretches_of(_filled(commands)), strict=True):
+    for step, (read,), pushed in zip(steps, stretches(readings), _stretches_of(_filled(commands)), strict=True):
         pushing = (pushed, further)
         state, moving, found = _along_moved(
             model, (state, begin.gain), (moving, moved.gain), numbers, to, read, step, pushing
@@ -322,7 +334,7 @@ def _along_moved(
     moved: tuple[FilterState, FilterGain],
     numbers: FilterNumbers,
     directions: FilterNumbers,
-    readings: Any,
+    readings: Float[jax.Array, "samples outputs"],
     step: Planes,
     pushes: tuple[Any, Any],
 ) -> tuple[FilterState, FilterState, Any]:
@@ -364,7 +376,7 @@ def _blocks(directions: Any) -> Iterator[Any]:
         yield jax.tree.map(lambda rows, at=first: rows[at : at + _DIRECTIONS], whole)
 
 
-def _stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
+def stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
     """Series cut into stretches of `STRETCH` samples, the last one lengthened by its last sample."""
     n = len(rows[0])
     for first in range(0, n, STRETCH):
@@ -379,7 +391,7 @@ def _stretches_of(moved: Array) -> Iterator[Array]:
         yield moved[:, first : first + STRETCH]
 
 
-def _whole(parts: Any, n: int) -> Any:
+def whole(parts: Any, n: int) -> Any:
     """Stretches or blocks one after the other, the first n of their rows."""
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
 

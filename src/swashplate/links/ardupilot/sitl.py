@@ -36,7 +36,7 @@ class Sitl:
     Args:
         binary: of ArduCopter for SITL.
         folder: where it runs: its output, parameters and logs; made where it is missing.
-        defaults: parameter files in that folder, the last one counts.
+        defaults: parameter files in that folder, the last one counts; none are a firmware's own.
         instance: which of several on this machine.
         speedup: most simulated seconds a second.
         altitude: of the ground above the sea [m].
@@ -60,8 +60,8 @@ class Sitl:
         self.mavlink_port, self.rc_port = MAVLINK_PORT + shift, RC_PORT + shift
         self.physics_port = PHYSICS_PORT + shift
         self.command = [
-            str(self.binary), "--model", "JSON:127.0.0.1", "--defaults", ",".join(defaults), "-I", str(instance),
-            "--home", f"{_HOME},{altitude:.0f},0", "--speedup", f"{speedup:g}",
+            str(self.binary), "--model", "JSON:127.0.0.1", *(("--defaults", ",".join(defaults)) if defaults else ()),
+            "-I", str(instance), "--home", f"{_HOME},{altitude:.0f},0", "--speedup", f"{speedup:g}",
         ]  # fmt: skip
         for port in (self.mavlink_port, *(self.mavlink_port + k for k in _OTHERS)):
             _check_free(socket.SOCK_STREAM, port)
@@ -117,7 +117,8 @@ class Sitl:
             return ""
         how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         words = self.last_words()
-        return f"the binary ended {how}{f'; its last words: {words}' if words else '; it said nothing'}."
+        told = f"; its last words: {words.rstrip('.')}" if words else "; it said nothing"
+        return f"the binary ended {how}{told}."
 
     def last_words(self, lines: int = 4) -> str:
         """The end of what it printed, in one line."""

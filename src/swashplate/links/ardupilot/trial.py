@@ -272,7 +272,12 @@ class Trial:
             self._tell(f"sweep of {axis}", bad()[0], "flown to its end", False)
         else:
             self.flown.append(axis)
-            self._tell(f"sweep of {axis}", f"flown, {chirp.record:g} s", "flown to its end", True)
+            self._tell(
+                f"sweep of {axis}",
+                f"{chirp.record:g} s, {chirp.start_hz:g} to {chirp.stop_hz:g} Hz",
+                "flown to its end",
+                True,
+            )
         self.set_mode("STABILIZE", STABILIZE)
         self.pause(2.0)
 

@@ -200,7 +200,7 @@ class TransferFunction:
         k = self.form.integrators
         below = " ".join(part for part in (("s " * k).strip(), side(self.form.pole_names)) if part)
         above = " ".join(part for part in (("s " * -k).strip(), side(self.form.zero_names)) if part)
-        delay = f" e^(-{self.values['tau']:.4g} s)" if self.form.delay else ""
+        delay = f" e^(-{self.values['tau']:.4g} s)" if self.form.delay and self.values["tau"] else ""
         return f"{self.output}/{self.input} = {self.values['K']:.4g} {above}{delay}" + (f" / {below}" if below else "")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -176,39 +176,39 @@ def spectrum(flights: Sequence[Flight], *, channels: Sequence[str] | None = None
     Raises:
         FlightError: a channel that no flight has, or one with too few samples.
     """
-    panels = [(name,) for names in _panels(flights, channels) for name in names][:_MOST_PANELS]
-    titles = []
-    for (name,) in panels:
-        unit = unit_words(next(unit_of(flight, name) for flight in flights if name in flight)) or "1"
-        titles.append(f"{name} [({unit})²/Hz]")
+    panels = [name for names in _panels(flights, channels) for name in names][:_MOST_PANELS]
+    return of_spectra(
+        [{label(f, k): spectra.spectrum(f, name) for k, f in enumerate(flights) if name in f} for name in panels],
+        [label(f, k) for k, f in enumerate(flights)],
+    )
+
+
+def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence[str]) -> Figure:
+    """Densities over frequency, a panel a channel.
+
+    Args:
+        panels: spectra of one channel, by the name of their flight.
+        names: of all flights, in the order of their colours.
+    """
+    drawn = [next(iter(panel.values())) for panel in panels]
+    told = [f"{name}: {found}" if len(names) > 1 else str(found) for panel in panels for name, found in panel.items()]
+    titles = [f"{one.channel} [({unit_words(one.unit) or '1'})²/Hz]" for one in drawn]
     layout = over_frequency(titles, height=_PANEL + 20, unit="Hz")
-    traces, keys = [], {}
-    for i, (name,) in enumerate(panels):
+    colors = {name: _COLORS[k % len(_COLORS)] for k, name in enumerate(names)}
+    traces = []
+    for i, panel in enumerate(panels):
         layout[f"yaxis{_number(i)}"] |= {"type": "log", "exponentformat": "power"}
-        for k, flight in enumerate(flights):
-            if name not in flight:
-                continue
-            found = spectra.spectrum(flight, name)
-            key = Key(label(flight, k), _COLORS[k % len(_COLORS)])
-            keys[key.words] = key
-            hover = f"{name}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
-            traces.append(
-                line(
-                    found.frequency[1:],
-                    found.density[1:],
-                    name=key.words,
-                    color=key.color,
-                    axis=_number(i),
-                    hover=hover,
-                )
-            )
+        for name, found in panel.items():
+            hover = f"{found.channel}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
+            over, density = found.frequency[1:], found.density[1:]
+            traces.append(line(over, density, name=name, color=colors[name], axis=_number(i), hover=hover))
     return Figure(
         "spectrum",
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Power spectral density, one-sided, after Welch; of a log with gaps its longest unbroken piece.",
-        f"Power spectra of {', '.join(name for (name,) in panels)}.",
-        keys=tuple(keys.values()) if len(flights) > 1 else (),
+        f"Power spectra of {', '.join(one.channel for one in drawn)}. {'; '.join(told)}.",
+        keys=tuple(Key(name, color) for name, color in colors.items()) if len(names) > 1 else (),
     )
 
 
@@ -219,11 +219,16 @@ def spectrogram(flight: Flight, *, channels: Sequence[str] | None = None) -> Fig
         FlightError: a channel that the flight has not, or one with too few samples.
     """
     names = [name for group in _panels([flight], channels) for name in group][:_MOST_PANELS]
+    return of_spectrograms([spectra.spectrogram(flight, name, frames=_COLUMNS) for name in names])
+
+
+def of_spectrograms(panels: Sequence[spectra.Spectrogram]) -> Figure:
+    """Power over time and frequency, one panel each; dB below the strongest line."""
+    names = [found.channel for found in panels]
     layout = stacked([f"{name}: frequency [Hz]" for name in names], height=_PANEL + 60)
     layout["margin"] = {**layout["margin"], "r": 70}
     traces: list[dict[str, Any]] = []
-    for i, name in enumerate(names):
-        found = spectra.spectrogram(flight, name, frames=_COLUMNS)
+    for i, (name, found) in enumerate(zip(names, panels, strict=True)):
         thin = max(1, -(-found.frequency.size // _ROWS))
         rows = [found.density[k : k + thin].max(axis=0) for k in range(0, found.frequency.size, thin)]
         level = 10.0 * np.log10(np.maximum(np.array(rows), 1e-30))

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from swashplate.simulation.derivatives_over_speed import Derivatives
 
 
-_HERE, _MODELS = "swashplate.reporting.figures", "swashplate.reporting.figures.of_models"
+_HERE = "swashplate.reporting.figures"
+_MODELS, _RESULTS = f"{_HERE}.of_models", f"{_HERE}.of_results"
 SECTIONS: Registry[Callable[[Any], Section]] = Registry(
     "sections",
     what="an object that shows itself",
@@ -45,6 +46,13 @@ SECTIONS: Registry[Callable[[Any], Section]] = Registry(
         "TrimCurve": f"{_MODELS}:section_of_trims",
         "Derivatives": f"{_MODELS}:section_of_derivatives",
         "LinearModel": f"{_MODELS}:section_of_linear_model",
+        "EquationError": f"{_RESULTS}:section_of_equation",
+        "Harmonics": f"{_RESULTS}:section_of_harmonics",
+        "PlannedManeuver": f"{_RESULTS}:section_of_planned",
+        "RateSteps": f"{_RESULTS}:section_of_steps",
+        "Reconstruction": f"{_RESULTS}:section_of_reconstruction",
+        "Spectrogram": f"{_RESULTS}:section_of_spectrogram",
+        "Spectrum": f"{_RESULTS}:section_of_spectrum",
     },
 )
 """What shows an object, by the name of its class; loaded when it is asked for, for those of models need JAX."""

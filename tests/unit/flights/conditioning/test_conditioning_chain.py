@@ -12,6 +12,7 @@ from swashplate.flights.conditioning.condition import condition, replay
 from swashplate.flights.conditioning.ground import GroundRule, flying_interval
 from swashplate.flights.flight import Flight, stream
 from swashplate.flights.provenance import ProcessingStep
+from swashplate.reporting.words import step_words
 
 
 def test_the_history_is_enough_to_do_it_again() -> None:
@@ -159,3 +160,19 @@ def test_a_hand_that_holds_it_is_seen() -> None:
     found = flying_interval(tracked(Motion(motion.time, euler, position), 8))
     assert 20.5 < found.stop < 22.5
     assert "held" in found.reasons[-1]
+
+
+def test_gravity_is_the_flights_own_and_said_where_it_is_assumed() -> None:
+    """On Mars a rotorcraft that hovers feels 3.71 m/s^2; a log that does not say it was taken to be on Earth."""
+    time = np.arange(300) / 100.0
+    still = {name: np.zeros(300) for name in ("x", "y", "z", "phi", "theta", "psi")}
+    log = Flight.from_arrays(time, still)
+    mars = log.done("simulate", gravity=3.71)
+    assert (log.gravity, mars.gravity) == (None, 3.71)
+    for flight, felt, assumed in ((log, -9.80665, True), (mars, -3.71, False)):
+        found = flight.condition(trim_ground=False)
+        np.testing.assert_allclose(found.values("az"), felt, rtol=1e-9)
+        (step,) = (each for each in found.history if each.operation == "derive")
+        assert step.details["assumed"] is assumed
+        assert found.gravity == -felt
+        assert ("the log does not say it" in step_words(step)) is assumed

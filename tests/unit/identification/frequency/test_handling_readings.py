@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_transfer_function import exact
 
-from swashplate.identification.frequency.handling import Handling, ReadNumber, ResponseMargins, margins
+from swashplate.identification.frequency.handling import Handling, ReadNumber, ResponseMargins, delay_words, margins
 from swashplate.identification.frequency.handling_readings import handling_lines, margin_lines, own_input
 from swashplate.identification.frequency.reading_accuracy import answers
 from swashplate.identification.frequency.state_space_fit import fit_state_space
@@ -174,3 +174,10 @@ def test_every_axis_is_judged_by_its_own_input() -> None:
     assert modelled.bandwidth.value == pytest.approx(flown.bandwidth.value, rel=0.02)
     assert 0.0 < modelled.bandwidth.sigma < 0.2 * modelled.bandwidth.value
     assert lines[1].as_dict()["bandwidth"] == [modelled.bandwidth.value, modelled.bandwidth.sigma]
+
+
+def test_a_delay_of_a_second_and_more_is_told_in_seconds() -> None:
+    assert delay_words(4.48, 0.11, digits=4) == "4.48 +- 0.11 s"
+    assert delay_words(0.0603) == "60.3 ms"
+    assert delay_words(float("inf")) == "any amount"
+    assert delay_words(float("nan")) == "none"

@@ -20,7 +20,9 @@ from swashplate.control.draws.spread import SHOWN, Limits
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
 from swashplate.flights.maneuvers.series import parse as parse_maneuver
-from swashplate.simulation.closed_loop_batch import BLOCK
+
+_FLIGHTS = 256
+"""Of a task, where the file does not say: some seconds of work, so that starting it costs little."""
 
 
 class FlightVaries(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
@@ -76,7 +78,7 @@ class FlightsKind:
         _limits(settings.limits)
         gusts_of(settings.varies.gusts)
         parse_maneuver(settings.maneuver)
-        return in_batches(settings, usual=BLOCK)
+        return in_batches(settings, usual=_FLIGHTS)
 
     def run(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
         many = self._flown(settings, portion, files)

@@ -4,11 +4,11 @@ import { curves } from "./curve.js";
 import { make, short } from "./make.js";
 
 // A number with its bound: as many decimals as the bound has with one digit.
-function pm([value, sigma], unit) {
+function pm([value, sigma]) {
   if (value === null) return "–";
-  if (!sigma) return `${short(value)} ${unit}`;
+  if (!sigma) return short(value);
   const decimals = Math.max(0, Math.min(6, -Math.floor(Math.log10(sigma))));
-  return `${value.toFixed(decimals)} ± ${sigma.toFixed(decimals)} ${unit}`;
+  return `${value.toFixed(decimals)} ± ${sigma.toFixed(decimals)}`.replaceAll(" ", "\u00a0"); // on one line, on a telephone too
 }
 
 const percent = (answer) => make("td", { class: "number" }, answer ? (answer.stable ? `${(100 * answer.overshoot).toFixed(0)} %` : "unstable") : "–");
@@ -19,9 +19,9 @@ function gains(home, found) {
     const head = make("tr", {}, make("th", {}, "parameter"), make("th", { class: "number" }, "flown"), make("th", { class: "number" }, "suggested"));
     const number = (value) => make("td", { class: "number" }, value === null ? "–" : String(+(+value).toPrecision(4)));
     const rows = axis.rows.map(([name, flown, suggested]) => make("tr", {}, make("td", {}, name), number(flown), make("td", { class: "number" }, make("b", {}, suggested === null ? "–" : String(+(+suggested).toPrecision(4))))));
-    const margin = (name, key, unit) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key], unit)) : "–")));
+    const margin = (name, key) => make("tr", {}, make("td", {}, name), ...["before", "after"].map((when) => make("td", { class: "number" }, axis[when] ? (typeof axis[when][key] === "number" ? short(axis[when][key]) : pm(axis[when][key])) : "–")));
     home.append(make("table", { class: "gains" }, make("thead", {}, head), make("tbody", {}, ...rows,
-      margin("phase margin", "phase_margin", "°"), margin("gain margin", "gain_margin", "dB"), margin("delay margin", "delay_margin", "ms"), margin("crossover", "crossover", "rad/s"), margin("largest sensitivity", "peak", ""), margin("bandwidth [rad/s]", "bandwidth", ""), margin("disturbance rejection [rad/s]", "rejection", ""), overshoot(axis))));
+      margin("phase margin [deg]", "phase_margin"), margin("gain margin [dB]", "gain_margin"), margin("delay margin [ms]", "delay_margin"), margin("crossover [rad/s]", "crossover"), margin("largest sensitivity", "peak"), margin("bandwidth [rad/s]", "bandwidth"), margin("disturbance rejection [rad/s]", "rejection"), overshoot(axis))));
     home.append(make("p", {}, axis.words));
     answers(home, axis, found);
   }

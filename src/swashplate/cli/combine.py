@@ -1,0 +1,62 @@
+"""`swash combine`: arithmetic on frequency responses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli import flying, options
+
+if TYPE_CHECKING:
+    from swashplate.identification.responses.frequency_response import FrequencyResponse
+
+FILES = (flying.RESPONSES, "responses.json", "report.html")
+
+
+def combine(
+    operation: Annotated[str, typer.Argument(metavar="OPERATION", help="product, ratio, inverse, closed or broken.")],
+    responses: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RESPONSES...", help="One or two: responses.nc or its folder; FILE:OUTPUT/INPUT takes a pair."
+        ),
+    ],
+    out: options.OutFolder = None,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Multiply, divide, invert frequency responses, close or open a loop; errors and coherence are carried through.
+
+    closed: L / (1 + L) of a broken loop L with negative feedback. broken: L = T / (1 - T) of the closed one. Writes
+    responses.nc, responses.json and report.html to --out, for fit-tf and compare.
+    """
+    import swashplate as sp
+    from swashplate.cli.console import as_json
+    from swashplate.cli.outputs import folder_when_complete, write_json
+    from swashplate.errors import SwashError
+
+    if len(responses) > 2:
+        raise SwashError(f"are {len(responses)}; it takes one or two.", channel="RESPONSES")
+    found = sp.combine(operation, *(_one(text) for text in responses))  # type: ignore[arg-type]  # it says which
+    with folder_when_complete(out, ours=FILES) as folder:
+        if folder is not None:
+            found.save(folder / flying.RESPONSES)
+            write_json(folder / "responses.json", found.as_dict())
+            sp.report(found, path=folder / "report.html")
+    if json:
+        typer.echo(as_json(found.as_dict()))
+    elif not quiet:
+        typer.echo(repr(found))
+
+
+def _one(text: str) -> FrequencyResponse:
+    """The responses in a file or folder, or one pair of them."""
+    path, pair = Path(text), ""
+    if not path.exists() and ":" in text:
+        name, _, pair = text.rpartition(":")
+        path = Path(name)
+    found = flying.load_responses(path)
+    output, _, input = pair.partition("/")
+    return found.select((output.strip(),), (input.strip(),)) if pair else found

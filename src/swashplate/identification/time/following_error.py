@@ -1,0 +1,258 @@
+"""Prediction errors of a filter whose gain follows what is flown: for wind, which acts through the square of speed.
+
+What wind does to a rotor grows with the air speed: nothing at rest, much in a gust. A constant gain answers to the
+average. Where the air speed is small it then takes other noise for wind, and a noisy regressor makes its coefficient
+too small, with bounds too narrow. An extended Kalman filter carries the covariance along instead (Jategaonkar 2015,
+sec. 5.5), with slopes and means averaged over the air speed's own uncertainty (statistical linearisation, Gelb 1974,
+sec. 6.2): the force of wind has a kink at rest, and a slope there would be zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.riccati import gain_at, predicted_covariance
+from swashplate.identification.core import robust
+from swashplate.identification.core.comparison import Comparison
+from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.records import Record
+from swashplate.identification.time.innovations import RecordRun
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.identification.time.record_filter import (
+    STRETCH,
+    FilterNumbers,
+    FirstMotion,
+    first_state,
+    stretches,
+    traced_begin,
+    whole,
+)
+from swashplate.identification.time.start_states import steady_flight
+from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
+from swashplate.simulation.discretisation import held_series
+
+_LANES = 8
+"""Rows whose filters run side by side."""
+
+_STEP = 1e-4
+"""Of a scaled entry, for slopes by differences."""
+
+
+class Followed(NamedTuple):
+    """Of some rows along a record: innovations (rows, n, outputs), their covariances, and the states after each reading
+    (rows, n, ...)."""
+
+    innovations: Array
+    covariances: Array
+    states: FilterState
+
+
+class FollowingError(PredictionError):
+    """`PredictionError` with a gain that follows: some twenty times the work, for wind; arguments are the same."""
+
+    def __init__(self, table: Parameterization, pieces: Sequence[Record], *, noise: Noise) -> None:
+        super().__init__(table, pieces, noise=noise)
+        self._constant = PredictionError(table, pieces, noise=noise)
+
+    @property
+    def constant(self) -> PredictionError:
+        """The likelihood of the same row with a constant gain."""
+        return self._constant
+
+    def cost(self, row: Array) -> float:
+        """Negative log-likelihood of the counted innovations (without its constant)."""
+        return self._likelihood(self._followed([row]))
+
+    def scores(self, row: Array) -> tuple[float, Array, Array]:
+        """Cost, gradient and Fisher information; slopes are differences of whole runs."""
+        runs = self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))])
+        gradient, information = np.zeros(len(row)), np.zeros((len(row), len(row)))
+        for white, moved, by_covariance in self._whitened(runs):
+            weight = robust.weights(white)
+            turned = np.tril(by_covariance) * (1.0 - 0.5 * np.eye(white.shape[1]))  # as in PredictionError
+            flat, covariance = moved.reshape(len(row), -1), by_covariance.reshape(len(row), -1)
+            gradient += flat @ (white * weight).ravel() + 0.5 * np.trace(by_covariance, axis1=2, axis2=3).sum(axis=1)
+            gradient -= np.einsum("pnij,ni,nj->p", turned, white * weight, white, optimize=True)
+            information += (flat * weight.ravel()) @ flat.T + 0.5 * covariance @ covariance.T
+        return self._likelihood(runs), gradient, information
+
+    def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
+        """Per record: whitened innovations (n, outputs) and their sensitivities (p, n, outputs).
+
+        The last is the information (p, p) that lies in the innovations' covariance instead.
+        """
+        found = self._whitened(self._followed([row, *(row + step for step in _STEP * np.eye(len(row)))]))
+        by_covariance = [part.reshape(len(row), -1) for _, _, part in found]
+        rest = sum((0.5 * flat @ flat.T for flat in by_covariance), np.zeros((len(row), len(row))))
+        return [white for white, _, _ in found], [moved for _, moved, _ in found], np.asarray(rest)
+
+    def comparisons(self, row: Array) -> tuple[Comparison, ...]:
+        """Every record beside its one-step predictions; the bounds are those of the mean covariance."""
+        kept = [self.table.vehicle.index(name) for name in PREDICTED]
+        return tuple(
+            Comparison(
+                record=piece,
+                counted=counted.astype(np.float64),
+                model=piece.outputs - run.innovations[0],
+                sigma=np.sqrt(np.diag(run.covariances[0][counted].mean(axis=0))),
+                states=np.asarray(run.states.x)[0][:, kept],
+            )
+            for piece, run, counted in zip(self.pieces, self._followed([row]), self.counted, strict=True)
+        )
+
+    def _likelihood(self, runs: Sequence[Followed]) -> float:
+        total = 0.0
+        for run, counted in zip(runs, self.counted, strict=True):
+            nu, S = run.innovations[0][counted], run.covariances[0][counted]
+            if not (np.isfinite(nu).all() and np.isfinite(S).all()):
+                return np.inf
+            try:
+                L = np.linalg.cholesky(S)
+            except np.linalg.LinAlgError:
+                return np.inf
+            total += robust.huber(np.linalg.solve(L, nu[..., None])[..., 0])
+            total += float(np.log(np.diagonal(L, axis1=1, axis2=2)).sum())
+        return total
+
+    def _whitened(self, runs: Sequence[Followed]) -> list[tuple[Array, Array, Array]]:
+        """Per record: whitened innovations (n, m), slopes of theirs (p, n, m) and L^-1 dS L^-T (p, n, m, m)."""
+        found = []
+        for run, counted in zip(runs, self.counted, strict=True):
+            nu, S = run.innovations[:, counted], run.covariances[:, counted]
+            Li = np.linalg.inv(np.linalg.cholesky(S[0]))
+            turn = np.swapaxes(Li, 1, 2)
+            white = (Li @ nu[0][..., None])[..., 0]
+            moved = (Li @ ((nu[1:] - nu[0]) / _STEP)[..., None])[..., 0]
+            found.append((white, moved, Li @ ((S[1:] - S[0]) / _STEP) @ turn))
+        return found
+
+    def _followed(self, rows: Sequence[Array]) -> list[Followed]:
+        """Every record's runs at some rows."""
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64)
+        found = []
+        for run in self._runs:
+            placed = [run.placed(*given, row * self.row.scale) for row in rows]
+            placed += placed[-1:] * (-len(placed) % _LANES)
+            blocks = [placed[first : first + _LANES] for first in range(0, len(placed), _LANES)]
+            found.append(whole([_along_some(self.model, run, block) for block in blocks], len(rows)))
+        return found
+
+
+def _along_some(model: StochasticModel, run: RecordRun, placed: Sequence[tuple[Array, FilterNumbers]]) -> Followed:
+    """One record at as many rows as there are lanes: commands and numbers of each."""
+    commands = np.stack([reaching for reaching, _ in placed])
+    numbers = jax.tree.map(lambda *rows: np.stack(rows), *(numbers for _, numbers in placed))
+    state, P = _begun(model, numbers, run.seen)
+    parts, n = [], len(run.readings)
+    for k, (readings, voltage) in enumerate(stretches(run.readings, run.voltage)):
+        here = commands[:, k * STRETCH : (k + 1) * STRETCH]
+        driven = np.swapaxes(lengthened(np.swapaxes(here, 0, 1), STRETCH), 0, 1)
+        state, P, found = _along(model, state, P, numbers, readings, driven, voltage)
+        parts.append(found)
+    return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)  # type: ignore[no-any-return]
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def _begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> tuple[FilterState, Any]:
+    """States to begin with, and their covariances where the filter has settled in steady flight, by lane."""
+
+    def one(numbers: FilterNumbers) -> tuple[FilterState, Any]:
+        parameters = model.vehicle.parameters(*numbers.parameters)
+        around, held = steady_flight(model.vehicle, parameters, seen.voltage[1], seen.velocity)
+        noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+        linear = model.linear(around, held, parameters, seen.voltage[1], noise, nuisance)
+        return first_state(model, traced_begin(model, numbers, seen).x), predicted_covariance(*linear)
+
+    return jax.vmap(one)(numbers)
+
+
+@partial(jax.jit, static_argnums=0)
+def _along(
+    model: StochasticModel,
+    state: FilterState,
+    covariance: Float[jax.Array, "lanes joined joined"],
+    numbers: FilterNumbers,
+    readings: Float[jax.Array, "samples outputs"],
+    commands: Float[jax.Array, "lanes samples inputs"],
+    voltage: Float[jax.Array, " samples"],
+) -> tuple[FilterState, Any, Followed]:
+    def one(state: FilterState, P: Any, numbers: FilterNumbers, commands: Any) -> Any:
+        def sample(carry: tuple[FilterState, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Followed]:
+            y, u, volts = now
+            state, P, nu, S = _corrected(model, *carry, y, numbers)
+            return _predicted(model, state, P, u, volts, numbers), Followed(nu, S, state)
+
+        return jax.lax.scan(sample, (state, P), (readings, commands, voltage))
+
+    (state, P), found = jax.vmap(one)(state, covariance, numbers, commands)
+    return state, P, found
+
+
+def _corrected(
+    model: StochasticModel,
+    state: FilterState,
+    P: Float[jax.Array, "joined joined"],
+    y: Float[jax.Array, " outputs"],
+    numbers: FilterNumbers,
+) -> tuple[FilterState, Any, Any, Any]:
+    """State and covariance after a reading, the innovation and its covariance."""
+    n, g = state.x.shape[0], model.n_gusts
+    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+    nu = y - model.measure(state.x, nuisance)
+    C = jnp.pad(jax.jacfwd(lambda x: model.measure(x, nuisance))(state.x), ((0, 0), (0, P.shape[0] - n)))
+    R = jnp.diag(model.sensor_variances(noise))
+    K = gain_at(P, C, R, jnp)
+    move, kept = K @ nu, jnp.eye(P.shape[0]) - K @ C
+    corrected = FilterState(state.x + move[:n], state.gust + move[n : n + g], state.drift + move[n + g :])
+    return corrected, kept @ P @ kept.T + K @ R @ K.T, nu, C @ P @ C.T + R
+
+
+def _predicted(
+    model: StochasticModel,
+    state: FilterState,
+    P: Float[jax.Array, "joined joined"],
+    u: Float[jax.Array, " inputs"],
+    volts: Float[jax.Array, ""],
+    numbers: FilterNumbers,
+) -> tuple[FilterState, Any]:
+    """State and covariance one sample later, averaged over what is not known of the air speed."""
+    n, g, d = state.x.shape[0], model.n_gusts, N_DISTURBANCES
+    parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
+    names = model.vehicle.state_names
+    psi = state.x[names.index("psi")]
+    c, s = jnp.cos(psi), jnp.sin(psi)
+    speeds = np.eye(n)[[names.index("u"), names.index("v")]]
+    wind = jnp.zeros((2, g + d))
+    if model.windy:
+        wind = wind.at[:, d : d + 2].set(-jnp.stack([jnp.stack([c, s]), jnp.stack([-s, c])]))
+    air = jnp.concatenate([jnp.asarray(speeds), wind], axis=1)  # of the state and the disturbances
+    away = jnp.sqrt(2.0 * jnp.diag(air @ P @ air.T))[:, None] * speeds
+    places = state.x + jnp.concatenate([away, -away])  # cubature of the third degree, as in StochasticModel.linear
+    acting = model.acting(state)
+    slope = partial(model.slopes, u=u, parameters=parameters, voltage=volts)
+    by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(lambda x: slope(x, acting))(places))
+    by_x, held = held_series(by_x, model.dt, jnp.eye(n))
+    by_gust = model.dt * held @ by_gust
+    fade = model.fade(noise)
+    F = jnp.block(
+        [
+            [by_x, by_gust, by_gust[:, :d]],
+            [jnp.zeros((g, n)), jnp.diag(fade), jnp.zeros((g, d))],
+            [jnp.zeros((d, n + g)), jnp.eye(d)],
+        ]
+    )
+    after = jnp.mean(jax.vmap(lambda x: model.step(x, acting, u, parameters, volts))(places), axis=0)
+    moved = F @ P @ F.T + model.process_noise(by_gust[:, :d], noise)
+    return FilterState(after, fade * state.gust, state.drift), 0.5 * (moved + moved.T)

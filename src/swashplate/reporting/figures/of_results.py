@@ -1,0 +1,194 @@
+"""What the results of single verbs show of themselves: gains, maneuvers, spectra, sensors' errors, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swashplate.flights.flight import Flight
+from swashplate.flights.maneuvers.maneuver_design import sampled
+from swashplate.flights.schema import channel
+from swashplate.flights.spectrum import Harmonics, Spectrogram, Spectrum
+from swashplate.reporting.figures.of_flight import of_spectra, of_spectrograms, over_time
+from swashplate.reporting.structure import Cell, Figure, Key, Report, Section, Table, Text
+from swashplate.reporting.theme import BLACK, BLUE, GREY, VERMILION, axis, base_layout, line, stacked, unit_words
+from swashplate.reporting.versions import date, versions
+
+if TYPE_CHECKING:
+    from swashplate.control.analysis.cascade_gains import LoopWorth
+    from swashplate.control.analysis.rate_loop_steps import RateSteps
+    from swashplate.flights.conditioning.reconstruction import Reconstruction
+    from swashplate.flights.maneuvers.planned import PlannedManeuver
+    from swashplate.flights.maneuvers.series import Maneuver
+    from swashplate.identification.time.equation_error import EquationError
+
+_ROW = 26
+"""Height of one estimate [px]."""
+_BOUNDS = 2.0
+"""Standard errors on each side."""
+
+
+def _table(caption: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    return Table(caption, tuple(head), tuple(tuple(Cell(cell) for cell in row) for row in rows))
+
+
+# ---- numbers with bounds ---------------------------------------------------------------------------------------
+def _estimates(panels: Mapping[str, Mapping[str, tuple[float, float]]], caption: str) -> Figure:
+    """Values with two standard errors, a panel a unit.
+
+    Args:
+        panels: value and standard error by name, by the title of the panel's axis.
+    """
+    count = max(1, sum(map(len, panels.values())))
+    gap = 64 / (_ROW * count + 64 * len(panels))
+    layout = base_layout(_ROW * count + 64 * len(panels) + 20, left=110)
+    traces, top = [], 1.0
+    for i, (title, values) in enumerate(panels.items()):
+        number = "" if i == 0 else str(i + 1)
+        low = max(0.0, top - (1.0 - gap * len(panels)) * len(values) / count)
+        for place, (value, sigma) in enumerate(values.values()):
+            ends = [value - _BOUNDS * sigma, value + _BOUNDS * sigma]
+            color = BLUE if abs(value) > _BOUNDS * sigma else GREY
+            traces.append(line(ends, [place, place], name=title, color=color, axis=number))
+            dot = line([value], [place], name=title, color=color, axis=number)
+            traces.append({**dot, "mode": "markers", "marker": {"color": color, "size": 7}})
+        traces.append(line([0.0, 0.0], [-0.5, len(values) - 0.5], name="zero", color=BLACK, width=0.8, axis=number))
+        ticks = {"tickvals": list(range(len(values))), "ticktext": list(values)}
+        reach = [len(values) - 0.5, -0.5]
+        layout[f"yaxis{number}"] = axis("", domain=[low, top], anchor=f"x{number}", range=reach, **ticks)
+        layout[f"xaxis{number}"] = axis(title, anchor=f"y{number}")
+        top = max(0.0, low - gap)
+    return Figure(
+        "estimates",
+        {"data": traces, "layout": layout},
+        int(layout["height"]),
+        f"{caption} Bars are two standard errors; grey ones hold zero.",
+        f"Estimates with bounds: {', '.join(name for values in panels.values() for name in values)}.",
+    )
+
+
+def section_of_reconstruction(found: Reconstruction) -> Section:
+    """Biases and scale factors of each channel with their bounds."""
+    panels: dict[str, dict[str, tuple[float, float]]] = {}
+    for name, estimate in found.biases.items():
+        known = channel(name)
+        values = panels.setdefault(f"bias [{unit_words(known.shown_unit) or '-'}]", {})
+        values[name] = (known.shown_factor * estimate.value, known.shown_factor * estimate.sigma)
+    if found.scales:
+        panels["error of scale [%]"] = {n: (100.0 * e.value, 100.0 * e.sigma) for n, e in found.scales.items()}
+    figure = (_estimates(panels, "Errors of the sensors."),) if panels else ()
+    return Section("reconstruction", "Errors of the sensors", (*figure, Text(str(found))))
+
+
+def section_of_equation(found: EquationError) -> Section:
+    """Coefficients with their bounds."""
+    values = dict(zip(found.names, zip(found.values.tolist(), found.sigmas.tolist(), strict=True), strict=True))
+    figure = _estimates({"coefficient [own units]": values}, "Coefficients of the equation.")
+    return Section("equation", f"Equation error: R² = {found.determination:.4f}", (figure, Text(repr(found))))
+
+
+# ---- over frequency --------------------------------------------------------------------------------------------
+def section_of_spectrum(found: Spectrum) -> Section:
+    """One channel's density over frequency."""
+    return Section("spectrum", f"Spectrum of {found.channel}", (of_spectra([{"": found}], [""]), Text(str(found))))
+
+
+def section_of_spectrogram(found: Spectrogram) -> Section:
+    """One channel's power over time and frequency."""
+    return Section("spectrogram", f"Spectrogram of {found.channel}", (of_spectrograms([found]),))
+
+
+def section_of_harmonics(found: Harmonics) -> Section:
+    """The channel's spectrum with the multiples of the rotor's speed marked, and the notches."""
+    drawn = of_spectra([{found.spectrum.channel: found.spectrum}], [found.spectrum.channel])
+    density = found.spectrum.density[1:]
+    seen = density[density > 0.0]
+    ends = [float(np.min(seen)), float(np.max(seen))] if seen.size else [1.0, 10.0]
+    marks = [
+        line([h.frequency, h.frequency], ends, name=f"{h.number} x", color=VERMILION, dash="dot", width=1.0)
+        for h in found.harmonics
+    ]
+    spec: dict[str, Any] = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
+    keys = (Key(found.spectrum.channel, BLUE), Key(f"multiples of {found.rotor}", VERMILION, "dot"))
+    caption = f"{drawn.caption} {found.words}"
+    figure = Figure("harmonics", spec, drawn.height, caption, drawn.alt, keys=keys)
+    return Section("harmonics", f"Rotor vibration in {found.spectrum.channel}", (figure, Text(str(found))))
+
+
+# ---- over time -------------------------------------------------------------------------------------------------
+def section_of_planned(found: PlannedManeuver) -> Section:
+    """What is flown over time, and its design rules."""
+    series = sampled(found.maneuver, rate=found.rate, chirp=found.chirp)
+    figure = over_time([Flight({"maneuver": series})], channels=[str(name) for name in series.data_vars])
+    return Section("maneuver", f"Maneuver: {found.maneuver.kind}", (figure, _table("Design rules", *found.rows())))
+
+
+def section_of_pieces(pieces: Sequence[Maneuver], *, rate: float) -> Section:
+    """Maneuvers that are flown one after the other, over time, sampled at a rate [Hz]."""
+    drawn = []
+    for number, piece in enumerate(pieces, 1):
+        series = sampled(piece, rate=rate)
+        one = over_time([Flight({"maneuver": series})], channels=[str(name) for name in series.data_vars])
+        drawn.append(replace(one, identifier=f"piece-{number}", caption=f"{number}. {piece.kind}"))
+    return Section("pieces", "What is flown", tuple(drawn))
+
+
+def section_of_steps(found: RateSteps) -> Section:
+    """The rate after a step of its target, and after a disturbance."""
+    layout = stacked(["over target [-]", "disturbed [own unit]"], height=150)
+    traces = [
+        line(found.time, found.step, name="step", color=BLUE),
+        line(found.time, found.disturbance, name="disturbance", color=BLUE, axis="2"),
+    ]
+    verdict = "Stable" if found.stable else "UNSTABLE: do not fly these gains"
+    words = f"{verdict}; overshoot {100.0 * found.overshoot:.0f} %, settles at {found.settled:.3g}."
+    alt = "The rate over time, after a step of the target and after a disturbance of 0.1 of the command."
+    figure = Figure("steps", {"data": traces, "layout": layout}, int(layout["height"]), words, alt)
+    return Section("steps", "Steps of a rate loop", (figure, Text(words, tone="plain" if found.stable else "bad")))
+
+
+# ---- autopilots ------------------------------------------------------------------------------------------------
+def section_of_loops(loops: Sequence[LoopWorth]) -> Section:
+    """Margins of an autopilot's loops beside those that are kept."""
+    from swashplate.control.analysis.cascade_gains import GAIN_KEPT, PEAK_KEPT, PHASE_KEPT
+
+    places, names = list(range(len(loops))), [loop.name for loop in loops]
+    layout = base_layout(_ROW * len(loops) + 80, left=90)
+    panels = (
+        ("gain margin [dB]", [loop.gain for loop in loops], GAIN_KEPT),
+        ("phase margin [deg]", [loop.phase for loop in loops], PHASE_KEPT),
+        ("largest sensitivity [-]", [loop.peak for loop in loops], PEAK_KEPT),
+    )
+    traces = []
+    for i, (title, values, kept) in enumerate(panels):
+        number = "" if i == 0 else str(i + 1)
+        dots = line(values, places, name=title, color=BLUE, axis=number)
+        ends = [-0.5, len(loops) - 0.5]
+        traces += [
+            {**dots, "mode": "markers", "marker": {"color": BLUE, "size": 8}},
+            line([kept, kept], ends, name="limit", color=VERMILION, dash="dash", axis=number),
+        ]
+        ticks = {"tickvals": places, "ticktext": names}
+        layout[f"yaxis{number}"] = axis("", anchor=f"x{number}", range=ends[::-1], **ticks)
+        layout[f"xaxis{number}"] = axis(title, anchor=f"y{number}", domain=[0.37 * i, 0.37 * i + 0.26])
+    figure = Figure(
+        "margins",
+        {"data": traces, "layout": layout},
+        int(layout["height"]),
+        "Each loop broken with the others closed; margins lie right of their limit, the sensitivity left of it.",
+        f"Margins of the loops {', '.join(names)}.",
+        keys=(Key("found", BLUE, "circle"), Key("limit", VERMILION, "dash")),
+    )
+    return Section("loops", "Loops", (figure,))
+
+
+def plain_page(
+    title: str, *, summary: Mapping[str, str], sections: Sequence[Section] = (), problems: Sequence[str] = ()
+) -> Report:
+    """The page of a result of one verb: what is wrong first, then its numbers, then its figures."""
+    made = f"swashplate {versions()['swashplate']}, {date()}"
+    lines = tuple((name, words, "plain") for name, words in summary.items())
+    return Report(title, tuple(("bad", text) for text in problems), lines, None, tuple(sections), made)
