@@ -104,6 +104,24 @@ def test_transfer_functions_are_tried_and_saved(folder: Path, answered: Path) ->
     assert gain.endswith("rad/s^3")  # rad/s per 1, over two more poles than zeros
 
 
+def test_responses_are_multiplied_divided_and_inverted(folder: Path, answered: Path) -> None:
+    """A response over itself is one; what is combined goes on into the next command."""
+    pair = f"{answered}:p/mixer_roll"
+    inverse = swash("combine", "inverse", pair, "--out", folder / "inverse")
+    assert inverse.code == 0, inverse.err
+    assert {file.name for file in (folder / "inverse").iterdir()} == {"responses.nc", "responses.json", "report.html"}
+    one = swash("combine", "product", pair, folder / "inverse", "--json")
+    assert one.code == 0, one.err
+    kept = json.loads((folder / "inverse" / "responses.json").read_text(encoding="utf-8"))
+    assert json.loads(one.out).keys() == kept.keys()
+    assert "mixer_roll / p" in inverse.out
+    assert "Did you mean 'ratio'?" in one_message(swash("combine", "ration", pair, pair))
+    assert "takes two responses" in one_message(swash("combine", "ratio", pair))
+    assert "responses of one pair" in one_message(swash("combine", "inverse", answered))
+    assert "no such file" in one_message(swash("combine", "inverse", folder / "nothing.nc"))
+    assert "it takes one or two" in one_message(swash("combine", "ratio", pair, pair, pair))
+
+
 def test_transfer_functions_start_a_model_and_tell_margins(folder: Path, answered: Path) -> None:
     places = []
     for name, output in (("mixer_roll", "p"), ("mixer_pitch", "q")):

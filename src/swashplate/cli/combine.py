@@ -33,8 +33,9 @@ def combine(
     responses.nc, responses.json and report.html to --out, for fit-tf and compare.
     """
     import swashplate as sp
+    from swashplate.atomic import write_json
     from swashplate.cli.console import as_json
-    from swashplate.cli.outputs import folder_when_complete, write_json
+    from swashplate.cli.outputs import folder_when_complete
     from swashplate.errors import SwashError
 
     if len(responses) > 2:
@@ -49,6 +50,8 @@ def combine(
         typer.echo(as_json(found.as_dict()))
     elif not quiet:
         typer.echo(repr(found))
+        if out is not None:
+            typer.echo(f"\nReport: {out / 'report.html'}")
 
 
 def _one(text: str) -> FrequencyResponse:

@@ -58,18 +58,18 @@ def combine(
                 hint="Choose one with select((output,), (input,)), or on the command line FILE:OUTPUT/INPUT.",
             )
     h, noise, error = _parts(first)
-    omega, one = first.omega, np.complex128(1.0)
+    omega, unity = first.omega, np.complex128(1.0)
     if second is not None:
         omega, (h, noise, error), (h2, noise2, error2) = _together(first, second)
         _fits(operation, first, second)
         h = h * h2 if operation == "product" else h / h2
         noise, error = noise + noise2, np.hypot(error, error2)
     elif operation == "inverse":
-        h = one / h
+        h = unity / h
     else:
-        through = np.abs(one / (one + h)) if operation == "closed" else np.abs(one / (one - h))
+        through = np.abs(unity / (unity + h)) if operation == "closed" else np.abs(unity / (unity - h))
         _fits(operation, first, None)
-        h = h / (one + h) if operation == "closed" else h / (one - h)
+        h = h / (unity + h) if operation == "closed" else h / (unity - h)
         noise, error = noise * through**2, error * through
     return _made(operation, first, second, omega, h, 1.0 / (1.0 + noise), error)
 
