@@ -33,7 +33,7 @@ from swashplate.simulation.late import steps_late
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start, trim
-from swashplate.simulation.tumbling import Carried, steep, with_angles, with_quaternion
+from swashplate.simulation.tumbling import CarriedAttitude, steep, with_angles, with_quaternion
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
@@ -142,7 +142,7 @@ def simulate_closed_loop(
     longer = shared_length(n)
     first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
 
-    def flown(as_carried: Carried) -> tuple[Array, Array]:
+    def flown(as_carried: CarriedAttitude) -> tuple[Array, Array]:
         states, inputs = fly(
             equations_of(as_carried.vehicle),
             controller.step,

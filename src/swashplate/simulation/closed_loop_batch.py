@@ -35,14 +35,14 @@ from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, surroundings_of_start
 from swashplate.simulation.trim import trim as find_trim
-from swashplate.simulation.tumbling import Carried, steep_at, with_angles, with_quaternion
+from swashplate.simulation.tumbling import CarriedAttitude, steep_at, with_angles, with_quaternion
 
 LANES = 8
 """Vehicles that one compiled program flies side by side, or a whole multiple where the controller's step says so
 (`block`): whatever their number, few programs fly them. A vehicle costs as much as in blocks of 256 (raptor50 under
 ArduPilot's law 6.4 and 6.9 ms for 4 s, the CoaX under its autopilot 3.7 and 3.4 ms): its loop fits into a cache."""
 
-Carry = Callable[[Vehicle, Array], Carried]
+Carry = Callable[[Vehicle, Array], CarriedAttitude]
 _THETA = RigidBody._fields.index("theta")
 
 

@@ -12,8 +12,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.models.vehicle import Vehicle
@@ -143,7 +145,11 @@ def euler_rows(rows: Array, before: Array) -> Array:
 
 
 # ---- in closed loops -----------------------------------------------------------------------------------------------
-class Carried(NamedTuple):
+Rows = Float[jax.Array, "rows ..."]
+"""A row, or columns of several vehicles."""
+
+
+class CarriedAttitude(NamedTuple):
     """How a compiled loop carries a vehicle whose controller is told roll, pitch and yaw.
 
     Attributes:
@@ -159,23 +165,23 @@ class Carried(NamedTuple):
     see: Callable[[Any, Any], tuple[Any, Any]]
 
 
-def with_angles(vehicle: Vehicle, start: Array) -> Carried:
+def with_angles(vehicle: Vehicle, start: Array) -> CarriedAttitude:
     """Euler angles, as they are: for flights that stay clear of the vertical."""
-    return Carried(vehicle, start, np.zeros((0, *start.shape[1:])), _as_it_is)
+    return CarriedAttitude(vehicle, start, np.zeros((0, *start.shape[1:])), _as_it_is)
 
 
-def with_quaternion(vehicle: Vehicle, start: Array) -> Carried:
+def with_quaternion(vehicle: Vehicle, start: Array) -> CarriedAttitude:
     """A quaternion, for flights that do not; `start` is a row of the vehicle, or equal columns (n_states, n)."""
     row = from_euler(start if start.ndim == 1 else start[:, 0])
     begin = row if start.ndim == 1 else np.repeat(row[:, None], start.shape[1], axis=1)
-    return Carried(tumbling(vehicle), begin, start[_PHI:_P], _as_euler)
+    return CarriedAttitude(tumbling(vehicle), begin, start[_PHI:_P], _as_euler)
 
 
-def _as_it_is(x: Any, shown: Any) -> tuple[Any, Any]:
+def _as_it_is(x: Rows, shown: Rows) -> tuple[Any, Any]:
     return x, shown
 
 
-def _as_euler(x: Any, shown: Any) -> tuple[Any, Any]:
+def _as_euler(x: Rows, shown: Rows) -> tuple[Any, Any]:
     found = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
     turn = 2.0 * jnp.pi
     roll, yaw = (

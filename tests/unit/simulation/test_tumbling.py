@@ -174,6 +174,7 @@ def test_closed_loops_fly_through_the_vertical(monkeypatch: pytest.MonkeyPatch) 
     assert _apart(_thrown(100.0), fine, 16) > 10.0 * right
 
 
+@pytest.mark.proof
 def test_a_batch_flies_through_the_vertical_as_one_does_and_leaves_the_others_alone() -> None:
     coax = sp.vehicle("coax")
     trim = sp.trim(coax)
