@@ -37,7 +37,12 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
 
     def besiege_files(seconds: float) -> list[dict[str, object]]:
         siege = files.Files(
-            list(TARGETS), files=chosen.files, seconds=seconds, workers=chosen.workers, seed=chosen.seed
+            list(TARGETS),
+            files=chosen.files,
+            seconds=seconds,
+            workers=chosen.workers,
+            seed=chosen.seed,
+            kept=FOLDER / "files.kept",
         )
         return [siege.run().as_dict()]
 
@@ -47,8 +52,7 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
         return [one.as_dict() for one in found]
 
     def besiege_links(seconds: float) -> list[dict[str, object]]:
-        each = seconds / len(packets.LINKS)
-        return [packets.besiege(packets=chosen.packets, seconds=each, seed=chosen.seed).as_dict()]
+        return [packets.besiege(packets=chosen.packets, seconds=seconds, seed=chosen.seed).as_dict()]
 
     def besiege_pages(seconds: float) -> list[dict[str, object]]:
         return [pages.besiege(half_open=chosen.half_open).as_dict()]
@@ -78,10 +82,13 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=60.0, help="for all of it")
     parser.add_argument("--workers", type=int, default=2, help="processes that read files")
     parser.add_argument("--seed", type=int, default=0, help="other mutants, other kills")
+    parser.add_argument("--resume", action="store_true", help="go on with the counts of a stopped run")
     parser.add_argument("--only", action="append", choices=list(SHARES), help="this campaign; may be repeated")
     parser.add_argument("--assemble-only", action="store_true", help="write the page from build/siege as it is")
     chosen = parser.parse_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in (chosen.only or SHARES) if not chosen.resume else ():
+        (FOLDER / f"{name}.kept").unlink(missing_ok=True)
     fell = False
     for name, run in campaigns(chosen).items() if not chosen.assemble_only else ():
         if chosen.only and name not in chosen.only:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import selectors
@@ -12,6 +13,7 @@ from collections import Counter, defaultdict
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from .found import ROOT, Found, progress
 
@@ -21,6 +23,8 @@ _START = 120.0
 """s that a worker may take for its first file of a kind: it imports, and makes the whole files."""
 _LOT = 4.0
 """s of work that is handed out at once."""
+_MOST = 0.1
+"""Part of all files that one kind may have: lines of text are read a thousand times quicker than logs."""
 
 
 @dataclass
@@ -82,7 +86,7 @@ def _processor_time(process: int) -> float:
 
 
 class Files:
-    """The campaign: every kind of file gets the same time.
+    """The campaign: a kind of file gets the more time the quicker it is read, as one over the root of a file's time.
 
     Args:
         names: of the targets.
@@ -90,21 +94,53 @@ class Files:
         seconds: after which no more is begun.
         workers: processes at a time.
         seed: of the first file of each kind.
+        kept: where the counts are kept, so that a stopped campaign goes on; what fell is tried again then. None: no.
     """
 
-    def __init__(self, names: list[str], *, files: int, seconds: float, workers: int = 2, seed: int = 0) -> None:
-        self._names, self._files, self._workers = names, files, workers
+    def __init__(
+        self, names: list[str], *, files: int, seconds: float, workers: int = 2, seed: int = 0, kept: Path | None = None
+    ) -> None:
+        self._names, self._files, self._workers, self._kept = names, files, workers, kept
         self._until = time.monotonic() + seconds
         self._next = dict.fromkeys(names, seed)
         self._spent = dict.fromkeys(names, 0.0)
         self._cost = dict.fromkeys(names, 0.2)
         self.counts: dict[str, Counter[str]] = defaultdict(Counter)
         self.bad: list[str] = []
+        self.fell: list[tuple[str, int, str]] = []
         self.warned = Counter[str]()
         self._given = 0
+        self._begun = time.monotonic()
+        self._again: list[tuple[str, int]] = []
+        if kept is not None and kept.exists():
+            self._go_on(json.loads(kept.read_text(encoding="utf-8")))
+
+    def _go_on(self, before: dict[str, Any]) -> None:
+        """Takes up the counts of a stopped campaign; what fell then counts as it does now."""
+        for name, counts in before["counts"].items():
+            self.counts[name].update(counts)
+        self._next |= {name: seed for name, seed in before["next"].items() if name in self._next}
+        self._spent |= {name: spent for name, spent in before["spent"].items() if name in self._spent}
+        self._begun -= before["seconds"]
+        self._cost |= {name: cost for name, cost in before["cost"].items() if name in self._cost}
+        for name, seed, kind in before["fell"]:
+            self._again.append((name, seed))
+            self.counts[name][kind] -= 1
+        self._given = sum(counts.total() for counts in self.counts.values())
+
+    def _keep_counts(self) -> None:
+        if self._kept is None:
+            return
+        fell = self.fell + [(name, seed, "other") for name, seed in self._again]
+        again = Counter(name for name, _ in self._again)
+        counts = {name: {**c, "other": c["other"] + again[name]} for name, c in self.counts.items()}
+        now: dict[str, Any] = {"counts": counts, "fell": fell, "spent": self._spent, "cost": self._cost}
+        now |= {"next": self._next, "seconds": time.monotonic() - self._begun}
+        made = self._kept.with_suffix(".new")
+        made.write_text(json.dumps(now), encoding="utf-8")
+        made.replace(self._kept)
 
     def run(self) -> Found:
-        begin = time.monotonic()
         selector = selectors.DefaultSelector()
         workers = [_started() for _ in range(self._workers)]
         for worker in workers:
@@ -121,24 +157,33 @@ class Files:
                     selector.unregister(worker.process.stdout)  # type: ignore[arg-type]
                     workers[k] = self._replaced(worker, late=late)
                     selector.register(workers[k].process.stdout, selectors.EVENT_READ, workers[k])  # type: ignore[arg-type]
-            progress(f"{sum(c.total() for c in self.counts.values()):,} files, {len(self.bad)} bad")
+            if progress(f"{sum(c.total() for c in self.counts.values()):,} files, {len(self.bad)} bad"):
+                self._keep_counts()
         for worker in workers:
             _ended(worker)
-        return self._found(time.monotonic() - begin)
+        self._keep_counts()
+        return self._found(time.monotonic() - self._begun)
 
     def _late(self, worker: _Worker) -> bool:
-        """Whether a file takes too long: of the processor's time, as the machine may be busy, or six times as long."""
+        """Whether a file takes too long: of processor time, as the machine may be busy, or thirty times as long."""
         assert worker.lot is not None
         if worker.at is None or worker.lot.name not in worker.known:
             return time.monotonic() - worker.since > _START
         used = _processor_time(worker.process.pid) - worker.used
-        return used > SLOWEST or time.monotonic() - worker.since > 6.0 * SLOWEST
+        return used > SLOWEST or time.monotonic() - worker.since > 30.0 * SLOWEST
 
     def _hand_out(self, worker: _Worker) -> None:
+        if self._again:
+            name, seed = self._again.pop()
+            worker.lot = _Lot(name, seed, 1, time.monotonic())
+            worker.at, worker.since = None, time.monotonic()
+            self._say(worker)
+            return
         if self._given >= self._files or time.monotonic() > self._until:
             worker.lot = None
             return
-        name = min(self._names, key=lambda n: self._spent[n])
+        few = [n for n in self._names if self.counts[n].total() < max(1.0, _MOST * self._files)] or self._names
+        name = min(few, key=lambda n: self._spent[n] * self._cost[n] ** 0.5)
         count = max(1, min(int(_LOT / self._cost[name]), self._files - self._given, 2000))
         worker.lot = _Lot(name, self._next[name], count, time.monotonic())
         self._next[name] += count
@@ -168,7 +213,7 @@ class Files:
                 lot = worker.lot
                 cost = (time.monotonic() - lot.begun) / lot.count
                 if lot.name in worker.known:
-                    self._cost[lot.name] = max(1e-4, 0.5 * self._cost[lot.name] + 0.5 * cost)
+                    self._cost[lot.name] = max(1e-4, 0.2 * self._cost[lot.name] + 0.8 * cost)
                 worker.known.add(lot.name)
                 self._hand_out(worker)
             else:
@@ -176,11 +221,12 @@ class Files:
                 worker.known.add(name)
                 self.counts[name][{"a": "accepted", "w": "warned", "r": "refused"}.get(kind, "other")] += 1
                 if kind == "x":
-                    self._keep(name, rest)
+                    self._keep(name, rest, "other")
                 elif kind == "w":
                     self.warned[rest.partition(" ")[2]] += 1
 
-    def _keep(self, name: str, words: str) -> None:
+    def _keep(self, name: str, words: str, kind: str) -> None:
+        self.fell.append((name, int(words.split()[0]), kind))
         self.bad.append(f"{name}, seed {words}")
         print(self.bad[-1], flush=True)
 
@@ -195,8 +241,9 @@ class Files:
             return fresh
         at = worker.at if worker.at is not None else lot.first
         kind = f"took more than {SLOWEST:g} s" if late else f"ended the process with {code}"
-        self.counts[lot.name]["hang" if late else "crash"] += 1
-        self._keep(lot.name, f"{at} {kind}")
+        end = "hang" if late else "crash"
+        self.counts[lot.name][end] += 1
+        self._keep(lot.name, f"{at} {kind}", end)
         left = lot.first + lot.count - at - 1
         if left > 0:
             fresh.lot = _Lot(lot.name, at + 1, left, time.monotonic())

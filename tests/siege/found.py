@@ -41,8 +41,10 @@ class Found:
 _told = [0.0]
 
 
-def progress(text: str) -> None:
-    """A line on the screen, every half minute."""
-    if time.monotonic() - _told[0] > 30.0:
-        _told[0] = time.monotonic()
-        print(text, file=sys.stderr, flush=True)
+def progress(text: str) -> bool:
+    """A line on the screen, every half minute; whether it was said now."""
+    if time.monotonic() - _told[0] <= 30.0:
+        return False
+    _told[0] = time.monotonic()
+    print(text, file=sys.stderr, flush=True)
+    return True

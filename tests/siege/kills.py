@@ -54,8 +54,8 @@ class Command:
 
 
 def _two(words: str, old: str, new: str) -> Command:
-    """A command with a word that differs, "*"."""
-    return Command(words.replace("*", old).split(), words.replace("*", new).split())
+    """A command with a word that differs, "*"; "#" is a star."""
+    return Command(*(words.replace("*", word).replace("#", "*").split() for word in (old, new)))
 
 
 QUICK: Mapping[str, Command] = {
@@ -75,6 +75,13 @@ SLOW: Mapping[str, Command] = {
     "export, C": _two("export * --format c --out OUT/code", "coax", "raptor50"),
     "export, MATLAB": _two("export raptor50 --format matlab --speed * --out OUT/made", "2", "4"),
     "export, FMU": _two("export * --format fmu --out OUT/made", "coax", "raptor50"),
+    "track": _two("track INPUTS/log.csv --equation p_dot=Lp#p+bias --rate * --out OUT/track", "40", "50"),
+    "identify": _two(
+        "identify --vehicle coax --flight INPUTS/flight.nc --free flight --method output-error --rate 20 --iterations *"
+        " --out OUT/fit",
+        "1",
+        "2",
+    ),
     "stitch": _two("stitch INPUTS/at0.toml INPUTS/at5.toml --title * --out OUT/model.toml", "a", "b"),
 }
 
@@ -114,12 +121,13 @@ class Siege:
         )
 
     def run(
-        self, arguments: list[str], *, mode: int = COUNT, stop: int = 0, error: int = 0
+        self, arguments: list[str], *, mode: int = COUNT, stop: int = 0, error: int = 0, stopped: bool = False
     ) -> tuple[dict[str, Any], str]:
-        """How a command ended, and what it said."""
+        """How a command ended, and what it said; `stopped`: from where it first wants to write, in a fork."""
         log = self.folder / "said.txt"
         asked = {"arguments": arguments, "folder": str(self.folder / "cases"), "mode": mode, "stop": stop}
         asked |= {"error": error, "log": str(log), "seconds": _SECONDS, "cwd": str(self.folder)}
+        asked |= {"stopped": stopped}
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps(asked) + "\n")
@@ -173,7 +181,17 @@ class Case:
         self._well(self._new)
         again = _files(self.out)
         self.varies = {name for name in self.new if again.get(name) != self.new[name]}
+        # What a command computes is the same whatever is struck: where it can, it is computed once.
+        self._stopped = self._can_stop()
         assert self.old != self.new, name
+
+    def _can_stop(self) -> bool:
+        _put(self.old, self.out)
+        told, _ = self._siege.run(self._new, stopped=True)
+        if told["code"] != 0 or _files(self.out).keys() != self.new.keys() or told["calls"] < 1:
+            return False
+        self.calls = told["calls"]
+        return True
 
     def _well(self, arguments: list[str]) -> dict[str, Any]:
         told, said = self._siege.run(arguments)
@@ -184,7 +202,7 @@ class Case:
     def struck(self, *, mode: int, stop: int, error: int = 0) -> list[str]:
         """What is wrong after a kill or a failing call, and after the next run."""
         _put(self.old, self.out)
-        told, said = self._siege.run(self._new, mode=mode, stop=stop, error=error)
+        told, said = self._siege.run(self._new, mode=mode, stop=stop, error=error, stopped=self._stopped)
         killed = told["code"] == -signal.SIGKILL
         wrong = []
         if told["hang"]:
@@ -198,7 +216,7 @@ class Case:
         wrong += self._judged(_files(self.out), complete=told["code"] == 0)
         if mode == FAIL and told["code"] == 2 and error not in (errno.EROFS, errno.EACCES, errno.EIO):
             wrong += [f"leaves {name}" for name in _litter(self.out, self._siege.temporary)]
-        after, said = self._siege.run(self._new)
+        after, said = self._siege.run(self._new, stopped=self._stopped)
         if after["code"] != 0:
             wrong.append(f"the next run ends with {after['code']}: {said.strip()[-200:]!r}")
         elif problems := self._judged(_files(self.out), complete=True):
@@ -269,8 +287,10 @@ def besiege(
         try:
             if any("INPUTS" in word for command in commands.values() for word in command.new):
                 _made_inputs(siege, inputs)
-            cases = [Case(siege, name, command, inputs) for name, command in commands.items()]
-            begin = time.monotonic()
+            begin, cases = time.monotonic(), []
+            for name, command in commands.items():
+                cases.append(Case(siege, name, command, inputs))
+                progress(f"{name}: {cases[-1].calls} calls")
             for k in range(max(kills, failures)):
                 for case in cases:
                     if time.monotonic() - begin > seconds:
@@ -298,9 +318,10 @@ def besiege(
 
 
 KILLS = (
-    "kills at calls that open, write, flush, rename, remove or close files (a third of them in the middle of a write), "
-    "spread over all calls of each command. Judged are files that are half-written, old and new ones side by side, the "
-    "user's own file in the folder, and temporary files or a wrong result after the next run."
+    "kills of processes that had done their work and wanted to write, at calls that open, write, flush, rename, remove "
+    "or close files (a third of them in the middle of a write), spread over all calls of a command. Judged are files "
+    "that are half-written, old and new ones side by side, the user's own file in the folder, and temporary files or a "
+    "wrong result after the next run."
 )
 FAILURES = (
     "runs in which a call fails, and all later ones: no space, quota, read-only, no permission, input or output error. "
@@ -315,12 +336,14 @@ def _made_inputs(siege: Siege, inputs: Path) -> None:
         f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 1-8Hz --out {out}",
         f"respond {inputs}/log.csv --inputs servo_roll --outputs p --band 2-6Hz --out {out}/narrow",
         f"linearize raptor50 --speed 0-5/5 --out {out}/models",
+        f"simulate --vehicle coax --maneuver sweep:pitch,0.5-4Hz,8s --out {out}/flight.nc",
     ]
     for words in made:
         told, said = siege.run(words.split())
         if told["code"] != 0:
             raise RuntimeError(f"{words}: {said}")
     shutil.copy(out / "responses.nc", inputs / "responses.nc")
+    shutil.copy(out / "flight.nc", inputs / "flight.nc")
     shutil.copy(out / "narrow" / "responses.nc", inputs / "narrow.nc")
     for k, path in enumerate(sorted((out / "models").glob("*.toml"))):
         shutil.copy(path, inputs / f"at{5 * k}.toml")

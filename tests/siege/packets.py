@@ -182,11 +182,12 @@ LINKS: dict[str, Callable[[], _Link]] = {
 
 
 def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
-    """So many mutated packets for each link, or so long for each."""
-    rows, bad = [], []
-    for name, make in LINKS.items():
+    """So many mutated packets for each link; where the time is too short, each link gets its part of what is left."""
+    rows, bad, until = [], [], time.monotonic() + seconds
+    for k, (name, make) in enumerate(LINKS.items()):
+        share = (until - time.monotonic()) / (len(LINKS) - k)
         link, chance, begin, wrong, sent = make(), random.Random(f"{name} {seed}"), time.monotonic(), 0, 0
-        while sent < packets and time.monotonic() - begin < seconds:
+        while sent < packets and time.monotonic() - begin < share:
             data, problem = _mutant(link, chance), ""
             began = time.monotonic()
             try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import json
 import random
@@ -69,12 +70,13 @@ def _bytes(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
 def _document(form: str) -> Callable[[tuple[bytes, ...], random.Random], bytes]:
     """Mostly a document with a wrong entry, now and then wrong bytes."""
 
+    read = functools.cache(lambda text: tomllib.loads(text.decode()) if form == "toml" else json.loads(text))
+
     def mutate(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
         text = chance.choice(whole)
-        if chance.random() < 0.2:
+        if chance.random() < 0.5:
             return damaged(text, chance, others=whole)
-        document = tomllib.loads(text.decode()) if form == "toml" else json.loads(text)
-        return mutated(document, chance, form=form).encode("utf-8", errors="surrogatepass")
+        return mutated(read(text), chance, form=form).encode("utf-8", errors="surrogatepass")
 
     return mutate
 
@@ -143,17 +145,17 @@ def _matlab(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
 
 # ---- what reads them ---------------------------------------------------------------------------------------------
 def _look(path: Path, **how: Any) -> None:
-    """Reads it; a part of them as `swash inspect` does, a part goes on: conditioned, saved, loaded."""
+    """Reads it; some as `swash inspect` does, some go on (conditioned, saved, loaded): a hundred times as long."""
     from swashplate.cli.inspect import inspect
 
-    lot = zlib.crc32(path.read_bytes()) % 16 if path.is_file() else 0
-    if how or lot < 4:
+    lot = zlib.crc32(path.read_bytes()) % 64 if path.is_file() else 0
+    if lot < 4 and not how:
         with contextlib.redirect_stdout(io.StringIO()):
             inspect(str(path), **how)
-    elif lot == 4:
-        _go_on(sp.read(path))
-    elif lot < 14 or not is_bench(path):
-        sp.read(path)
+    elif lot < 48 or not is_bench(path):
+        flight = sp.read(path, **how)
+        if lot == 4:
+            _go_on(flight)
     else:
         read_bench(path)
 
@@ -224,7 +226,7 @@ def _use_responses(path: Path) -> None:
 
 
 def _blackbox() -> tuple[bytes, ...]:
-    k = np.arange(150)
+    k = np.arange(60)
     moving = {"gyroADC[0]": (100 * np.sin(k / 9)).astype(int), "rcCommand[0]": (50 * np.cos(k / 9)).astype(int)}
     return (made_blackbox_logs.rotorflight(moving), made_blackbox_logs.rotorflight(moving, interval=32) * 2)
 
@@ -373,13 +375,13 @@ def _saved_mat(compressed: bool) -> bytes:
 
 
 TARGETS: Mapping[str, Callable[[], Target]] = {
-    "ArduPilot log": _logs(lambda: (made_autopilot_logs.dataflash(_rows(300)),), ".bin"),
-    "ArduPilot log, text": _logs(lambda: (made_autopilot_logs.dataflash_text(_rows(300)).encode(),), ".log"),
+    "ArduPilot log": _logs(lambda: (made_autopilot_logs.dataflash(_rows(120)),), ".bin"),
+    "ArduPilot log, text": _logs(lambda: (made_autopilot_logs.dataflash_text(_rows(120)).encode(),), ".log"),
     "PX4 log, old form": _logs(
-        lambda: (made_autopilot_logs.dataflash(made_autopilot_logs.px4_rows(30), made_autopilot_logs.PX4LOG),),
+        lambda: (made_autopilot_logs.dataflash(made_autopilot_logs.px4_rows(20), made_autopilot_logs.PX4LOG),),
         ".px4log",
     ),
-    "PX4 ULog": _logs(lambda: (made_autopilot_logs.ulog(40), made_autopilot_logs.ulog(40, dropout=True)), ".ulg"),
+    "PX4 ULog": _logs(lambda: (made_autopilot_logs.ulog(15), made_autopilot_logs.ulog(15, dropout=True)), ".ulg"),
     "Blackbox log": _logs(_blackbox, ".bbl"),
     "ROS bag, first form": _logs(lambda: _bags(1), ".bag"),
     "ROS bag, second form": lambda: Target("", _bags(2), _bytes, _look_at_bag),

@@ -64,7 +64,43 @@ def _claimed_by(path: Path, item: h5py.h5d.DatasetID, name: str) -> int:
     for k in range(made.get_nfilters()):
         if made.get_filter(k)[0] not in _OWN_FILTERS:
             raise _refused(path, name, "it is packed by a plugin")
+    _check_scales(path, item, name)
     return int(np.prod(item.shape or (), dtype=object)) * int(item.dtype.itemsize)
+
+
+def _check_scales(path: Path, item: h5py.h5d.DatasetID, name: str) -> None:
+    """HDF5 1.14 reads what says which axis is along which as if it were of the right type: with another one it writes
+    beyond its memory, and the process dies then or later."""
+    for attribute, right in _SCALES.items():
+        if not h5py.h5a.exists(item, attribute):
+            continue
+        found = h5py.h5a.open(item, attribute)
+        if not right(found.get_type()) or (attribute == b"DIMENSION_LIST" and found.shape != (item.rank,)):
+            raise _refused(path, f"{name}/{attribute.decode()}", "it is not of the type that HDF5 expects")
+
+
+def _lists_references(kind: h5py.h5t.TypeID) -> bool:
+    return isinstance(kind, h5py.h5t.TypeVlenID) and isinstance(kind.get_super(), h5py.h5t.TypeReferenceID)
+
+
+def _pairs_references(kind: h5py.h5t.TypeID) -> bool:
+    """Whether it is a reference and the number of an axis."""
+    if not isinstance(kind, h5py.h5t.TypeCompoundID) or kind.get_nmembers() != 2:
+        return False
+    first, second = kind.get_member_type(0), kind.get_member_type(1)
+    return isinstance(first, h5py.h5t.TypeReferenceID) and isinstance(second, h5py.h5t.TypeIntegerID)
+
+
+def _is_text(kind: h5py.h5t.TypeID) -> bool:
+    return isinstance(kind, h5py.h5t.TypeStringID) and not kind.is_variable_str()
+
+
+_SCALES = {
+    b"DIMENSION_LIST": _lists_references,
+    b"REFERENCE_LIST": _pairs_references,
+    b"CLASS": _is_text,
+    b"NAME": _is_text,
+}
 
 
 def _refused(path: Path, name: str, what: str) -> FlightError:

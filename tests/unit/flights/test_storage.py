@@ -198,3 +198,16 @@ def test_a_stream_without_time_is_refused(tmp_path: Path) -> None:
         file["stream_0/time"][1] = np.nan
     with pytest.raises(FlightError, match="motion/time: the times do not increase"):
         read(path)
+
+
+@pytest.mark.parametrize("odd", [np.arange(40.0), np.array([["a"]], "S3"), 7], ids=["numbers", "words", "one"])
+def test_a_list_of_axes_of_another_type_is_refused_before_hdf5_reads_it(odd: object, tmp_path: Path) -> None:
+    """HDF5 1.14 writes beyond its memory there: the process ends, at once or later."""
+    path = tmp_path / "a.nc"
+    t = np.arange(5) / 10.0
+    Flight({"log": stream(t, {"p": t})}, Provenance(source="a test", reader="tests", reader_version="1")).save(path)
+    with h5py.File(path, "r+") as file:
+        place = next(item for item in file["stream_0"].values() if "DIMENSION_LIST" in item.attrs)
+        place.attrs["DIMENSION_LIST"] = odd
+    with pytest.raises(FlightError, match="DIMENSION_LIST: it is not of the type"):
+        Flight.load(path)

@@ -287,6 +287,8 @@ def test_a_card_out_of_order_is_refused(stitched: StitchedVehicle) -> None:
         from_card(card.with_values({"trim_u_1": 30.0}))
     with pytest.raises(CardError, match="expected two or more"):
         from_card(replace(card, options={**card.options, "points": 1}))
+    with pytest.raises(CardError, match="has 1 entries, expected"):
+        from_card(replace(card, options={**card.options, "high": [1.0]}))
     lost = {name: p for name, p in card.parameters.items() if name != "gradient_theta_2"}
     with pytest.raises(CardError, match="gradient_theta_2: is missing"):
         from_card(replace(card, parameters=lost))
