@@ -148,9 +148,7 @@ def test_a_log_that_no_fit_has_seen_refutes_wrong_models_and_not_the_identified_
         *({name: factor * values[name]} for name in values for factor in (0.5, 1.5)),
     ]
     verdicts = {str(change): verify(fit.solution.with_values(change), unseen).verdict for change in wrong}
-    # Half more Lb moves the pitch rate by 1.0 times what is allowed there: these 3 s of a roll sweep cannot tell.
-    borderline = verdicts.pop(str({"Lb": 1.5 * values["Lb"]}))
-    assert borderline == "not refuted"
+    # Half more Lb hides in every single band; what all of them ask of this parameter together does not.
     assert set(verdicts.values()) == {"refuted"}, verdicts
 
 

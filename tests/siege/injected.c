@@ -54,7 +54,7 @@ static void mark(int fd, int yes) { if (fd >= 0 && fd < (int)sizeof ours) ours[f
 static int hit(int space) {
     long now = __sync_add_and_fetch(&calls, 1);
     if ((mode == KILL || (mode == HALF && !space)) && now == stop) kill(getpid(), SIGKILL);
-    if (mode == FAIL && now >= stop && (space || number != ENOSPC)) { errno = number; return 1; }
+    if (mode == FAIL && now >= stop && (space || (number != ENOSPC && number != EDQUOT))) { errno = number; return 1; }
     return 0;
 }
 static int half(void) { return mode == HALF && calls == stop; }

@@ -152,7 +152,7 @@ def _thinned(time: Array, table: Array) -> tuple[Array, Array]:
     A block that spans a gap is left out. A slower recording is returned as it is.
     """
     step = float(np.median(np.diff(time))) if time.size > 1 else np.inf
-    k = int(1.0 / (step * _FASTEST)) if step > 0.0 else 1
+    k = int(min(1.0 / (step * _FASTEST), time.size + 1)) if step > 0.0 else 1
     if k < 2 or time.size < k:
         return time, table
     blocks = time.size // k

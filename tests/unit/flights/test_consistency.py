@@ -187,3 +187,10 @@ def test_a_fast_log_is_averaged_down_and_judged_alike(monkeypatch: pytest.Monkey
     assert 60 * 50 < rows[0] + 60 < 60 * 100, "between 50 and 100 Hz of a minute"
     (finding,) = consistency(fast_log(sign=-1.0))
     assert (finding.channel, "other sign" in finding.text) == ("p", True)
+
+
+def test_stamps_that_hardly_differ_are_no_reason_to_stop() -> None:
+    """Times of a damaged log: the number of samples in a block would be infinite."""
+    time = np.arange(50) * 5e-324
+    stamps, table = consistency_module._thinned(time, np.ones((50, 3)))
+    assert (stamps.shape, table.shape) == ((50,), (50, 3))

@@ -10,7 +10,7 @@ exactly (Stevens, Lewis and Johnson 2016, eqs 1.3-18 and 1.4-4). Every entry tha
 
 from __future__ import annotations
 
-from collections import namedtuple
+from collections import Counter, namedtuple
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, partial
@@ -94,6 +94,9 @@ def linear(card: Card) -> Vehicle:
             channel="options",
         )
     states, inputs = tuple(card.options["states"]), tuple(card.options["inputs"])
+    twice = sorted(name for name, count in Counter((*states, *inputs)).items() if count > 1)
+    if twice:
+        raise CardError(f"has {', '.join(twice)} more than once.", where=where, channel="options")
     units = dict(zip(states, card.options["state_units"], strict=True))
     grounded = _not_flying(states, units)
     trims = tuple(f"trim_{name}" for name in (*states, *inputs))

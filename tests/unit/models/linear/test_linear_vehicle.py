@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from swashplate.errors import CardError, ControllerError, TrimError
 from swashplate.export.linear import logged_delays, of_vehicle
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.delays import input_delays
+from swashplate.models.linear.card_vehicle import linear
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import parse, structure, to_toml
@@ -111,6 +113,13 @@ def test_limits_are_the_files(model: StateSpaceModel) -> None:
         parse(text.replace("[-0.5, 0.25]", "[1.0]"))
     with pytest.raises(CardError, match="expected a range about the trim"):
         linear_vehicle(parse(text.replace("-0.5, 0.25", "0.5, 1.0")))
+
+
+def test_a_state_that_is_an_input_too_is_refused(model: StateSpaceModel) -> None:
+    card = linear_vehicle(model).card
+    inputs = [card.options["states"][0], *card.options["inputs"][1:]]
+    with pytest.raises(CardError, match="more than once"):
+        linear(replace(card, options={**card.options, "inputs": inputs}))
 
 
 def test_a_model_that_is_not_enough_to_fly_is_named() -> None:
