@@ -33,6 +33,7 @@ from swashplate.simulation.late import steps_late
 from swashplate.simulation.record import check_divergence, simulated_flight
 from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trim import Trim, start_row, surroundings_of_start, trim
+from swashplate.simulation.tumbling import CarriedAttitude, steep, with_angles, with_quaternion
 
 Step = Callable[[Any, Any, Any, Any, Any], tuple[Any, Any]]
 
@@ -97,6 +98,8 @@ def simulate_closed_loop(
 ) -> Flight:
     """Fly a vehicle under a controller, with an excitation added to what the controller commands.
 
+    A flight that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate`.
+
     Args:
         vehicle, start, rate, environment: as in `simulate`; inputs are held over a step.
         controller: see `Controller`.
@@ -138,22 +141,30 @@ def simulate_closed_loop(
     waiting = 1 << (int(late.max()) - 1).bit_length() if late.any() else 0
     longer = shared_length(n)
     first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
-    states, inputs = fly(
-        equations_of(vehicle),
-        controller.step,
-        waiting,
-        x0,
-        jnp.asarray(controller.memory),
-        jnp.asarray(controller.gains),
-        tuple(lengthened(table, longer) for table in (around, wanted, added)),
-        parameter_row(vehicle, surroundings),
-        np.array(vehicle.input_limits).T,
-        late,
-        first,
-        round(every),
-        1.0 / rate,
-    )
-    states, inputs = np.asarray(states)[:n], np.asarray(inputs)[:n]
+
+    def flown(as_carried: CarriedAttitude) -> tuple[Array, Array]:
+        states, inputs = fly(
+            equations_of(as_carried.vehicle),
+            controller.step,
+            waiting,
+            as_carried.see,
+            as_carried.start,
+            as_carried.shown,
+            jnp.asarray(controller.memory),
+            jnp.asarray(controller.gains),
+            tuple(lengthened(table, longer) for table in (around, wanted, added)),
+            parameter_row(vehicle, surroundings),
+            np.array(vehicle.input_limits).T,
+            late,
+            first,
+            round(every),
+            1.0 / rate,
+        )
+        return np.asarray(states)[:n], np.asarray(inputs)[:n]
+
+    states, inputs = flown(with_angles(vehicle, x0))
+    if not vehicle.traits.linear and steep(states):
+        states, inputs = flown(with_quaternion(vehicle, x0))
     time, rows = np.arange(n) / rate, np.concatenate([inputs, around], axis=1)
     details = {"rate": rate, "controller_rate": controller.rate, "gravity": float(surroundings.gravity)}
     flight = simulated_flight(vehicle, time, states, rows, details=details)
@@ -170,7 +181,9 @@ def _flying(
     equations: Equations,
     control: Step,
     waiting: int,
+    see: Callable[[Any, Any], tuple[Any, Any]],
     x0: Float[jax.Array, " states"],
+    shown: Float[jax.Array, " shown"],
     memory: Float[jax.Array, " memory"],
     gains: Float[jax.Array, " gains"],
     tables: tuple[Float[jax.Array, "samples ..."], ...],
@@ -184,11 +197,12 @@ def _flying(
     rates = row_rates(equations, padded=True)
     around, wanted, added = tables
 
-    def sample(carry: tuple[Any, Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        x, memory, command, sent, k = carry
+    def sample(carry: tuple[Any, ...], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+        x, shown, memory, command, sent, k = carry
         surroundings, reference, excitation = now
         acting = _arrived(sent, late) if waiting else jnp.clip(command, limits[0], limits[1])  # until now
-        measured = told(control, equations, x, acting, surroundings, p)
+        seen, shown = see(x, shown)
+        measured = told(control, equations, x, acting, surroundings, p, seen=seen)
         due = k % every == 0
 
         def decided() -> tuple[Any, Any]:
@@ -205,11 +219,13 @@ def _flying(
             inputs = _arrived(sent, late)
         w = jnp.concatenate([inputs, surroundings])
         after = rk4_step(lambda x, w: rates(x, w, p), x, lambda _: w, dt, looped=True)
-        return (after, memory, command, sent, k + 1), (x, inputs)
+        return (after, shown, memory, command, sent, k + 1), (seen, inputs)
 
     nothing = jnp.zeros(added.shape[1])
     sent = jnp.broadcast_to(jnp.asarray(first), (waiting + 1, added.shape[1]))
-    _, record = jax.lax.scan(sample, (jnp.asarray(x0), memory, nothing, sent, 0), (around, wanted, added))
+    _, record = jax.lax.scan(
+        sample, (jnp.asarray(x0), jnp.asarray(shown), memory, nothing, sent, 0), (around, wanted, added)
+    )
     return record  # type: ignore[no-any-return]
 
 
@@ -218,9 +234,9 @@ def _arrived(sent: Float[jax.Array, "commands inputs"], late: Int[jax.Array, " i
     return jnp.take_along_axis(sent, late[None, :], axis=0)[0]
 
 
-_fly = jax.jit(_flying, static_argnums=(0, 1, 2))
+_fly = jax.jit(_flying, static_argnums=(0, 1, 2, 3))
 # An observer's derivatives take minutes to compile as XLA usually does it.
-_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2), compiler_options=QUICK_TO_COMPILE)
+_fly_quickly_compiled = jax.jit(_flying, static_argnums=(0, 1, 2, 3), compiler_options=QUICK_TO_COMPILE)
 
 
 def told(
@@ -230,11 +246,17 @@ def told(
     inputs: Float[jax.Array, " inputs"],
     surroundings: Float[jax.Array, " surroundings"],
     p: Float[jax.Array, " parameters"],
+    *,
+    seen: Float[jax.Array, " seen"] | None = None,
 ) -> Any:
-    """What a controller is given as `measured`: the state, the specific force if it feels it, the voltage."""
+    """What a controller is given as `measured`: the state (as `seen`, with Euler angles, where `x` has others), the
+    specific force if it feels it, the voltage."""
+    shown = x if seen is None else seen
     if not getattr(control, "feels", False):
-        return jnp.concatenate([x, surroundings[-1:]])
-    return jnp.concatenate([x, row_force(equations)(x, jnp.concatenate([inputs, surroundings]), p), surroundings[-1:]])
+        return jnp.concatenate([shown, surroundings[-1:]])
+    return jnp.concatenate(
+        [shown, row_force(equations)(x, jnp.concatenate([inputs, surroundings]), p), surroundings[-1:]]
+    )
 
 
 def _table(names: tuple[str, ...], given: Mapping[str, ArrayLike], n: int, default: list[Any]) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -17,6 +17,7 @@ from swashplate.arrays import Array
 from swashplate.errors import CardError, SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
+from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.batch import Batch
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened, shared_length
@@ -34,11 +35,15 @@ from swashplate.simulation.runge_kutta import rk4_step
 from swashplate.simulation.trigonometry import vector_backend
 from swashplate.simulation.trim import Trim, surroundings_of_start
 from swashplate.simulation.trim import trim as find_trim
+from swashplate.simulation.tumbling import CarriedAttitude, steep_at, with_angles, with_quaternion
 
 LANES = 8
 """Vehicles that one compiled program flies side by side, or a whole multiple where the controller's step says so
 (`block`): whatever their number, few programs fly them. A vehicle costs as much as in blocks of 256 (raptor50 under
 ArduPilot's law 6.4 and 6.9 ms for 4 s, the CoaX under its autopilot 3.7 and 3.4 ms): its loop fits into a cache."""
+
+Carry = Callable[[Vehicle, Array], CarriedAttitude]
+_THETA = RigidBody._fields.index("theta")
 
 
 def simulate_closed_loops(
@@ -87,6 +92,7 @@ def simulate_closed_loops(
 
     Returns:
         States, inputs and surroundings at the kept samples. A vehicle that is lost has numbers that are not finite.
+        One that pitches beyond 80 degrees is integrated with a quaternion, as by `simulate`.
     """
     enable_double_precision()
     substeps = rate / controller.rate
@@ -129,34 +135,45 @@ def simulate_closed_loops(
 
     asked = lengthened(wanted, flown_for), lengthened(added, flown_for)
 
-    def block(first: int) -> tuple[Array, Array]:
-        part = np.minimum(first + np.arange(count), size - 1)  # of one size all, so that one program flies them
+    def block(carry: Carry, members: NDArray[np.int64], first: int) -> tuple[Array, ...]:
         key = jax.random.fold_in(jax.random.key(seed), first)
         fly = _fly_many_quickly_compiled if getattr(controller.step, "feels", False) else _fly_many
+        as_carried = carry(vehicle, np.repeat(begin.state[:, None], count, axis=1))
         found = fly(
-            equations_of(vehicle),
+            equations_of(as_carried.vehicle),
             controller.step,
             round(substeps),
             keep,
             bool(np.any(sigma)),
             waiting,
-            np.repeat(begin.state[:, None], count, axis=1),
+            as_carried.see,
+            as_carried.start,
+            as_carried.shown,
             _memories(controller, seed + first + np.arange(count)),
             np.asarray(controller.gains),
-            lengthened(around[:, :, part], flown_for),
+            lengthened(around[:, :, members], flown_for),
             *asked,
-            p[:, part],
+            p[:, members],
             told,
             sigma[:, None],
-            late[:, part],
+            late[:, members],
             begin.inputs,
             key,
             1.0 / rate,
         )
-        return np.asarray(found[0])[: samples // keep], np.asarray(found[1])[: samples // keep]
+        return tuple(np.asarray(part)[: samples // keep] for part in found)
+
+    def flown_block(first: int) -> tuple[Array, ...]:
+        members = np.minimum(first + np.arange(count), size - 1)  # of one size all, so that one program flies them
+        states, inputs, pitched = block(with_angles, members, first)
+        lost = steep_at(pitched) & ~vehicle.traits.linear
+        if lost.any():
+            again = block(with_quaternion, members, first)
+            states, inputs = (np.where(lost, new, old) for new, old in zip(again, (states, inputs), strict=False))
+        return states, inputs
 
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        parts = list(threads.map(block, range(0, size, count)))
+        parts = list(threads.map(flown_block, range(0, size, count)))
     flown, inputs = (np.concatenate([part[i] for part in parts], axis=2)[:, :, :size] for i in (0, 1))
     kept = np.broadcast_to(around[::keep], (inputs.shape[0], len(SURROUNDINGS), size))
     rows = np.concatenate([inputs, kept], axis=1)
@@ -202,7 +219,9 @@ def _flying_many(
     keep: int,
     noisy: bool,
     waiting: int,
+    see: Callable[[Any, Any], tuple[Any, Any]],
     x0: Float[jax.Array, "states vehicles"],
+    shown: Float[jax.Array, "shown vehicles"],
     memory: Float[jax.Array, "memory vehicles"],
     gains: Float[jax.Array, " gains"],
     around: Float[jax.Array, "samples surroundings ..."],
@@ -235,12 +254,13 @@ def _flying_many(
         ago = jnp.clip(-((j - late) // substeps), 0, waiting)
         return jnp.take_along_axis(sent, ago[None], axis=0)[0]
 
-    def sample(carry: tuple[Any, Any, Any, Any], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        x, memory, sent, k = carry
+    def sample(carry: tuple[Any, ...], now: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+        x, shown, memory, sent, k = carry
         surroundings, reference, excited = now
-        measured = x
+        seen, shown = see(x, shown)
+        measured = seen
         if noisy:
-            measured = x + sigma * jax.random.normal(jax.random.fold_in(key, k), x.shape)
+            measured = seen + sigma * jax.random.normal(jax.random.fold_in(key, k), seen.shape)
         acting = arrived(sent, substeps - 1) if waiting else sent[0]  # until now
         felt = [feeling(x, jnp.concatenate([acting, surroundings]), p)] if feels else []
         measured = jnp.concatenate([measured, *felt, surroundings[voltage][None]])
@@ -250,24 +270,26 @@ def _flying_many(
         if not waiting:
             w = jnp.concatenate([inputs, surroundings])
             after, _ = jax.lax.scan(lambda x, _: (flying(x, w, p), None), x, None, length=substeps)
-            return (after, memory, inputs[None], k + 1), (x, inputs)
+            return (after, shown, memory, inputs[None], k + 1), (seen, inputs)
         sent = jnp.concatenate([inputs[None], sent[:-1]])
 
         def step(x: Float[jax.Array, "states vehicles"], j: Int[jax.Array, ""]) -> tuple[Any, None]:
             return flying(x, jnp.concatenate([arrived(sent, j), surroundings]), p), None
 
         after, _ = jax.lax.scan(step, x, jnp.arange(substeps))
-        return (after, memory, sent, k + 1), (x, arrived(sent, 0))
+        return (after, shown, memory, sent, k + 1), (seen, arrived(sent, 0))
 
     def kept(carry: Any, now: Any) -> Any:
         carry, (x, inputs) = jax.lax.scan(sample, carry, now)
-        return carry, (x[0], inputs[0])
+        return carry, (x[0], inputs[0], jnp.nanmax(jnp.abs(x[:, _THETA]), axis=0))
 
     tables = tuple(part.reshape(-1, keep, *part.shape[1:]) for part in (around, wanted, added))
     sent = jnp.broadcast_to(first[None, :, None], (waiting + 1, first.shape[0], x0.shape[1]))
-    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(memory), sent, 0), tables)
+    _, record = jax.lax.scan(kept, (jnp.asarray(x0), jnp.asarray(shown), jnp.asarray(memory), sent, 0), tables)
     return record  # type: ignore[no-any-return]
 
 
-_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5))
-_fly_many_quickly_compiled = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5), compiler_options=QUICK_TO_COMPILE)
+_fly_many = jax.jit(_flying_many, static_argnums=(0, 1, 2, 3, 4, 5, 6))
+_fly_many_quickly_compiled = jax.jit(
+    _flying_many, static_argnums=(0, 1, 2, 3, 4, 5, 6), compiler_options=QUICK_TO_COMPILE
+)

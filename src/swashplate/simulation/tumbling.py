@@ -12,11 +12,14 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.backend import Backend, FloatBackend, Scalar
+from swashplate.physics.backend import Backend, FloatBackend, JaxBackend, Scalar
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector
 from swashplate.physics.quaternion import Quaternion, euler_of, quaternion_of, quaternion_rates
@@ -124,8 +127,12 @@ def counted_on(angle: float, before: float) -> float:
 def steep(states: Array) -> bool:
     """Whether rows of states with Euler angles, shape (n, n_states), come so near to the vertical that these lose
     digits: beyond 80 degrees the rates of roll and yaw are six times those of the body and more."""
-    pitch = np.abs(states[:, _PHI + 1])
-    return bool(np.any(pitch[np.isfinite(pitch)] > _STEEP))
+    return bool(np.any(steep_at(states[:, _PHI + 1])))
+
+
+def steep_at(pitch: Array) -> Any:
+    """The same of series of pitch [rad], shape (n, ...), one by one of what comes behind; not finite: not."""
+    return np.any(np.where(np.isfinite(pitch), np.abs(pitch), 0.0) > _STEEP, axis=0)
 
 
 def euler_rows(rows: Array, before: Array) -> Array:
@@ -135,3 +142,51 @@ def euler_rows(rows: Array, before: Array) -> Array:
         before = to_euler(row, before)
         made.append(before)
     return np.array(made)
+
+
+# ---- in closed loops -----------------------------------------------------------------------------------------------
+Rows = Float[jax.Array, "rows ..."]
+"""A row, or columns of several vehicles."""
+
+
+class CarriedAttitude(NamedTuple):
+    """How a compiled loop carries a vehicle whose controller is told roll, pitch and yaw.
+
+    Attributes:
+        vehicle: whose equations are flown.
+        start: its state row or columns at the start.
+        shown: what `see` needs of the sample before; nothing, or roll, pitch and yaw.
+        see: from a row or columns of states and `shown` to those of the vehicle with Euler angles, and `shown` of now.
+    """
+
+    vehicle: Vehicle
+    start: Array
+    shown: Array
+    see: Callable[[Any, Any], tuple[Any, Any]]
+
+
+def with_angles(vehicle: Vehicle, start: Array) -> CarriedAttitude:
+    """Euler angles, as they are: for flights that stay clear of the vertical."""
+    return CarriedAttitude(vehicle, start, np.zeros((0, *start.shape[1:])), _as_it_is)
+
+
+def with_quaternion(vehicle: Vehicle, start: Array) -> CarriedAttitude:
+    """A quaternion, for flights that do not; `start` is a row of the vehicle, or equal columns (n_states, n)."""
+    row = from_euler(start if start.ndim == 1 else start[:, 0])
+    begin = row if start.ndim == 1 else np.repeat(row[:, None], start.shape[1], axis=1)
+    return CarriedAttitude(tumbling(vehicle), begin, start[_PHI:_P], _as_euler)
+
+
+def _as_it_is(x: Rows, shown: Rows) -> tuple[Any, Any]:
+    return x, shown
+
+
+def _as_euler(x: Rows, shown: Rows) -> tuple[Any, Any]:
+    found = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
+    turn = 2.0 * jnp.pi
+    roll, yaw = (
+        angle + turn * jnp.round((before - angle) / turn)
+        for angle, before in ((found.phi, shown[0]), (found.psi, shown[2]))
+    )
+    angles = jnp.stack([roll, found.theta, yaw])
+    return jnp.concatenate([x[:_PHI], angles, x[_PHI + 4 :]]), angles

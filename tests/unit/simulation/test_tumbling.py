@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,16 @@ import swashplate as sp
 from flown_by_hand import fly, fresh
 from heli_autopilot import servo_packet
 from link_bench import bench
+from swashplate.control.laws.hold import hover_hold
 from swashplate.links.live.world import World
 from swashplate.models.catalogue import vehicle
 from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, euler_rates
 from swashplate.physics.quaternion import euler_of, quaternion_of, quaternion_rates
-from swashplate.simulation import integrate
+from swashplate.simulation import closed_loop, integrate
+from swashplate.simulation.closed_loop import simulate_closed_loop
+from swashplate.simulation.closed_loop_batch import simulate_closed_loops
 from swashplate.simulation.stepping import Stepping
 from swashplate.simulation.tumbling import from_euler, to_euler
 
@@ -141,3 +145,49 @@ def test_a_simulated_flight_through_the_vertical_is_what_its_gyros_add_up_to(mon
     assert away() < 0.05
     monkeypatch.setattr(integrate, "steep", lambda states: False)
     assert away() > 5.0
+
+
+def _thrown(rate: float) -> sp.Flight:
+    """The CoaX, thrown nose up over the top while its controller wants it to hover."""
+    coax = sp.vehicle("coax")
+    trim = sp.trim(coax)
+    start = {**trim.states(), "theta": 1.3, "phi": 0.05, "q": 12.0, "u": 1.0}
+    return simulate_closed_loop(coax, hover_hold(coax, trim), duration=0.4, start=start, rate=rate)
+
+
+def _apart(one: sp.Flight, other: sp.Flight, every: int) -> float:
+    """The largest angle between two flights' attitudes [deg]."""
+    angles = ("psi", "theta", "phi")
+    first, second = (
+        Rotation.from_euler("ZYX", np.stack([f.values(n)[::f_every] for n in angles], axis=1))
+        for f, f_every in ((one, 1), (other, every))
+    )
+    return float(np.degrees((first.inv() * second).magnitude()).max())
+
+
+def test_closed_loops_fly_through_the_vertical(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, fine = _thrown(100.0), _thrown(1600.0)
+    assert np.abs(usual.values("theta")).max() > np.radians(80.0)
+    right = _apart(usual, fine, 16)
+    assert right < 0.1
+    monkeypatch.setattr(closed_loop, "steep", lambda states: False)
+    assert _apart(_thrown(100.0), fine, 16) > 10.0 * right
+
+
+@pytest.mark.proof
+def test_a_batch_flies_through_the_vertical_as_one_does_and_leaves_the_others_alone() -> None:
+    coax = sp.vehicle("coax")
+    trim = sp.trim(coax)
+    over = replace(trim, state=np.array([{**trim.states(), "theta": 1.2, "q": 7.0}[n] for n in coax.state_names]))
+    wind = {"wind_north": np.array([25.0, -25.0])[None, :] * np.ones((40, 1))}
+    hold = hover_hold(coax, trim)
+    many = simulate_closed_loops(coax, hold, duration=0.6, size=2, start=over, rate=500.0, wind=wind)
+    for k, north in enumerate((25.0, -25.0)):
+        one = simulate_closed_loop(
+            coax, hold, duration=0.6, start=over, rate=500.0, wind={"wind_north": np.full(301, north)}
+        )
+        steep = np.abs(one.values("theta")).max() > np.radians(80.0)
+        assert steep == (north < 0.0)
+        for name in ("theta", "phi", "psi", "x", "q"):
+            theirs = many[name][:, k]
+            np.testing.assert_allclose(theirs, one.values(name)[:: round(500.0 / hold.rate)][: len(theirs)], atol=1e-9)
