@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tempfile
 from typing import Any
 
 FOOT = 0.3048
@@ -27,7 +28,8 @@ def fly(start: dict[str, float], *, seconds: float, step: float = 0.002) -> dict
     """What JSBSim says at the start and at the end of a flight from `start` (its initial conditions, in feet and
     degrees)."""
     command = [sys.executable, __file__, json.dumps({"start": start, "seconds": seconds, "step": step})]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    with tempfile.TemporaryDirectory() as folder:  # JSBSim leaves a file where it runs
+        said = subprocess.run(command, capture_output=True, text=True, check=True, cwd=folder).stdout
     found: dict[str, Any] = json.loads(said.splitlines()[-1])
     return found
 

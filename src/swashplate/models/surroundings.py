@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+from swashplate.models.card import Card
 from swashplate.physics.atmosphere import SEA_LEVEL_DENSITY
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
-
-if TYPE_CHECKING:
-    from swashplate.models.vehicle import Vehicle
 
 _NO_BATTERY = 12.22
 """V, carried along by vehicles whose equations have no battery; it changes nothing."""
 
 
-def environment_of(vehicle: Vehicle, environment: Environment | None = None, *, parameters: Any = None) -> Environment:
+class _Carded(Protocol):
+    """A vehicle, as far as its surroundings go."""
+
+    @property
+    def card(self) -> Card: ...
+    @property
+    def parameter_names(self) -> tuple[str, ...]: ...
+
+
+def environment_of(vehicle: _Carded, environment: Environment | None = None, *, parameters: Any = None) -> Environment:
     """The surroundings of a vehicle, complete: what `environment` leaves open is the vehicle's own.
 
     Args:
@@ -34,7 +41,7 @@ def environment_of(vehicle: Vehicle, environment: Environment | None = None, *, 
     return given
 
 
-def _own(vehicle: Vehicle, name: str, usual: float, parameters: Any) -> Any:
+def _own(vehicle: _Carded, name: str, usual: float, parameters: Any) -> Any:
     if name not in vehicle.parameter_names:
         return usual
     return vehicle.card.values()[name] if parameters is None else getattr(parameters, name)

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import diffrax
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import ArrayLike, Float, Real
 
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
@@ -51,7 +53,7 @@ def simulate_adaptive(
     rates, p = row_rates(equations_of(vehicle), padded=False), jnp.asarray(parameter_row(vehicle, surroundings))
     stamps, table = jnp.asarray(time), jnp.asarray(acting)
 
-    def field(t: Any, x: Any, _: Any) -> Any:
+    def field(t: Real[ArrayLike, ""], x: Float[jax.Array, " states"], _: None) -> Any:
         i = jnp.clip(jnp.searchsorted(stamps, t, side="right") - 1, 0, stamps.size - 2)
         fraction = (t - stamps[i]) * rate if interpolation == "linear" else 0.0
         return rates(x, table[i] + fraction * (table[i + 1] - table[i]), p)

@@ -8,7 +8,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
+from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import COLUMNS, CONTROLS, MOTIONS, DerivativeTable
 from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
@@ -65,10 +67,10 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _slopes(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+def _slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
     vehicle = equations.vehicle
 
-    def acting(x: Any, w: Any) -> Any:
+    def acting(x: Float[jax.Array, " states"], w: Float[jax.Array, " inputs"]) -> Any:
         inputs, parameters, environment = unpack_rows(equations, w, p)
         state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
         commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))

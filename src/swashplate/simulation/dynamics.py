@@ -46,7 +46,9 @@ def rates_function(vehicle: Vehicle) -> Rates:
     """`f(x, u, parameters, environment) -> dx/dt` on flat rows of shape (n_states,) and (n_inputs,)."""
     xp = jax_backend()
 
-    def rates(x: Float[jax.Array, "states ..."], u: Any, parameters: Any, environment: Environment) -> Any:
+    def rates(
+        x: Float[jax.Array, "states ..."], u: Float[jax.Array, "inputs ..."], parameters: Any, environment: Environment
+    ) -> Any:
         return jnp.stack([jnp.asarray(rate) for rate in vehicle.rates(x, u, parameters, environment, xp)])
 
     return rates
@@ -71,11 +73,11 @@ def equations_of(vehicle: Vehicle) -> Equations:
     return Equations((vehicle.name, vehicle.state_names, vehicle.input_names, *functions), vehicle)
 
 
-def _identity(function: Any) -> Hashable:
+def _identity(function: object) -> Hashable:
     if isinstance(function, partial):  # two of the same function and numbers are the same equations
         keywords = ((name, _identity(value)) for name, value in sorted(function.keywords.items()))
         return (_identity(function.func), tuple(map(_identity, function.args)), tuple(keywords))
-    return function  # type: ignore[no-any-return]
+    return function
 
 
 def parameter_row(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:

@@ -225,5 +225,5 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _jacobians(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+def _jacobians(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Any, Any]:
     return jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))(x, w, p)  # type: ignore[no-any-return]

@@ -188,6 +188,6 @@ def specific_forces(flight: Flight, vehicle: Vehicle, *, environment: Environmen
 
 
 @partial(jax.jit, static_argnums=0)
-def _specific_forces(equations: Equations, states: Any, rows: Any, p: Any) -> Any:
+def _specific_forces(equations: Equations, states: Array, rows: Array, p: Array) -> Any:
     felt = row_force(equations)
     return jax.vmap(lambda x, w: felt(x, w, p))(states, rows)

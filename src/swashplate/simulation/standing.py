@@ -115,7 +115,7 @@ def at_rest(vehicle: Vehicle, environment: Environment) -> NDArray[np.float64]:
 
 
 def _derivatives(
-    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend
+    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Any, env: Environment, xp: Backend
 ) -> Any:
     force, moment, bending = skid_loads(state.body, skids, xp, state.grip)
     inertia = Inertia(par.mass, par.inertia_xx, par.inertia_yy, par.inertia_zz, getattr(par, "inertia_xz", None))
@@ -128,7 +128,7 @@ def _derivatives(
 
 
 def _specific_force(
-    free: Callable[..., Any], skids: Skids, state: Any, inputs: Any, par: Any, env: Environment, xp: Backend
+    free: Callable[..., Any], skids: Skids, state: Standing, inputs: object, par: Any, env: Environment, xp: Backend
 ) -> Vector:
     force, _, _ = skid_loads(state.body, skids, xp, state.grip)
     felt: Vector = free(_own(state), inputs, par, env, xp)

@@ -11,7 +11,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from swashplate.physics.backend import JaxBackend
 
@@ -52,7 +54,7 @@ KERNELS = {
 }
 
 
-def _rotated(x: Any, quarter_turns: int) -> Any:
+def _rotated(x: Float[jax.Array, ...], quarter_turns: int) -> Any:
     """sin(x + quarter_turns pi/2)."""
     x = jnp.asarray(x)
     kernel = KERNELS[str(x.dtype)]
@@ -67,22 +69,22 @@ def _rotated(x: Any, quarter_turns: int) -> Any:
     return jnp.where(quadrant & 2, -value, value)
 
 
-def _horner(coefficients: tuple[float, ...], z: Any) -> Any:
+def _horner(coefficients: tuple[float, ...], z: Float[jax.Array, ...]) -> Any:
     total: Any = coefficients[0]
     for coefficient in coefficients[1:]:
         total = total * z + coefficient
     return total
 
 
-def sin(x: Any) -> Any:
+def sin(x: Float[jax.Array, ...]) -> Any:
     return _rotated(x, 0)
 
 
-def cos(x: Any) -> Any:
+def cos(x: Float[jax.Array, ...]) -> Any:
     return _rotated(x, 1)
 
 
-def tan(x: Any) -> Any:
+def tan(x: Float[jax.Array, ...]) -> Any:
     return sin(x) / cos(x)
 
 

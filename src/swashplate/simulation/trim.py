@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -34,6 +34,14 @@ from swashplate.simulation.dynamics import (
 )
 
 _BODY = len(RigidBody._fields)
+
+
+class Residual(Protocol):
+    """What is left of the rates of change at the unknowns `z`, and its slope, at a share of the course."""
+
+    def __call__(self, z: Array, *, share: float = 1.0) -> tuple[Array, Array]: ...
+
+
 _ACCELERATIONS = slice(3, 6)
 _ANGULAR_ACCELERATIONS = slice(9, 12)
 _STEPS = 60
@@ -168,7 +176,7 @@ def trim(
             hint=f"Give the battery's voltage; the card's is {nominal:g} V.",
         )
 
-    def residual(z: Array, share: float = 1.0) -> tuple[Array, Array]:
+    def residual(z: Array, *, share: float = 1.0) -> tuple[Array, Array]:
         value, slope = _unrest(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
         return np.asarray(value), np.asarray(slope)
 
@@ -274,7 +282,7 @@ def _residual_names(vehicle: Vehicle) -> tuple[str, ...]:
     return (*names[_ACCELERATIONS], *names[_ANGULAR_ACCELERATIONS], *names[_BODY:])
 
 
-def _first_guess(vehicle: Vehicle, residual: Any) -> Array:
+def _first_guess(vehicle: Vehicle, residual: Residual) -> Array:
     """Level, inputs in the middle of their ranges, and the inner states where these inputs hold them."""
     held = dict(vehicle.trim_held)
     limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
@@ -296,7 +304,7 @@ def _unknowns(vehicle: Vehicle, known: Trim) -> Array:
     return np.array([*attitude, *inputs, *known.state[_BODY:]])
 
 
-def _newton(z: Array, residual: Any) -> tuple[Array, Array]:
+def _newton(z: Array, residual: Residual) -> tuple[Array, Array]:
     """Newton's method; a step is halved until the residual shrinks."""
     value, slope = residual(z)
     for _ in range(_STEPS):
@@ -317,7 +325,7 @@ def _at_rest(value: Array) -> bool:
     return bool(np.all(np.isfinite(value)) and np.max(np.abs(value)) < _TOLERANCE)
 
 
-def _on_the_way(vehicle: Vehicle, residual: Any) -> tuple[Array, Array, float]:
+def _on_the_way(vehicle: Vehicle, residual: Residual) -> tuple[Array, Array, float]:
     """The last equilibrium on the way from no motion to the wanted one, found in steps, and its share of the way."""
     z, value = _newton(_first_guess(vehicle, partial(residual, share=0.0)), partial(residual, share=0.0))
     share, step = 0.0, 0.25

@@ -78,9 +78,9 @@ def tumbling(vehicle: Vehicle) -> Vehicle:
 
 def _derivatives(
     free: Callable[..., Any],
-    state: Any,
-    inputs: Any,
-    par: Any,
+    state: Tumbling,
+    inputs: object,
+    par: object,
     env: Environment,
     xp: Backend,
 ) -> Any:

@@ -11,10 +11,9 @@ import tempfile
 import threading
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import metadata
+from importlib import metadata, resources
 from pathlib import Path
 
-import swashplate
 from swashplate.errors import CampaignError
 from swashplate.extras import version_of
 
@@ -58,7 +57,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 def _source() -> str:
     """SHA-256 of the package's equations and cards, shortened: a changed file is another program."""
-    home, digest = Path(swashplate.__file__).parent, hashlib.sha256()
+    home, digest = Path(str(resources.files("swashplate"))), hashlib.sha256()
     for place in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".toml", ".c", ".h")):
         digest.update(str(place.relative_to(home)).encode() + b"\0" + place.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

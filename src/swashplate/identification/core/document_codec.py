@@ -18,6 +18,7 @@ from typing import Any, Union
 
 import numpy as np
 
+from swashplate.arrays import Array, Complex
 from swashplate.errors import DocumentError
 from swashplate.registry import Registry
 
@@ -45,7 +46,7 @@ _MOST = 200 << 20
 _INFINITE = {"inf": math.inf, "-inf": -math.inf}
 
 
-def encode(value: Any) -> Any:
+def encode(value: object) -> Any:
     """A value as JSON types."""
     if value is None or isinstance(value, str | bool | int):
         return value
@@ -68,7 +69,7 @@ def encode(value: Any) -> Any:
     return str(value)
 
 
-def _array(values: Any) -> Any:
+def _array(values: Array | Complex) -> Any:
     if np.iscomplexobj(values):
         return {"real": _array(values.real), "imag": _array(values.imag)}
     values = np.asarray(values, dtype="<f8")
@@ -78,7 +79,7 @@ def _array(values: Any) -> Any:
     return {"shape": list(values.shape), "packed": [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]}
 
 
-def decode(wanted: Any, value: Any, *, where: str, at: str = "") -> Any:
+def decode(wanted: Any, value: object, *, where: str, at: str = "") -> Any:
     """What `encode` made of an object of that type.
 
     Args:
@@ -124,16 +125,17 @@ def decode(wanted: Any, value: Any, *, where: str, at: str = "") -> Any:
     return _decoded_object(wanted, value, where, at)
 
 
-def part(value: Any, *, where: str, at: str) -> Any:
+def part(value: object, *, where: str, at: str) -> Any:
     """An object whose class its `kind` names (see `PARTS`).
 
     Raises:
         DocumentError: for a kind that is not known.
     """
-    kind = _table(value, where, at).get("kind")
+    table = _table(value, where, at)
+    kind = table.get("kind")
     if not isinstance(kind, str) or kind not in PARTS:
         raise DocumentError(f"is {kind!r}, expected one of {', '.join(PARTS)}.", where=where, channel=f"{at}.kind")
-    return _decoded_object(PARTS[kind], {k: v for k, v in value.items() if k != "kind"}, where, at)
+    return _decoded_object(PARTS[kind], {k: v for k, v in table.items() if k != "kind"}, where, at)
 
 
 @lru_cache(maxsize=64)
@@ -141,7 +143,7 @@ def _hints(wanted: type) -> dict[str, Any]:
     return typing.get_type_hints(wanted)
 
 
-def _decoded_object(wanted: Any, value: Any, where: str, at: str) -> Any:
+def _decoded_object(wanted: type, value: object, where: str, at: str) -> Any:
     hints, found = _hints(wanted), {}
     known = {f.name: f for f in fields(wanted)}
     for name, entry in _known(tuple(known), value, where, at):
@@ -155,7 +157,7 @@ def _decoded_object(wanted: Any, value: Any, where: str, at: str) -> Any:
         raise DocumentError(f"is no {wanted.__name__}: {trouble}.", where=where, channel=at) from None
 
 
-def _known(names: tuple[str, ...], value: Any, where: str, at: str) -> list[tuple[str, Any]]:
+def _known(names: tuple[str, ...], value: object, where: str, at: str) -> list[tuple[str, Any]]:
     table = _table(value, where, at)
     for name in table:
         if name not in names:
@@ -163,7 +165,7 @@ def _known(names: tuple[str, ...], value: Any, where: str, at: str) -> list[tupl
     return list(table.items())
 
 
-def _decoded_float(value: Any, where: str, at: str) -> float:
+def _decoded_float(value: object, where: str, at: str) -> float:
     if value is None:
         return math.nan
     if isinstance(value, str) and value in _INFINITE:
@@ -173,7 +175,7 @@ def _decoded_float(value: Any, where: str, at: str) -> float:
     return float(value)
 
 
-def _decoded_array(value: Any, where: str, at: str, *, complex_numbers: bool) -> Any:
+def _decoded_array(value: object, where: str, at: str, *, complex_numbers: bool) -> Any:
     if isinstance(value, dict) and set(value) == {"real", "imag"}:
         real, imag = (_decoded_array(value[k], where, f"{at}.{k}", complex_numbers=False) for k in ("real", "imag"))
         if real.shape != imag.shape:
@@ -183,8 +185,8 @@ def _decoded_array(value: Any, where: str, at: str, *, complex_numbers: bool) ->
     return found.astype(np.complex128) if complex_numbers else found
 
 
-def _nested(value: Any, where: str, at: str) -> Any:
-    def numbers(entry: Any, place: str, depth: int) -> Any:
+def _nested(value: object, where: str, at: str) -> Any:
+    def numbers(entry: object, place: str, depth: int) -> Any:
         if isinstance(entry, list) and depth < 4:
             return [numbers(e, f"{place}[{i}]", depth + 1) for i, e in enumerate(entry)]
         return _decoded_float(entry, where, place)
@@ -215,18 +217,18 @@ def _unpacked(value: dict[str, Any], where: str, at: str) -> Any:
     return np.frombuffer(content, dtype="<f8").astype(np.float64).reshape(shape)
 
 
-def _table(value: Any, where: str, at: str) -> dict[str, Any]:
+def _table(value: object, where: str, at: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise _wrong(value, "a table", where, at)
     return value
 
 
-def _list(value: Any, where: str, at: str) -> list[Any]:
+def _list(value: object, where: str, at: str) -> list[Any]:
     if not isinstance(value, list):
         raise _wrong(value, "a list", where, at)
     return value
 
 
-def _wrong(value: Any, expected: str, where: str, at: str) -> DocumentError:
+def _wrong(value: object, expected: str, where: str, at: str) -> DocumentError:
     words = {dict: "a table", list: "a list", str: "a text", bool: "true or false", type(None): "nothing"}
     return DocumentError(f"is {words.get(type(value), 'a number')}, expected {expected}.", where=where, channel=at)

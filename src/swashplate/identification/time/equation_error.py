@@ -86,7 +86,7 @@ def _over_band(measured: Array, regressors: Array, dt: float, band: tuple[float,
     return kernel @ detrend(measured), kernel @ detrend(np.asarray(regressors), axis=0)
 
 
-def _solved(left: Any, right: Any, names: tuple[str, ...], history: tuple[str, ...] = ()) -> EquationError:
+def _solved(left: Array, right: Array, names: tuple[str, ...], history: tuple[str, ...] = ()) -> EquationError:
     n, k = right.shape
     complex_rows = np.iscomplexobj(left)
     information = (right.conj().T @ right).real

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,10 +21,14 @@ from swashplate.arrays import Array
 from swashplate.filtering.riccati import kalman_gain
 from swashplate.identification.core.parameter_row import Entry
 from swashplate.identification.core.time_likelihood import SPREAD, gust_entries
-from swashplate.identification.time.linear_likelihood import OutputErrors
+from swashplate.identification.time.linear_likelihood import Batch, OutputErrors
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.gathered_noise import gathered_noise
+
+if TYPE_CHECKING:
+    import jax
+    from jaxtyping import Complex, Float
 
 VELOCITIES = ("u", "v", "w")
 """States that are velocities through the air."""
@@ -43,11 +47,11 @@ class FilterErrors(OutputErrors):
     def _covariance(self, errors: Array) -> Array:
         return np.diag(np.diag(super()._covariance(errors)))
 
-    def _gain(self, batch: Any, a: Any, c: Any, phi: Any, dt: float) -> Any:
+    def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
         sensors = np.broadcast_to(np.diag(self.covariance), (len(batch), len(self.outputs)))
         return np.einsum("pij,pjk->pik", phi, _filter(a, self._white(batch), c, sensors.astype(np.complex128), dt)[0])
 
-    def _white(self, batch: Any) -> Any:
+    def _white(self, batch: Batch) -> Any:
         """Intensity of the white noise on every state's rate."""
         return np.exp(2.0 * batch[:, [self._place[f"gust {s}"] for s in self.model.states]])
 
@@ -82,7 +86,7 @@ class GustErrors(FilterErrors):
     def _covariance(self, errors: Array) -> Array:
         return OutputErrors._covariance(self, errors)
 
-    def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
+    def _matrices(self, numbers: Batch) -> tuple[Any, Any, Any, Any, Any]:
         a, b, c, d, h1 = super()._matrices(numbers)
         air = self._air()
         felt = -a[:, [self.model.states.index(name.split()[1]) for name in air]]
@@ -95,27 +99,27 @@ class GustErrors(FilterErrors):
             np.hstack([h1, np.zeros((len(h1), len(air)))]),
         )
 
-    def _kalman(self, batch: Any, a: Any, c: Any, dt: float) -> tuple[Any, Any]:
+    def _kalman(self, batch: Batch, a: Batch, c: Batch, dt: float) -> tuple[Any, Any]:
         moving = [name.split()[1] for name in self._air()]
         size, last = (batch[:, [self._place[f"{what} {s}"] for s in moving]] for what in ("air", "fading"))
         intensity = np.concatenate([self._white(batch), 2.0 * np.exp(2.0 * size - last)], axis=1)
         sensors = np.exp(2.0 * batch[:, [self._place[f"noise {o}"] for o in self.outputs]])
         return _filter(a, intensity, c, sensors, dt)
 
-    def _gain(self, batch: Any, a: Any, c: Any, phi: Any, dt: float) -> Any:
+    def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
         return np.einsum("pij,pjk->pik", phi, self._kalman(batch, a, c, dt)[0])
 
     def sized(self, row: Array) -> Array:
         numbers = np.asarray(row * self.row.scale)
         a, _, c, _, _ = self._systems(self._stepped(row, np.array([], dtype=np.intp)))
-        told = np.real(self._kalman(numbers[None] + 0j, a, c, self.records[0].dt)[1][0])
+        told = np.real(self._kalman(numbers[None].astype(np.complex128), a, c, self.records[0].dt)[1][0])
         errors = np.linalg.solve(told, self.covariance)
         larger = 0.5 * np.log(np.trace(errors) / len(told))
         noises = [i for i, entry in enumerate(self.row.entries) if entry.group == "noise"]
         return np.asarray(row + larger * np.isin(np.arange(row.size), noises))
 
 
-def _filter(a: Any, intensity: Any, c: Any, sensors: Any, dt: float) -> tuple[Any, Any]:
+def _filter(a: Batch, intensity: Batch, c: Batch, sensors: Batch, dt: float) -> tuple[Any, Any]:
     """Kalman gains (n_batch, n, m) and innovations' covariances of a batch of models, both noises' diagonals."""
     gain, covariance = _filters()(a, intensity, c, sensors, dt)
     return np.asarray(gain), np.asarray(covariance)
@@ -129,7 +133,13 @@ def _filters() -> Any:
 
     enable_double_precision()
 
-    def gain(a: Any, intensity: Any, c: Any, sensors: Any, dt: Any) -> Any:
+    def gain(
+        a: Complex[jax.Array, "n n"],
+        intensity: Complex[jax.Array, " n"],
+        c: Complex[jax.Array, "m n"],
+        sensors: Complex[jax.Array, " m"],
+        dt: Float[jax.Array, ""],
+    ) -> Any:
         phi, gathered = gathered_noise(a, jnp.diag(intensity), dt)
         return kalman_gain(phi, c, gathered, jnp.diag(sensors))
 

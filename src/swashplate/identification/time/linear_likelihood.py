@@ -11,6 +11,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Complex
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
@@ -180,7 +181,7 @@ class OutputErrors(TimeErrors):
         stepped = np.eye(numbers.size) if places is None else np.eye(numbers.size)[places]
         return numbers + 1j * STEP * np.vstack([np.zeros(numbers.size), stepped])
 
-    def _matrices(self, numbers: Any) -> tuple[Any, Any, Any, Any, Any]:
+    def _matrices(self, numbers: Batch) -> tuple[Any, Any, Any, Any, Any]:
         """A, B, C, D and the effect of rate shifts on the outputs, complex where the numbers are."""
         values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
         n, m, k = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
@@ -238,7 +239,7 @@ class OutputErrors(TimeErrors):
             lag=np.array([self._lags(numbers) for numbers in batch]) / dt,
         )
 
-    def _lags(self, numbers: Any) -> list[Any]:
+    def _lags(self, numbers: Batch) -> list[Any]:
         """Delay of every input [s]."""
         if not any(self.delays):
             return [0.0] * len(self.delays)
@@ -260,7 +261,7 @@ class OutputErrors(TimeErrors):
         near, far = (np.take_along_axis(u, np.clip(at - k, 0, len(u) - 1), axis=0) for k in (0, 1))
         return near + (lags - whole) * (far - near), far - near
 
-    def _gain(self, batch: Batch, a: Any, c: Any, phi: Any, dt: float) -> Any:
+    def _gain(self, batch: Batch, a: Batch, c: Batch, phi: Batch, dt: float) -> Any:
         """Gains from innovations to the next states, (n_batch, n_states, n_outputs); zero for output error."""
         columns = [self._column(batch, f"gain {s}/{{}}", self.outputs) for s in self.model.states]
         return np.stack(columns, axis=1)
@@ -299,12 +300,19 @@ def _compiled(chosen: Callable[[jax.Array, jax.Array], jax.Array]) -> Any:
     """The innovations' form along a record for a batch of models: what is chosen of errors and predicted states."""
     enable_double_precision()
 
-    def one(x: Any, phi: Any, c: Any, gain: Any, measured: Any, drive: Any) -> Any:
-        def correct(x: Any, y: Any, drive: Any) -> Any:
+    def one(
+        x: Complex[jax.Array, " n"],
+        phi: Complex[jax.Array, "n n"],
+        c: Complex[jax.Array, "m n"],
+        gain: Complex[jax.Array, "n m"],
+        measured: Complex[jax.Array, "samples m"],
+        drive: Complex[jax.Array, "samples n"],
+    ) -> Any:
+        def correct(x: Complex[jax.Array, " n"], y: Complex[jax.Array, " m"], drive: Complex[jax.Array, " n"]) -> Any:
             error = y - c @ x
             return (x, drive + gain @ error), error
 
-        def predict(state: tuple[Any, Any], _: Any) -> Any:
+        def predict(state: tuple[Any, Any], _: Complex[jax.Array, " n"]) -> Any:
             x, pushed = state
             return phi @ x + pushed
 

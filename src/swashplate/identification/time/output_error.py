@@ -15,6 +15,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -148,7 +149,7 @@ class OutputError:
             "initial_scale": jnp.asarray([scale for scale, _ in self._own.values()]),
         }
 
-    def unpack(self, shared: Any) -> tuple[Any, Nuisance]:
+    def unpack(self, shared: Array) -> tuple[Any, Nuisance]:
         """Equations' parameters and nuisances (one array entry per record) of the shared part of a scaled row."""
         return _unpack(self._plan, self._data, jnp.asarray(shared))
 
@@ -267,7 +268,7 @@ class _Plan:
     shared: int
 
 
-def _unpack(plan: _Plan, data: Any, shared: Any) -> tuple[Any, Nuisance]:
+def _unpack(plan: _Plan, data: Mapping[str, jax.Array], shared: Float[jax.Array, " shared"]) -> tuple[Any, Nuisance]:
     numbers = shared * data["scale"]
     k, n, m = len(plan.layout.free), plan.logs, len(plan.nuisances)
     block = numbers[k : k + n * m].reshape(n, m)[data["log"]]
@@ -277,7 +278,13 @@ def _unpack(plan: _Plan, data: Any, shared: Any) -> tuple[Any, Nuisance]:
     return plan.layout.values(data["card"], numbers[:k]), nuisance
 
 
-def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tuple[Any, Any]:
+def _shoot(
+    plan: _Plan,
+    data: Mapping[str, jax.Array],
+    shared: Float[jax.Array, " shared"],
+    initial: Float[jax.Array, " initial"],
+    place: Int[jax.Array, ""],
+) -> tuple[Any, Any]:
     """Outputs and states of one window."""
     model, vehicle = plan.model, plan.model.vehicle
     parameters, nuisances = _unpack(plan, data, shared)
@@ -303,7 +310,7 @@ def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tup
     )
     calm = jnp.zeros(N_DISTURBANCES)
 
-    def sample(x: Any, now: Any) -> tuple[Any, Any]:
+    def sample(x: Float[jax.Array, " states"], now: tuple[jax.Array, jax.Array]) -> tuple[Any, Any]:
         u, volts = now
         return model.step(x, calm, u, parameters, volts), x
 
@@ -312,7 +319,7 @@ def _shoot(plan: _Plan, data: Any, shared: Any, initial: Any, place: Any) -> tup
 
 
 @partial(jax.jit, static_argnums=0)
-def _residuals(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+def _residuals(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
     shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
     places = jnp.arange(initial.shape[0])
     outputs, states = jax.vmap(lambda i, x0: _shoot(plan, data, shared, x0, i))(places, initial)
@@ -327,12 +334,12 @@ def _traced_cost(plan: _Plan, data: Mapping[str, Any], row: jax.Array) -> Any:
 
 
 @partial(jax.jit, static_argnums=0)
-def _with_tangents(plan: _Plan, data: Any, row: Any) -> tuple[Any, Any]:
+def _with_tangents(plan: _Plan, data: Mapping[str, jax.Array], row: Float[jax.Array, " entries"]) -> tuple[Any, Any]:
     """Residuals and, per window, their derivatives by the shared entries and by the window's own initial state."""
     shared, initial = row[: plan.shared], row[plan.shared :].reshape(data["first"].shape[0], -1)
 
-    def one(place: Any, x0: Any) -> Any:
-        def outputs(both: Any) -> Any:
+    def one(place: Int[jax.Array, ""], x0: Float[jax.Array, " initial"]) -> Any:
+        def outputs(both: Float[jax.Array, " entries"]) -> Any:
             return _shoot(plan, data, both[: plan.shared], both[plan.shared :], place)[0]
 
         both = jnp.concatenate([shared, x0])

@@ -7,6 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
@@ -52,7 +53,12 @@ def mean_velocity(vehicle: Vehicle, record: Record) -> Array:
     return found
 
 
-def steady_flight(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: Any = None) -> tuple[Any, Any]:
+def steady_flight(
+    vehicle: Vehicle,
+    parameters: tuple[jax.Array, ...],
+    voltage: Float[jax.Array, ""],
+    velocity: Float[jax.Array, " axes"] | Array | None = None,
+) -> tuple[Any, Any]:
     """Flat state and inputs of steady flight in calm air, the nose north, traceable and differentiable.
 
     Args:
@@ -66,7 +72,12 @@ def steady_flight(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: Any
     return _trim_by_newton(vehicle, parameters, voltage, jnp.zeros(3) if velocity is None else velocity)
 
 
-def _trim_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: Any) -> tuple[Any, Any]:
+def _trim_by_newton(
+    vehicle: Vehicle,
+    parameters: tuple[jax.Array, ...],
+    voltage: Float[jax.Array, ""],
+    velocity: Float[jax.Array, " axes"] | Array,
+) -> tuple[Any, Any]:
     """Trim by a fixed count of Newton steps, none of which moves an angle by more than `_STRIDE`.
 
     The steps are not differentiated: one more from where they end, with a constant slope, has the exact derivative
@@ -84,7 +95,7 @@ def _trim_by_newton(vehicle: Vehicle, parameters: Any, voltage: Any, velocity: A
     start = jnp.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[len(RigidBody._fields) :]])
     frozen, still = jax.lax.stop_gradient(p), jax.lax.stop_gradient(row)
 
-    def newton(_: Any, reached: tuple[Any, Any]) -> tuple[Any, Any]:
+    def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
         value, slope = unrest(equations, reached[0], course, still, frozen)
         step = jnp.linalg.solve(slope, value)
         return reached[0] - step * jnp.minimum(1.0, _STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
@@ -115,13 +126,13 @@ def slopes(record: Record, places: Array) -> tuple[Array, Array]:
 def start_state(
     vehicle: Vehicle,
     output_names: tuple[str, ...],
-    parameters: Any,
+    parameters: tuple[jax.Array, ...],
     nuisance: Nuisance,
     *,
-    value: Any,
-    rate: Any,
-    inputs: Any,
-    voltage: Any,
+    value: Float[jax.Array, " outputs"],
+    rate: Float[jax.Array, " outputs"],
+    inputs: Float[jax.Array, " inputs"],
+    voltage: Float[jax.Array, ""],
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states where they would rest.
 
@@ -172,7 +183,13 @@ def start_state(
     return _at_rest_inside(vehicle, row, inputs, parameters, voltage)
 
 
-def _at_rest_inside(vehicle: Vehicle, row: Any, inputs: Any, parameters: Any, voltage: Any) -> Any:
+def _at_rest_inside(
+    vehicle: Vehicle,
+    row: Float[jax.Array, " states"],
+    inputs: Float[jax.Array, " inputs"],
+    parameters: tuple[jax.Array, ...],
+    voltage: Float[jax.Array, ""],
+) -> Any:
     """The row with disc tilt, bar, inflow, rotor speed and servos where this motion and these inputs hold them.
 
     Differentiated as `_trim_by_newton` is.
@@ -180,16 +197,22 @@ def _at_rest_inside(vehicle: Vehicle, row: Any, inputs: Any, parameters: Any, vo
     body, rates = len(RigidBody._fields), rates_function(vehicle)
     still = jax.lax.stop_gradient((row[:body], inputs, parameters, voltage))
 
-    def unrest_inside(inner: Any, body_row: Any, inputs: Any, parameters: Any, voltage: Any) -> Any:
+    def unrest_inside(
+        inner: Float[jax.Array, " inner"],
+        body_row: Float[jax.Array, " body"],
+        inputs: Float[jax.Array, " inputs"],
+        parameters: tuple[jax.Array, ...],
+        voltage: Float[jax.Array, ""],
+    ) -> Any:
         surroundings = Environment(voltage=voltage)
         return rates(jnp.concatenate([body_row, inner]), inputs, parameters, surroundings)[body:]
 
-    def slope(inner: Any) -> Any:
+    def slope(inner: Float[jax.Array, " inner"]) -> Any:
         found = jax.jacfwd(unrest_inside)(inner, *still)
         # A governor at its stop does not move: without this the slope could not be inverted.
         return found - _NUDGE * jnp.eye(inner.shape[0])
 
-    def newton(_: Any, reached: tuple[Any, Any]) -> tuple[Any, Any]:
+    def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
         here = slope(reached[0])
         return reached[0] - jnp.linalg.solve(here, unrest_inside(reached[0], *still)), here
 
