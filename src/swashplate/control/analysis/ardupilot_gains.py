@@ -52,12 +52,10 @@ OVERSHOOT = 0.3
 
 _SLOW = 2.0 * np.pi * 0.2
 """rad/s: unstable modes below it are the attitude loop's or the pilot's, not the rate loop's."""
-_SHARES = {
-    "P": np.geomspace(20.0, 0.02, 50),
-    "D": np.array([0.2, 0.1, 0.05, 0.0]),
-    "I": np.array([0.5, 0.25, 0.1]),
-}
+_SHARES = {"P": np.geomspace(20.0, 0.02, 50), "D": np.array([0.2, 0.1, 0.05, 0.0]), "I": np.array([0.5, 0.25, 0.1])}
 """Shares: P of one over the steady rate, D of a tenth of P, I of the feed-forward or else of P / 5."""
+_HELD = np.array([20.0, 8.0, 3.0, 1.0])
+"""1/s, I over P where the integral of the rate holds the attitude (Rotorflight)."""
 _NEARLY = 0.9
 _DEMAND = (20.0, 10.0, 7.0, 5.0, 3.0, 2.0)
 """Hz: filters of the demand that are tried."""
@@ -256,13 +254,14 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     else:  # an integrator's phase is -90 degrees there
         middle = complex(loop.plant(np.array([_SLOW]))[0])
         one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
-    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _SHARES["I"], indexing="ij")
+    holds = loop.axis in ROTORFLIGHT  # no attitude loop stands behind its integral
+    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _HELD if holds else _SHARES["I"], indexing="ij")
     share, slope, integral = (np.ravel(x) for x in tried)
     p: Array = one * share
     grid: dict[str, Array] = {
         "FF": np.full(p.size, one if steady else 0.0),
         "P": p,
-        "I": integral * (one if steady else 0.2 * p),
+        "I": integral * (p if holds else one if steady else 0.2 * p),
         "D": slope * 0.1 * p,
         **{name: np.full(p.size, value) for name, value in loop.filters.items()},
     }
@@ -277,7 +276,12 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     rejected = omega[np.argmax(sensitivity > HALF_POWER, axis=1)]
     # Of those that are nearly the fastest, the one whose integral takes a lasting disturbance away first.
     slow = rejected < _NEARLY * rejected.max()
-    best = int(np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))[0]])
+    ranked = np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))]
+    best = int(ranked[0])
+    if holds:  # no filter of the demand takes an overshoot away
+        beyond = loop.overshoots({name: value[ranked] for name, value in grid.items()})
+        beyond = np.nan_to_num(beyond, nan=0.0 if loop.structure is None else np.inf)
+        best = int(ranked[np.argmax(beyond <= max(OVERSHOOT, beyond.min()))])
     chosen = {name: float(value[best]) for name, value in grid.items()}
     if "FLTT" not in names_of(loop.axis):
         return written(loop.axis, chosen)
