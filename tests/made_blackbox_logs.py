@@ -97,10 +97,14 @@ def tag2(values: Sequence[int], *, variable: bool) -> bytes:
 
 def written(values: Sequence[int], encodings: Sequence[int]) -> bytes:
     """The bytes of a frame's numbers, in their encodings."""
-    out, at = b"", 0
-    most = {6: 8, 7: 3, 8: 4, 10: 3, 4: 99, 5: 99}
+    out, bits, at = b"", "", 0
+    most = {6: 8, 7: 3, 8: 4, 10: 3}
     while at < len(values):
         encoding, end = encodings[at], at + 1
+        if encoding in (4, 5):  # bits run on until a field of whole bytes
+            bits += elias(values[at] % (1 << 32) if encoding == 4 else zigzag(values[at]))
+        elif encoding != 9:
+            out, bits = out + _packed(bits), ""
         while end < len(values) and encodings[end] == encoding and end - at < most.get(encoding, 1):
             end += 1
         row = list(values[at:end])
@@ -110,10 +114,6 @@ def written(values: Sequence[int], encodings: Sequence[int]) -> bytes:
             out += vb(row[0])
         elif encoding == 3:
             out += vb(-row[0] % (1 << 14))
-        elif encoding == 4:
-            out += _packed("".join(elias(v % (1 << 32)) for v in row))
-        elif encoding == 5:
-            out += _packed("".join(elias(zigzag(v)) for v in row))
         elif encoding == 6:
             tag = sum(1 << i for i, v in enumerate(row) if v)
             out += svb(row[0]) if len(row) == 1 else bytes([tag]) + b"".join(svb(v) for v in row if v)
@@ -122,7 +122,7 @@ def written(values: Sequence[int], encodings: Sequence[int]) -> bytes:
         elif encoding in (7, 10):
             out += tag2(row + [0] * (3 - len(row)), variable=encoding == 10)
         at = end
-    return out
+    return out + _packed(bits)
 
 
 # --- logs ------------------------------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ def flown(*, chirp: bool, seconds: float = 80.0, seed: int = 1) -> bytes:
     return made.rotorflight(
         {"gyroADC[0]": degrees[:, 0], "setpoint[0]": degrees[:, 1], "mixer[0]": np.rint(1e3 * mixer).astype(int),
          "accADC[2]": np.full(t.size, 2048), "headspeed": np.full(t.size, 2100)}, step_us=STEP,
+        more={"rollPID": "50,100,20,90,0", "rollBW": "60,15,15"},
     )  # fmt: skip
 
 
@@ -66,6 +67,31 @@ def test_respond_finds_the_aircraft_in_a_chirp(chirped: Path, tmp_path: Path) ->
     ratio *= np.exp(0.5j * found.omega * 1e-6 * STEP)
     assert np.abs(20 * np.log10(np.abs(ratio))).max() < 0.5
     assert np.abs(np.rad2deg(np.angle(ratio))).max() < 3.0
+
+
+def test_gains_come_in_the_firmwares_own_names(chirped: Path, tmp_path: Path) -> None:
+    """The plant is 90 / (s + 6), so feed-forward is 6 / 90 of a radian per second, 46.5 in Rotorflight's unit."""
+    arguments = ("--inputs", "mixer_roll", "--outputs", "p", "--references", "p_demand", "--band", "0.5-8")
+    assert swash("respond", chirped, *arguments, "--out", tmp_path / "out", "-q").code == 0
+    outcome = swash(
+        "fit-tf",
+        tmp_path / "out" / "responses.nc",
+        "--input",
+        "mixer_roll",
+        "--form",
+        "0/1",
+        "--gains",
+        "--json",
+        "--out",
+        tmp_path,
+    )
+    assert outcome.code == 0, outcome.err
+    (roll,) = json.loads(outcome.out)["gains"]
+    assert roll["axis"] == "roll"
+    assert roll["flown"]["roll_i_gain"] == 100.0
+    assert roll["parameters"]["roll_gyro_cutoff"] == 60.0
+    assert roll["parameters"]["roll_f_gain"] == pytest.approx(np.deg2rad(1.0) * 6.0 / 90.0 / 2.5e-5, abs=3.0)
+    assert all(value == int(value) for value in roll["parameters"].values())
 
 
 def test_a_flight_of_feedback_alone_is_refused_in_words(tmp_path: Path) -> None:

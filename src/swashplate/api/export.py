@@ -78,18 +78,22 @@ def export_controller(path: str | Path, *, name: str | None = None, precision: P
     return Export({f"{identifier(name or Path(path).stem)}.c": code.source.encode()}, (told,))
 
 
-def export_flight(flight: Flight, *, name: str | None = None) -> Export:
-    """A flight as an MCAP file for Foxglove, Lichtblick, PlotJuggler and Rerun.
+def export_flight(flight: Flight | str | Path, *, name: str | None = None) -> Export:
+    """A flight, or what a report draws over time, as an MCAP file for Foxglove, Lichtblick, PlotJuggler and Rerun.
 
     Args:
-        flight: as logged or simulated.
-        name: what the file is called; the log's own name where None.
+        flight: as logged or simulated; or the path of a report's page (.html): its fits and predictions.
+        name: what the file is called; the log's or page's own name where None.
 
     Raises:
-        SwashError: where the extra `mcap` is missing, or the name is no file's.
+        SwashError: where the extra `mcap` is missing, the name is no file's, or the page draws nothing over time.
     """
     from swashplate.export.mcap import as_mcap
 
+    if not isinstance(flight, Flight):
+        from swashplate.reporting.page_series import page_series
+
+        flight = page_series(flight)
     called = Path(flight.provenance.source).stem if name is None else name
     if not called or Path(called).name != called:
         raise SwashError(f"'{called}' is no file's name.", channel="--name")

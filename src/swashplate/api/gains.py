@@ -6,13 +6,16 @@ from typing import Any
 
 from swashplate.control.analysis import ardupilot_gains
 from swashplate.control.analysis.ardupilot_gains import Suggestion
+from swashplate.control.analysis.rate_gain_names import ARDUPILOT
 from swashplate.errors import SwashError
 from swashplate.identification.frequency.reading_accuracy import Fitted
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 
 
 def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion, ...]:
-    """ArduPilot rate-loop gains for every axis of a fit, beside those that the log flew with, with margins of both.
+    """Rate-loop gains for every axis of a fit, beside those that the log flew with, with margins of both.
+
+    In Rotorflight's names and whole numbers where the log is Rotorflight's, otherwise in ArduPilot's.
 
     Args:
         fit: of transfer functions or of a state-space model.
@@ -24,7 +27,7 @@ def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion
     settings: dict[str, Any] = dict(responses.settings)
     found = ardupilot_gains.suggest_gains(fit, autopilot=settings.get("autopilot"), sources=settings.get("channels"))
     if not found:
-        pairs = ", ".join(f"{rate} with {command}" for rate, command in ardupilot_gains.AXES.values())
+        pairs = ", ".join(f"{rate} with {command}" for rate, command in ARDUPILOT.values())
         raise SwashError(
             f"the model joins no rate with its mixer command ({pairs}).",
             channel="--gains",

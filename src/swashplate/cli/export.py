@@ -73,8 +73,8 @@ def export(
     """Write a model, published or identified, in the format of another program, with the equations that fly here.
 
     A controller's file (`swash decouple --out`) is written as C. Formats c, fmu and simulink need the extra 'export';
-    only fmu needs a C compiler, and does without where there is none. Format mcap takes a flight and needs the extra
-    'mcap'. Examples:
+    only fmu needs a C compiler, and does without where there is none. Format mcap takes a flight, or a report.html
+    for its fits and predictions over time, and needs the extra 'mcap'. Examples:
 
     swash export coax --format c --out firmware
 
@@ -83,6 +83,8 @@ def export(
     swash export raptor50 --format matlab --speed 10
 
     swash export flight.bbl --format mcap
+
+    swash export out/report.html --format mcap --name prediction
     """
     import swashplate as sp
     from swashplate.cli.console import as_json
@@ -145,6 +147,8 @@ def _flight(flight: str, name: str | None, refused: list[str]) -> Export:
 
     if refused:
         raise SwashError("is for vehicles, and mcap takes a flight.", where=flight, channel=", ".join(refused))
+    if flight.endswith(".html"):
+        return sp.export_flight(flight, name=name)
     called = Path(split_log(split_window(flight)[0])[0]).stem
     return sp.export_flight(read(flight), name=called if name is None else name)
 

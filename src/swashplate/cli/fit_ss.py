@@ -41,7 +41,9 @@ def fit_ss(
     ] = False,
     starts: Annotated[int, typer.Option("--starts", help="Number of starting points.", min=1)] = 4,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the starting points.", min=0)] = 0,
-    gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
+    gains: Annotated[
+        bool, typer.Option("--gains", help="Also suggest rate-loop gains, ArduPilot's or Rotorflight's.")
+    ] = False,
     hold_out: options.HoldOut = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,

@@ -33,7 +33,9 @@ def fit_tf(
             "--margins", help="Margins of the responses as open loops; bandwidth and phase delay of the attitude."
         ),
     ] = False,
-    gains: Annotated[bool, typer.Option("--gains", help="Also suggest ArduPilot rate-loop gains.")] = False,
+    gains: Annotated[
+        bool, typer.Option("--gains", help="Also suggest rate-loop gains, ArduPilot's or Rotorflight's.")
+    ] = False,
     hold_out: options.HoldOut = None,
     out: options.OutFolder = None,
     rate: options.Rate = 100.0,

@@ -9,6 +9,7 @@ import numpy as np
 
 from swashplate.arrays import Complex
 from swashplate.control.analysis.ardupilot_gains import Suggestion
+from swashplate.control.analysis.rate_gain_names import ROTORFLIGHT, gain_text
 from swashplate.identification.core.result import Estimate, Result
 from swashplate.identification.core.time_fit import TimeDetails
 from swashplate.identification.frequency.handling import Handling
@@ -304,12 +305,12 @@ def excitation_section(r: FrequencyResponse) -> Section:
 
 
 def gains_section(gains: Sequence[Suggestion]) -> Section:
-    """Suggested rate-loop gains in ArduPilot's names beside the flown ones, and the margins of both."""
+    """Suggested rate-loop gains in the firmware's names beside the flown ones, and the margins of both."""
     rows = tuple(
         (
             Cell(name),
-            Cell(f"{g.parameters[name]:.4f}" if name in g.parameters else "–", number=True, strong=True),
-            Cell(f"{g.flown[name]:.4f}" if name in g.flown else "not logged", number=True),
+            Cell(gain_text(name, g.parameters[name]) if name in g.parameters else "–", number=True, strong=True),
+            Cell(gain_text(name, g.flown[name]) if name in g.flown else "not logged", number=True),
         )
         for g in gains
         for name in g.parameters or g.flown
@@ -325,9 +326,10 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
         for what, suggested, flown in g.table()
     )
     said = dict.fromkeys(g.words for g in gains)
+    firmware = "Rotorflight" if any(g.axis in ROTORFLIGHT for g in gains) else "ArduPilot"
     return Section(
         "gains",
-        "Suggested rate-loop gains (ArduPilot)",
+        f"Suggested rate-loop gains ({firmware})",
         (
             Table("Gains", ("parameter", "suggested", "flown"), rows),
             Table(
@@ -335,8 +337,8 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
                 ("axis", "", "suggested", "flown"),
                 judged,
                 note="Margins are the least of each where the loop crosses several times; ± is what the Cramér-Rao "
-                "bounds of the model's parameters make of them. FLTT, FLTE and FLTD are filters of the controller, and "
-                "count. The step of the demand is a sudden one; ArduPilot's own shaping is not in it.",
+                "bounds of the model's parameters make of them. Filters of the controller (FLTT, FLTE, FLTD; cutoff) "
+                f"count. The step of the demand is a sudden one; {firmware}'s own shaping is not in it.",
             ),
             *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
             *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),

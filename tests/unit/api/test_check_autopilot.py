@@ -157,7 +157,10 @@ def test_px4_of_a_helicopter(name: str) -> None:
         "CA_SP0_ANG1": 140.0,
         "PWM_MAIN_FUNC2": 201.0,
     }
-    assert (found["CA_HELI_PITCH_C0"], found["CA_HELI_PITCH_C4"]) == pytest.approx((-0.05, 0.45))
+    assert [found[f"CA_HELI_PITCH_C{k}"] for k in range(5)] == pytest.approx([-0.05, 0.075, 0.2, 0.325, 0.45])
+    assert [found[f"CA_HELI_THR_C{k}"] for k in range(5)] == [1.0] * 5
+    # It must not disarm itself while the rotor spools up.
+    assert found["COM_DISARM_PRFLT"] > found["COM_SPOOLUP_TIME"] > servo_mapping(name, RAPTOR).spool
 
 
 @pytest.mark.parametrize(

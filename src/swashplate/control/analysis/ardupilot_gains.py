@@ -1,7 +1,7 @@
-"""Rate-loop feed-forward and gains for ArduPilot's helicopter code, from an identified model, and what they buy.
+"""Rate-loop feed-forward and gains for ArduPilot or Rotorflight, from an identified model, and what they buy.
 
-The parameters are ATC_RAT_*_FF, _P, _I, _D and the filters _FLTT, _FLTE, _FLTD (`rate_loop`), which belong to the loop,
-and so to the suggestion.
+ArduPilot's parameters are ATC_RAT_*_FF, _P, _I, _D and the filters _FLTT, _FLTE, _FLTD (`rate_loop`), which belong to
+the loop, and so to the suggestion; Rotorflight's are `roll_p_gain` and its like (`rate_gain_names`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array, Complex
+from swashplate.control.analysis.rate_gain_names import (
+    ARDUPILOT,
+    ROTORFLIGHT,
+    beware,
+    filters_of,
+    firmware_of,
+    gain_text,
+    names_of,
+    representable,
+    short,
+    written,
+)
 from swashplate.control.analysis.rate_loop import (
     HALF_POWER,
     LOWEST,
@@ -22,7 +34,6 @@ from swashplate.control.analysis.rate_loop import (
     LoopFigures,
     RateLoop,
     couplings,
-    short,
 )
 from swashplate.control.analysis.rate_loop_steps import RateSteps, rate_loop_steps
 from swashplate.errors import IdentificationError
@@ -39,17 +50,12 @@ PHASE_MARGIN, GAIN_MARGIN, PEAK = 45.0, 6.0, 2.0
 OVERSHOOT = 0.3
 """Of a demand that steps at once; the filter of the demand (FLTT) is the fastest that keeps it."""
 
-AXES = {"RLL": ("p", "mixer_roll"), "PIT": ("q", "mixer_pitch"), "YAW": ("r", "mixer_yaw")}
-_FILTER = 20.0  # Hz: FLTE where the log does not say it, and FLTD of a suggestion
-_GAINS = ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD")
 _SLOW = 2.0 * np.pi * 0.2
 """rad/s: unstable modes below it are the attitude loop's or the pilot's, not the rate loop's."""
-_SHARES = {
-    "P": np.geomspace(20.0, 0.02, 50),
-    "D": np.array([0.2, 0.1, 0.05, 0.0]),
-    "I": np.array([0.5, 0.25, 0.1]),
-}
+_SHARES = {"P": np.geomspace(20.0, 0.02, 50), "D": np.array([0.2, 0.1, 0.05, 0.0]), "I": np.array([0.5, 0.25, 0.1])}
 """Shares: P of one over the steady rate, D of a tenth of P, I of the feed-forward or else of P / 5."""
+_HELD = np.array([20.0, 8.0, 3.0, 1.0])
+"""1/s, I over P where the integral of the rate holds the attitude (Rotorflight)."""
 _NEARLY = 0.9
 _DEMAND = (20.0, 10.0, 7.0, 5.0, 3.0, 2.0)
 """Hz: filters of the demand that are tried."""
@@ -60,8 +66,8 @@ class Suggestion(Shown):
     """Gains of one axis.
 
     Attributes:
-        axis: "RLL", "PIT" or "YAW".
-        parameters: by ArduPilot's names; none where no gains keep the margins.
+        axis: "RLL", "PIT" or "YAW"; Rotorflight's are "roll", "pitch", "yaw".
+        parameters: by the firmware's names; none where no gains keep the margins.
         figures: what they are worth on the model, with what the fit's bounds make of the margins.
         flown: the log's own gains (none where it does not hold them), and what they are worth.
         buys, costs: what the suggestion betters and worsens, from flown to suggested.
@@ -141,7 +147,7 @@ class Suggestion(Shown):
         if self.parameters or self.flown:
             lines.append(f"  {'':<30}{'suggested':>18}{'flown':>18}")
         for name in self.parameters or self.flown:
-            cells = [f"{k[name]:.4f}" if name in k else "-" for k in (self.parameters, self.flown)]
+            cells = [gain_text(name, k[name]) if name in k else "-" for k in (self.parameters, self.flown)]
             lines.append(f"  {name:<30}{cells[0]:>18}{cells[1]:>18}")
         if np.isfinite(self.peak) or np.isfinite(self.flown_peak):
             lines += [f"  {name:<30}{cells[0]:>18}{cells[1]:>18}" for name, *cells in self.table()]
@@ -183,23 +189,24 @@ def suggest_gains(
 
     Args:
         model: a model, or a fit, whose bounds the margins then get.
-        autopilot: parameters of the log by name: FLTE, the gains that were flown, INS_GYRO_FILTER.
+        autopilot: parameters of the log by name: filters, the gains that were flown, INS_GYRO_FILTER. With
+            Rotorflight's among them the suggestion is in Rotorflight's names and whole numbers.
         sources: the log's channel behind a model's, where their names differ. A rate of SIDD (`p_sid`) has not passed
             the gyro filter, which the loop has.
     """
     known, behind = dict(autopilot or {}), dict(sources or {})
     fit, answering = (model, model.solution) if isinstance(model, Result) else (None, structure_of(model))
     made = []
-    for axis, (rate, command) in AXES.items():
+    for axis, (rate, command) in (ROTORFLIGHT if firmware_of(known) == "Rotorflight" else ARDUPILOT).items():
         rates = [o for o in answering.outputs if behind.get(o, o) in (rate, f"{rate}_sid")]
         commands = [i for i in answering.inputs if behind.get(i, i) == command]
         if rates and commands:
             raw = behind.get(rates[0], rates[0]) != rate
             gyro = known.get("INS_GYRO_FILTER", 0.0) if raw else 0.0
-            error = known.get(f"ATC_RAT_{axis}_FLTE", _FILTER)
-            loop = RateLoop(answering, axis, rates[0], commands[0], error, gyro, _in_time(model), fit)
+            filters = filters_of(axis, known)
+            loop = RateLoop(answering, axis, rates[0], commands[0], filters, gyro, _in_time(model), fit)
             made.append(_suggest(loop, known))
-    return tuple(_with_words(s) for s in _with_coupling(made))
+    return tuple(_with_words(s, beware(s.axis, known)) for s in _with_coupling(made))
 
 
 def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | None:
@@ -211,8 +218,8 @@ def _in_time(model: Vehicle | StateSpaceModel | Fitted) -> StateSpaceModel | Non
 
 
 def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:
-    names = [f"ATC_RAT_{loop.axis}_{name}" for name in _GAINS]
-    flown = {name: known[name] for name in names if name in known}
+    names = names_of(loop.axis)
+    flown = {name: known[name] for name in names.values() if name in known}
     unstable = loop.unstable
     if unstable >= _SLOW:
         words = (
@@ -220,10 +227,13 @@ def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:
         )
         return Suggestion(loop.axis, {}, NO_FIGURES, flown, NO_FIGURES, loop, words)
     omega = _judged_at(loop)
-    as_flown = loop.figures(flown, omega) if names[1] in flown else NO_FIGURES
+    as_flown = loop.figures(flown, omega) if names["P"] in flown else NO_FIGURES
     gains = _best(loop, omega)
     if gains is None:
-        words = f"none: no gains tried keep {PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a sensitivity of {PEAK:g}."
+        words = (
+            f"none: no gains tried that the firmware can hold keep {PHASE_MARGIN:g} degrees, {GAIN_MARGIN:g} dB and a "
+            f"sensitivity of {PEAK:g}."
+        )
         return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, words)
     found = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
     better = [name for name, good, _ in _changes(found) if good]
@@ -244,17 +254,20 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     else:  # an integrator's phase is -90 degrees there
         middle = complex(loop.plant(np.array([_SLOW]))[0])
         one = float(np.sign((1j * middle).real or 1.0) / abs(middle))
-    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _SHARES["I"], indexing="ij")
+    holds = loop.axis in ROTORFLIGHT  # no attitude loop stands behind its integral
+    tried = np.meshgrid(_SHARES["P"], _SHARES["D"], _HELD if holds else _SHARES["I"], indexing="ij")
     share, slope, integral = (np.ravel(x) for x in tried)
     p: Array = one * share
     grid: dict[str, Array] = {
         "FF": np.full(p.size, one if steady else 0.0),
         "P": p,
-        "I": integral * (one if steady else 0.2 * p),
+        "I": integral * (p if holds else one if steady else 0.2 * p),
         "D": slope * 0.1 * p,
-        "FLTE": np.full(p.size, loop.error_filter),
-        "FLTD": np.full(p.size, _FILTER),
+        **{name: np.full(p.size, value) for name, value in loop.filters.items()},
     }
+    grid = representable(loop.axis, grid)
+    if not grid["P"].size:
+        return None
     loops = _loops(loop, grid, omega)
     kept = _keep(loops)
     if not kept.any():
@@ -263,13 +276,20 @@ def _best(loop: RateLoop, omega: Array) -> dict[str, float] | None:
     rejected = omega[np.argmax(sensitivity > HALF_POWER, axis=1)]
     # Of those that are nearly the fastest, the one whose integral takes a lasting disturbance away first.
     slow = rejected < _NEARLY * rejected.max()
-    best = int(np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))[0]])
+    ranked = np.flatnonzero(kept)[np.lexsort((sensitivity.max(axis=1), -np.abs(grid["I"][kept]), slow))]
+    best = int(ranked[0])
+    if holds:  # no filter of the demand takes an overshoot away
+        beyond = loop.overshoots({name: value[ranked] for name, value in grid.items()})
+        beyond = np.nan_to_num(beyond, nan=0.0 if loop.structure is None else np.inf)
+        best = int(ranked[np.argmax(beyond <= max(OVERSHOOT, beyond.min()))])
     chosen = {name: float(value[best]) for name, value in grid.items()}
+    if "FLTT" not in names_of(loop.axis):
+        return written(loop.axis, chosen)
     filters = {name: np.full(len(_DEMAND), value) for name, value in chosen.items()} | {"FLTT": np.array(_DEMAND)}
     overshoot = np.nan_to_num(loop.overshoots(filters), nan=0.0 if loop.structure is None else np.inf)
     quick = np.flatnonzero(overshoot <= max(OVERSHOOT, overshoot.min()))[0]
     chosen["FLTT"] = _DEMAND[quick]
-    return {f"ATC_RAT_{loop.axis}_{name}": chosen[name] for name in _GAINS}
+    return written(loop.axis, chosen)
 
 
 def _as_rows(gains: Mapping[str, float]) -> dict[str, Array]:
@@ -353,13 +373,12 @@ def _plain(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
-def _with_words(s: Suggestion) -> Suggestion:
+def _with_words(s: Suggestion, besides: str) -> Suggestion:
     if s.words:
         return s
     if s.parameters == s.flown:
-        return replace(
-            s, words="The flown gains are kept: they keep the margins, and nothing that was tried is better."
-        )
+        words = "The flown gains are kept: they keep the margins, and nothing that was tried is better."
+        return replace(s, words=words + besides)
     changes = _changes(s)
     buys = tuple(words for words, good, _ in changes if good)
     costs = tuple(words for words, good, _ in changes if not good)
@@ -370,6 +389,7 @@ def _with_words(s: Suggestion) -> Suggestion:
     if s.figures_suggested.overshoot > OVERSHOOT:
         size = f"{100.0 * s.figures_suggested.overshoot:.0f} %"
         words += f" A step of the demand overshoots by {size} with the slowest filter tried: give it soft demands."
+    words += besides
     if not np.isfinite(s.loop.steady):
         words += " Under a steady command the rate settles slowly or not at all: no feed-forward."
     if s.loop.unstable:

@@ -1,7 +1,8 @@
 """A rate loop around an identified model: its controller and filters, and what a set of gains is worth in it.
 
 ArduPilot's rate controller gives the mixer command u = FF target + P e + I int e + D de/dt, with the target and the
-rate error e in rad/s behind first-order filters (FLTT and FLTE), and one more on the derivative (FLTD).
+rate error e in rad/s behind first-order filters (FLTT and FLTE), and one more on the derivative (FLTD). Rotorflight's
+has a filter of the gyro alone (FLTG), and its derivative is that of the gyro.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from swashplate.arrays import Array, Complex
+from swashplate.control.analysis.rate_gain_names import short
 from swashplate.control.analysis.rate_loop_steps import stepped
 from swashplate.identification.frequency.handling import ReadNumber, ResponseMargins, margins
 from swashplate.identification.frequency.handling_readings import model_margins
@@ -64,7 +66,8 @@ class RateLoop:
 
     Attributes:
         model: what answers the command. axis, rate, command: names.
-        error_filter, gyro_filter: corners [Hz].
+        filters: of the controller, by their short names: corners [Hz].
+        gyro_filter: of the gyro where the model lacks it [Hz].
         structure: the model in time; None for transfer functions that cannot be stepped.
         fit: where the model comes from one, for the bounds of margins.
     """
@@ -73,7 +76,7 @@ class RateLoop:
     axis: str
     rate: str
     command: str
-    error_filter: float
+    filters: Mapping[str, float]
     gyro_filter: float
     structure: StateSpaceModel | None = None
     fit: Fitted | None = None
@@ -94,13 +97,16 @@ class RateLoop:
         pid = k.get("P", 0.0) + k.get("I", 0.0) / s + k.get("D", 0.0) * s * _first_order(s, k.get("FLTD", 0.0))
         c = 2.0 * np.pi * self.gyro_filter
         gyro = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else 1.0
-        return np.asarray(pid * _first_order(s, k.get("FLTE", 0.0)) * gyro, dtype=np.complex128)
+        smooth = _first_order(s, k.get("FLTE", 0.0)) * _first_order(s, k.get("FLTG", 0.0))
+        return np.asarray(pid * smooth * gyro, dtype=np.complex128)
 
     def ahead(self, gains: Mapping[str, float], omega: Array) -> Complex:
         """From the demanded rate to the command: its filter, feed-forward, the controller without the gyro's filter."""
         without, k = replace(self, gyro_filter=0.0), short(gains)
+        if "FLTG" in k:
+            k |= {"FLTG": 0.0, "D": 0.0}
         smooth = _first_order(np.asarray(1j * omega), k.get("FLTT", 0.0))
-        return np.asarray(smooth * (k.get("FF", 0.0) + without.controller(gains, omega)))
+        return np.asarray(smooth * (k.get("FF", 0.0) + without.controller(k, omega)))
 
     def figures(self, gains: Mapping[str, float], omega: Array) -> LoopFigures:
         """Margins, with bounds where a fit has them, and what the loop does."""
@@ -167,11 +173,6 @@ def couplings(loops: tuple[RateLoop, ...], gains: tuple[Mapping[str, float], ...
     closed = np.linalg.solve(np.eye(len(loops)) + H * back[:, None, :], H * ahead[:, None, :])
     size = np.abs(closed)
     return tuple(float(np.max(np.delete(size[:, :, k], k, axis=1))) for k in range(len(loops)))
-
-
-def short(gains: Mapping[str, float]) -> dict[str, float]:
-    """Gains by the ends of ArduPilot's names: `P`, `I`, `D`, `FF`, `FLTT`, `FLTE`, `FLTD`."""
-    return {name.rsplit("_", 1)[-1]: float(value) for name, value in gains.items()}
 
 
 def _first_order(s: Complex, hertz: float) -> Complex | float:

@@ -1,8 +1,9 @@
 """A rate loop closed over an identified model, in time: the answer to a step of the target, and to a disturbance.
 
 ArduPilot's controller of `ardupilot_gains`: u = FF target + P e + I int e + D de/dt, with the filters FLTT of the
-target, FLTE of the error and FLTD of the derivative, all of first order. The loop is stepped at 400 Hz, as the
-autopilot runs, with the model exact between steps (zero-order hold) and its delay in whole steps.
+target, FLTE of the error and FLTD of the derivative, all of first order; with FLTG, Rotorflight's filter of the gyro,
+the derivative is that of the gyro alone. The loop is stepped at 400 Hz, as ArduPilot runs (Rotorflight is faster), with
+the model exact between steps (zero-order hold) and its delay in whole steps.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from swashplate.arrays import Array
+from swashplate.control.analysis.rate_gain_names import short
 from swashplate.errors import ControllerError
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -59,7 +61,8 @@ def rate_loop_steps(
 
     Args:
         model: identified, from the mixer command to the rate.
-        gains: by ArduPilot's names (`ATC_RAT_RLL_P`, ...) or their ends (`P`, `I`, `D`, `FF`, `FLTT`, `FLTE`, `FLTD`).
+        gains: by ArduPilot's names (`ATC_RAT_RLL_P`, ...) or their ends (`P`, `I`, `D`, `FF`, `FLTT`, `FLTE`, `FLTD`),
+            or by Rotorflight's (`roll_p_gain`, ...).
         rate, command: the model's output and input.
         seconds: how long.
         gyro_filter: corner of a gyro filter that the model has not seen [Hz]; 0 for none.
@@ -68,7 +71,7 @@ def rate_loop_steps(
         ControllerError: no gain among the names, or a model without these channels.
     """
     structure = structure_of(model) if isinstance(model, Vehicle) else model
-    k = {name.rsplit("_", 1)[-1]: float(value) for name, value in gains.items()}
+    k = short(gains)
     if not {"P", "I", "D", "FF"} & set(k):
         raise ControllerError(f"hold no gain of a rate loop: {', '.join(gains) or 'none'}.", channel="gains")
     for name, names in ((rate, structure.outputs), (command, structure.inputs)):
@@ -103,7 +106,7 @@ def stepped(
     """
     k = {
         name: np.asarray(gains.get(name, 0.0), dtype=np.float64)
-        for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD")
+        for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD", "FLTG")
     }
     m = max(value.size for value in k.values())
     a, b, c, d = model.explicit()
@@ -113,10 +116,12 @@ def stepped(
     ad, bd, cd, dd = held[:n, :n], held[:n, n], c[o], float(d[o, i])
     late = max(1, round(model.delay(rate, command) * RATE))  # one step at least: commands act after it
     waiting = [np.zeros(m)] * late
-    wanted, filtered, sloped, before, summed, x = *np.zeros((5, m)), np.zeros((n, m))
-    target_share, error_share, slope_share = (
-        np.where(k[name] > 0.0, 1.0 - np.exp(-2.0 * np.pi * k[name] * dt), 1.0) for name in ("FLTT", "FLTE", "FLTD")
+    wanted, slow, filtered, sloped, before, summed, x = *np.zeros((6, m)), np.zeros((n, m))
+    target_share, error_share, slope_share, gyro_share = (
+        np.where(k[name] > 0.0, 1.0 - np.exp(-2.0 * np.pi * k[name] * dt), 1.0)
+        for name in ("FLTT", "FLTE", "FLTD", "FLTG")
     )
+    of_gyro = "FLTG" in gains
     seen, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
     found = np.full((round(seconds * RATE) + 1, m), np.nan)
     for step in range(len(found)):
@@ -125,10 +130,12 @@ def stepped(
         flying &= np.abs(y) < _WILD * max(1.0, abs(target))
         found[step, flying] = y[flying]
         wanted = wanted + target_share * (target - wanted)
-        filtered = filtered + error_share * (wanted - seen(np.where(flying, y, 0.0)) - filtered)
+        slow = slow + gyro_share * (seen(np.where(flying, y, 0.0)) - slow)
+        filtered = filtered + error_share * (wanted - slow - filtered)
         summed = summed + filtered * dt
-        sloped = sloped + slope_share * ((filtered - before) / dt - sloped)
-        before = filtered
+        changing = -slow if of_gyro else filtered
+        sloped = sloped + slope_share * ((changing - before) / dt - sloped)
+        before = changing
         waiting.append(k["FF"] * wanted + k["P"] * filtered + k["I"] * summed + k["D"] * sloped + disturbance)
         x = (ad @ x + np.outer(bd, acting)) * flying
     return found

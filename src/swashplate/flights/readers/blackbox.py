@@ -81,7 +81,7 @@ def read(source: Source, options: Options) -> Flight:
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
         notes=tuple(notes),
         damage=(*_lost(found), *main.damage),
-        parameters=_parameters(header),
+        parameters=_parameters(header, own=fields.rotorflight),
         events=_events(found, header, main),
     )
     if note:
@@ -126,7 +126,7 @@ def _lost(found: FoundFrames) -> list[str]:
     ]
 
 
-def _parameters(header: Header) -> dict[str, float]:
+def _parameters(header: Header, *, own: bool) -> dict[str, float]:
     """Numbers of the header by name; of a row of numbers `rollPID_0`, `rollPID_1`, ..."""
     found = {}
     for name, text in header.values.items():
@@ -136,6 +136,23 @@ def _parameters(header: Header) -> dict[str, float]:
             value = as_number(part.strip(), np.nan)
             if plain and np.isfinite(value):
                 found[plain if len(parts) == 1 else f"{plain}_{i}"] = value
+    return found | (_own_gains(found) if own else {})
+
+
+def _own_gains(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Rotorflight's gains and cut-offs by the names of its command line (`roll_p_gain`).
+
+    Headers with five gains an axis (P, I, D, F, B) are of firmwares whose scales are known: `rate_gain_names`.
+    """
+    found: dict[str, float] = {}
+    for axis in ("roll", "pitch", "yaw"):
+        for header, names in (("PID", "pidfb"), ("BW", ("gyro", "d", "b"))):
+            if f"{axis}PID_4" in numbers:
+                found |= {
+                    f"{axis}_{name}_{'gain' if header == 'PID' else 'cutoff'}": numbers[f"{axis}{header}_{i}"]
+                    for i, name in enumerate(names)
+                    if f"{axis}{header}_{i}" in numbers
+                }
     return found
 
 

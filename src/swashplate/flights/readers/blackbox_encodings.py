@@ -18,15 +18,24 @@ Bytes = NDArray[np.uint8]
 Whole = NDArray[np.int64]
 
 PADDING = 64  # zero bytes behind the file's last: a field that begins inside reads no further
-_GROUPS = {4: 512, 5: 512, 6: 8, 7: 3, 8: 4, 10: 3}  # encodings that write several fields together, at most so many
+_GROUPS = {6: 8, 7: 3, 8: 4, 10: 3}  # encodings that write several fields together, at most so many
+_BITS = (4, 5)  # Elias delta: a row of bits that only a field of whole bytes ends
+_NOTHING = 9
 
 
 def groups(encodings: tuple[int, ...]) -> list[tuple[int, int, int]]:
-    """Fields that are written together: (encoding, first, end). Neighbours of one encoding, as many as it holds."""
+    """Fields that are written together: (encoding, first, end).
+
+    Neighbours of one encoding, as many as it holds. Elias delta: up to the next field that writes whole bytes, signed
+    and unsigned alike, and over fields that write nothing (as the C decoder of blackbox-tools reads it).
+    """
     found, at = [], 0
     while at < len(encodings):
-        end = at + 1
-        while end < len(encodings) and encodings[end] == encodings[at] and end - at < _GROUPS.get(encodings[at], 1):
+        kind, end = encodings[at], at + 1
+        if kind in _BITS:
+            while end < len(encodings) and encodings[end] in (*_BITS, _NOTHING):
+                end += 1
+        while end < len(encodings) and encodings[end] == kind and end - at < _GROUPS.get(kind, 1):
             end += 1
         found.append((encodings[at], at, end))
         at = end
@@ -47,7 +56,10 @@ def decoded(data: Bytes, places: Whole, layout: FrameLayout) -> tuple[Whole, Who
     reading = _Reading(data, places)
     written = np.zeros((len(layout.names), places.size), dtype=np.int64)
     for encoding, first, end in groups(layout.encodings):
-        reading.group(encoding, written[first:end])
+        if encoding in _BITS:
+            reading.elias(written[first:end], layout.encodings[first:end])
+        else:
+            reading.group(encoding, written[first:end])
     ends = np.where(reading.bad | (reading.at > data.size - PADDING), -1, reading.at)
     return written, ends
 
@@ -100,8 +112,6 @@ class _Reading:
             out[0] = self.variable()
         elif encoding == 3:
             out[0] = -_signed(self.variable(), 14)
-        elif encoding in (4, 5):
-            self._elias(out, signed=encoding == 5)
         elif encoding == 6:
             self._tag8_8svb(out)
         elif encoding == 8:
@@ -174,10 +184,12 @@ class _Reading:
             value[there] = _signed(value[there], 8 * size)
         return value
 
-    def _elias(self, out: Whole, *, signed: bool) -> None:
+    def elias(self, out: Whole, encodings: tuple[int, ...]) -> None:
         """Elias delta numbers in a row of bits, filled up to whole bytes behind the last."""
         bit = self.at * 8
-        for row in out:
+        for row, encoding in zip(out, encodings, strict=True):
+            if encoding == _NOTHING:
+                continue
             first = np.minimum(bit >> 3, self.last)
             window = np.zeros(bit.size, dtype=np.uint64)
             for i in range(8):
@@ -197,7 +209,7 @@ class _Reading:
             escaped = value == 0xFFFFFFFF  # one more bit tells the two largest numbers apart
             value = np.where(escaped, value - 1 + _bits(window, behind, np.ones_like(behind)), value - 1)
             bit += behind + escaped
-            row[:] = _unfolded(value) if signed else value
+            row[:] = _unfolded(value) if encoding == 5 else value
         self.at = (bit + 7) >> 3
 
 

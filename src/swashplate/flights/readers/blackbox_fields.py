@@ -3,9 +3,10 @@
 Both firmwares turn about forward-left-up axes: positive pitch is nose down, positive yaw is nose left, so pitch and yaw
 change their sign here. Sources: Rotorflight's setpoint.c ("CW direction is positive, while gyro[YAW] is negative"),
 Betaflight's SITL, which negates y and z of a forward-right-down gyro, and its pull request 15336 ("positive gyro Y =
-nose down"); accelerometers stand in the same axes and show +1 g at rest. Units: the firmwares' blackbox.c and the
-presenters of their log viewers (setpoint deg/s, mixer 1/1000, headspeed rpm, vbatLatest 0.01 V, amperageLatest 0.01 A,
-motor 1/1000, servo us; gyro, setpoint and rcCommand ten times as large with blackbox_high_resolution).
+nose down", as of its attitude, while the heading counts clockwise); accelerometers stand in the same axes and show +1 g
+at rest. Units: the firmwares' blackbox.c and the presenters of their log viewers (setpoint deg/s, mixer 1/1000,
+headspeed rpm, vbatLatest 0.01 V, amperageLatest 0.01 A, motor 1/1000, servo us, attitude 0.1 deg, altitude cm; gyro,
+setpoint and rcCommand ten times as large with blackbox_high_resolution).
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from swashplate.flights.readers.blackbox_header import Header
 _AXES = ("roll", "pitch", "yaw")
 _SIGNS = (1.0, -1.0, -1.0)  # forward-left-up to forward-right-down
 _THREE = {
-    "gyroADC": ("p", "q", "r"), "gyroRAW": ("p_imu", "q_imu", "r_imu"), "gyroUnfilt": ("p_imu", "q_imu", "r_imu"),
+    "gyroADC": ("p", "q", "r"), "gyroData": ("p", "q", "r"), "attitude": ("phi", "theta", "psi"),
+    "gyroRAW": ("p_imu", "q_imu", "r_imu"), "gyroUnfilt": ("p_imu", "q_imu", "r_imu"),
     "setpoint": ("p_demand", "q_demand", "r_demand"), "accADC": ("ax", "ay", "az"), "accSmooth": ("ax", "ay", "az"),
     "mixer": ("mixer_roll", "mixer_pitch", "mixer_yaw"),
     **{f"axis{term}": tuple(f"pid_{term.lower()}_{axis}" for axis in _AXES) for term in "PIDFSBO"},
@@ -32,7 +34,8 @@ _THREE = {
 _SINGLE = {
     "headspeed": ("omega_rotor", "rpm", 1.0), "tailspeed": ("omega_tail", "rpm", 1.0),
     "Vbat": ("voltage", "V", 0.01), "Ibat": ("current", "A", 0.01), "amperageLatest": ("current", "A", 0.01),
-    "BaroAlt": ("altitude_baro", "cm", 1.0),
+    "BaroAlt": ("altitude_baro", "cm", 1.0), "baroAlt": ("altitude_baro", "cm", 1.0),
+    "altitude": ("altitude_baro", "cm", 1.0),
 }  # fmt: skip
 _TERMS = "PIDFS"
 _SKIPPED = ("loopIteration", "time")
@@ -107,7 +110,9 @@ class Fields:
 
     def _axis(self, family: str, index: int) -> _Place:
         channel, sign = _THREE[family][index], _SIGNS[index]
-        if family in ("gyroADC", "gyroUnfilt", "gyroRAW"):
+        if family == "attitude":
+            return _Place(channel, "deg", (0.1, -0.1, 0.1)[index])  # its yaw is a heading: clockwise, 0 to 360
+        if family in ("gyroADC", "gyroData", "gyroUnfilt", "gyroRAW"):
             scale = self.header.number("gyro_scale", self.header.number("gyro.scale", 1.0)) or 1.0
             # Baseflight and old Cleanflight: radians in a microsecond for each count. Later: degrees in a second.
             degrees = scale if abs(scale) > 1e-6 else math.degrees(scale) * 1e6
@@ -152,8 +157,9 @@ class Fields:
     def remarks(self, found: Mapping[str, tuple[Array, str]]) -> tuple[str, ...]:
         """What a user must know about the channels."""
         told = list(self.notes)
-        if not self.firmware:
-            told.append("the header names no firmware: signs and units are taken as Betaflight's")
+        if not self.rotorflight and "betaflight" not in self.firmware.lower():
+            whose = f"the firmware is {self.firmware[:40]!r}" if self.firmware else "the header names no firmware"
+            told.append(f"{whose}: signs and units are taken as Betaflight's")
         if "p" in found and self.fine == 1.0:
             told.append("gyros and set-points are whole degrees per second (noise of 0.29 deg/s from rounding alone)")
         if self.rotorflight and "mixer_collective" in found:

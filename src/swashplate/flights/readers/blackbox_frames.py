@@ -22,7 +22,7 @@ from swashplate.flights.readers.source import refuse_oversized
 
 _BLOCK = 1 << 22  # bytes that are searched for beginnings at once
 _AT_ONCE = 1 << 22  # numbers that are decoded at once: 32 MB
-_END = b"End of log\0"
+_END = re.compile(rb"End of log[ -~]{0,40}\0")  # some firmwares add why they were disarmed
 _NUMBERS = {0: 1, 14: 2, 15: 1, 30: 2, 50: 1, 51: 1, 52: 1}  # events whose payload is so many variable bytes
 _NAMES = {
     0: "sync beep", 14: "logging resumes", 15: "disarmed", 30: "flight mode", 50: "governor state",
@@ -172,8 +172,9 @@ class _Walk:
         kind = content[at + 1] if at + 1 < len(content) else -1
         text, numbers = _NAMES.get(kind, f"event {kind}"), list[float]()
         if kind == 255:
-            self.found.ended = content.startswith(_END, place)
-            return place + len(_END) if self.found.ended else -1
+            last = _END.match(content, place)
+            self.found.ended = last is not None
+            return last.end() if last else -1
         if kind in _NUMBERS:
             for _ in range(_NUMBERS[kind]):
                 value, place = _variable(content, place)

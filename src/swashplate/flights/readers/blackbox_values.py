@@ -19,6 +19,7 @@ from swashplate.flights.readers.blackbox_header import Header
 _LEAP = 10_000_000  # us: a clock that goes further from one frame to the next is damaged, says the documentation
 _LONG = 1024  # frames behind one I frame: longer rows are added up one by one, shorter ones side by side
 _TURN = 1 << 32  # where 32 bits of microseconds begin anew: after 71.6 minutes
+_WILD = 3  # frames at a seam of two runs of the clock that may be left out of the first
 _RESUMES = 14  # the event that announces a leap
 
 
@@ -49,12 +50,13 @@ def _fitting(values: Whole, signed: bool) -> Whole:
 
 
 def constants(header: Header) -> dict[int, int]:
-    """What the predictors that do not look back stand for."""
+    """What the predictors that do not look back stand for; where the header is silent, what blackbox-tools takes."""
+    least = header.number("minthrottle", 1150.0)
     return {
-        4: int(header.number("minthrottle")),
+        4: int(least),
         8: 1500,
-        9: int(header.number("vbatref")),
-        11: int(header.number("motorOutput")),
+        9: int(header.number("vbatref", 4095.0)),
+        11: int(header.number("motorOutput", least)),
     }
 
 
@@ -160,6 +162,11 @@ def _complete(found: FoundFrames, header: Header, damage: list[str], notes: list
     A row is whole where it has as many frames as most rows have.
     """
     keep = np.ones(found.intra.size, dtype=np.bool_)
+    # A frame into which the loss fell may end at a letter by chance: it would be half of one and half of another.
+    spliced = found.broken[(found.broken > 0) & (found.broken < keep.size)] - 1
+    keep[spliced] = False
+    if spliced.size:
+        damage.append(f"{spliced.size} main frames that end where bytes were lost may be spliced: left out")
     starts = np.flatnonzero(found.intra)
     if starts.size < 2:
         return keep
@@ -219,7 +226,10 @@ def _clock(found: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: li
 
 
 def _joined(ticks: Whole, runs: Whole) -> NDArray[np.bool_]:
-    """The frames of the longest chain of runs in which each goes on within a leap of the one before it."""
+    """The frames of the longest chain of runs in which each goes on within a leap of the one before it.
+
+    Frames at a seam that are wild, or stand there twice, are left out.
+    """
     edges = np.flatnonzero(np.diff(runs, prepend=-1))
     ends = np.append(edges[1:], runs.size)
     sizes = ends - edges
@@ -231,9 +241,24 @@ def _joined(ticks: Whole, runs: Whole) -> NDArray[np.bool_]:
         run = seed + direction
         while 0 <= run < edges.size:
             early, late = (last, run) if direction > 0 else (run, last)
-            step = int(ticks[edges[late]] - ticks[ends[early] - 1]) % _TURN
-            if 0 < step <= _LEAP:
+            cut, skip = _seam(ticks[edges[early] : ends[early]], ticks[edges[late] : ends[late]])
+            if skip >= 0:
                 best[edges[run] : ends[run]] = True
+                best[ends[early] - cut : edges[late] + skip] = False
                 last = run
             run += direction
     return best
+
+
+def _seam(early: Whole, late: Whole) -> tuple[int, int]:
+    """How many frames to leave out at the end of one run and the beginning of the next so that the clock goes on.
+
+    Wild frames, or some that stand in the log twice. The second is -1 where nothing helps.
+    """
+    found = [(0, -1)]
+    for cut in range(min(_WILD, early.size)):
+        after = (late - early[-1 - cut]) % _TURN
+        goes_on = (after > 0) & (after <= _LEAP)
+        if goes_on.any():
+            found.append((cut, int(np.argmax(goes_on))))
+    return min(found[1:], key=sum, default=found[0])

@@ -13,13 +13,16 @@ from swashplate.flights.schema import QUATERNION, channel
 INJECTED = ("sweep", "sid", "reference", "excitation")
 """Names of signals that a program adds to a command: they are part of an input, not another one."""
 
+_RATE_GAINS = re.compile(
+    r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[TED])|INS_GYRO_FILTER"
+    r"|(roll|pitch|yaw)_([pidf]_gain|(gyro|d)_cutoff)|yaw_stop_gain_[01]"
+)
+
 
 def autopilot_gains(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
-    """ArduPilot's rate gains and filters, where all logs hold them and agree: suggestions of gains start from them."""
+    """Rate gains and filters of the autopilot, where all logs hold them and agree: suggestions start from them."""
     said = [flight.provenance for flight in flights]
-    names = (
-        n for n in said[0].parameters if re.fullmatch(r"ATC_RAT_(RLL|PIT|YAW)_(P|I|D|FF|FLT[TED])|INS_GYRO_FILTER", n)
-    )
+    names = (n for n in said[0].parameters if _RATE_GAINS.fullmatch(n))
     values = {n: {one.parameter(n, at=f.stop) for one, f in zip(said, flights, strict=True)} for n in names}
     same = {n: float(v) for n, one in sorted(values.items()) if len(one) == 1 and (v := one.pop()) is not None}
     return {"autopilot": same} if same else {}

@@ -10,7 +10,11 @@ from typing import Literal
 from swashplate.links.mavlink.parameter_reading import ParameterReading
 
 Verdict = Literal["right", "wrong", "yours", "absent", "not read"]
-_YOURS = ("ATC_", "H_RSC_SETPOINT", "H_RSC_RAMP_TIME", "H_RSC_RUNUP_TIME", "RC8_OPTION", "RNGFND1_TYPE", "RPM1_TYPE")
+_YOURS = (
+    "ATC_", "H_RSC_SETPOINT", "H_RSC_RAMP_TIME", "H_RSC_RUNUP_TIME", "RC8_OPTION", "RNGFND1_TYPE", "RPM1_TYPE",
+    "CA_HELI_PITCH_C1", "CA_HELI_PITCH_C2", "CA_HELI_PITCH_C3", "COM_SPOOLUP_TIME", "COM_DISARM_PRFLT",
+    "MPC_MANTHR_MIN",
+)  # fmt: skip
 """Starts of names that a user tunes: another value is told, and is no fault."""
 _DIGITS = 1e-5
 """Relative distance of two numbers that were written with six digits."""

@@ -1,16 +1,23 @@
 """PX4's parameters that a servo mapping fixes: airframe, output functions, reversals, swashplate servos, collective.
 
-Names and meanings: PX4's parameter reference (CA_, PWM_MAIN_); actuator functions 101 on are motors, 201 on servos.
+Names and meanings: PX4's parameter reference (CA_, PWM_MAIN_); actuator functions 101 on are motors, 201 on servos. A
+swashplate servo goes to collective + pitch cos(angle) - roll sin(angle), a coaxial's first motor is the clockwise one
+(PX4's ActuatorEffectivenessHelicopter and ActuatorEffectivenessHelicopterCoaxial).
 """
 
 from __future__ import annotations
 
+import math
+
+from swashplate.links.ardupilot.parameters import RUN_UP
 from swashplate.links.servo import CENTRE, HALF
 from swashplate.links.servos import CoaxialMapping, ServoMapping
 
 HELICOPTER, COAXIAL = 11, 12
 """CA_AIRFRAME: helicopter with a tail servo, coaxial helicopter."""
 _MOTOR, _SERVO = 101, 201
+_UNHURRIED = {"COM_DISARM_PRFLT": 60.0, "MPC_MANTHR_MIN": 0.0}
+"""As PX4's own helicopters (rc.heli_defaults): else it disarms 10 s after arming, while the rotor still spools up."""
 _COAXIAL_ANGLES = (270.0, 0.0)
 """CA_SP0_ANGn of a servo for roll and one for pitch [deg]."""
 
@@ -28,7 +35,10 @@ def parameters(mapping: ServoMapping) -> dict[str, float]:
         motors, servos, plate = (mapping.throttle,), (mapping.tail, *mapping.swash), len(mapping.swash)
         low, high = ((pulse - CENTRE) / HALF for pulse in mapping.collective_pulse)
         angles = mapping.angles
-        found = {"CA_AIRFRAME": float(HELICOPTER), "CA_HELI_PITCH_C0": low, "CA_HELI_PITCH_C4": high}
+        found = {"CA_AIRFRAME": float(HELICOPTER)}
+        found |= {f"CA_HELI_PITCH_C{k}": low + 0.25 * k * (high - low) for k in range(5)}
+        found |= {f"CA_HELI_THR_C{k}": 1.0 for k in range(5)}  # a governor holds the rotor's speed
+        found |= {"COM_SPOOLUP_TIME": float(math.ceil(mapping.spool + RUN_UP)), **_UNHURRIED}
     found["CA_SP0_COUNT"] = float(plate)
     found |= {f"CA_SP0_ANG{k}": angle for k, angle in enumerate(angles)}
     for first, outputs in ((_MOTOR, motors), (_SERVO, servos)):

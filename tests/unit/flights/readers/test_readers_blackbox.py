@@ -85,6 +85,42 @@ def test_every_encoding_reads_back(encoding, count):
         assert np.array_equal(main.columns[field.name], rows[:, i]), field.name
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_any_mixture_of_encodings_and_predictors_reads_back(seed):
+    """Elias delta bits run on over signed and unsigned fields, and over fields that write nothing."""
+    rng = np.random.default_rng(seed)
+    n, interval = 60, int(rng.choice([1, 4, 16]))
+    fields = [Field("loopIteration", 0, (0, 1), (6, 9)), Field("time", 0, (0, 1), (2, 0)),
+              Field("motor[0]", 0, (4, 1), (3, 0))]  # fmt: skip
+    columns = [np.arange(n), 5000 + 1000 * np.arange(n), rng.integers(1100, 2000, n)]
+    while len(fields) < 12:
+        encoding, intra = int(rng.choice([0, 1, 4, 4, 5, 5, 6, 7, 9, 10])), int(rng.choice([0, 4, 5, 8, 9, 11]))
+        group = int(rng.integers(1, 5)) if encoding not in (7, 10) else 3
+        inter = 1 if encoding == 9 else int(rng.choice([0, 1, 2, 3, 4, 5, 8, 9, 11]))
+        for _ in range(group):
+            ours = rng.integers(-(2**20), 2**20, n) if encoding != 9 else np.full(n, 77)
+            first = int(rng.choice([4, 5])) if encoding == 9 else encoding
+            fields.append(Field(f"x[{len(fields)}]", 1, (intra, first), (inter, encoding)))
+            columns.append(ours)
+    rows = np.column_stack(columns)
+    content = made.header(fields, interval=interval, share="1/1", more={})
+    _, main = decoded(content + b"".join(made.frames(fields, rows, interval=interval)) + made.END)
+    assert main.damage == ()
+    for i, field in enumerate(fields):
+        assert np.array_equal(main.columns[field.name], rows[:, i]), field
+
+
+def test_where_the_header_is_silent_constants_are_those_of_the_firmwares_own_tools():
+    fields = [Field("time", 0, (0, 1), (1, 0)), *(Field(f"x{k}", 1, (k, 0), (1, 0)) for k in (4, 9, 11))]
+    rows = np.column_stack([1000 * np.arange(1, 9), *np.zeros((3, 8), dtype=np.int64)])
+    content = made.header(fields, interval=4, share="1/1", more={})
+    for line in (b"H minthrottle:1070\n", b"H vbatref:420\n", b"H motorOutput:158,2047\n"):
+        content = content.replace(line, b"")
+    _, main = decoded(content + b"".join(made.frames(fields, rows, interval=4)) + made.END)
+    found = [int(main.columns[f"x{k}"][0]) for k in (4, 9, 11)]
+    assert found == [1150 - made.MINTHROTTLE, 4095 - made.VBATREF, 1150 - made.LOWEST]
+
+
 @pytest.mark.parametrize("predictor", [0, 1, 2, 3, 4, 5, 8, 9, 11])
 @pytest.mark.parametrize("interval", [1, 4, 2000])
 @pytest.mark.parametrize("signed", [0, 1])
@@ -148,6 +184,25 @@ def test_rotorflight_channels_signs_and_units(tmp_path):
     assert flight.provenance.parameter("rollPID_1") == 100.0
     assert flight.provenance.parameter("gyro_scale") == 1.0
     assert flight.provenance.damage == ()
+
+
+def test_attitude_height_and_gains_of_newer_firmware(tmp_path):
+    """Angles in 0.1 deg: pitch nose down positive, yaw a heading; gains by the names of the command line."""
+    fields = (*made.ROTORFLIGHT, *(Field(f"attitude[{i}]", 1, (0, 0), (1, 7)) for i in range(3)),
+              Field("altitude", 1, (0, 0), (1, 6)), Field("Vbat", 0, (9, 3), (1, 0)))  # fmt: skip
+    rows = np.zeros((40, len(fields)), dtype=np.int64)
+    rows[:, 1] = 1000 * np.arange(1, 41)
+    rows[:, -5:] = [105, 52, 2701, 1250, 2400]
+    more = {**made.RF_HEADER, "rollPID": "50,100,20,80,10", "rollBW": "50,15,20"}
+    content = made.header(fields, interval=8, share="1/1", more=more)
+    content += b"".join(made.frames(fields, rows, interval=8)) + made.END
+    flight = sp.read(saved(tmp_path, content))
+    angles = [np.rad2deg(flight.values(name)[0]) for name in ("phi", "theta", "psi")]
+    assert angles == pytest.approx([10.5, -5.2, 270.1])
+    assert flight.values("altitude_baro")[0] == pytest.approx(12.5)
+    told = {name: flight.provenance.parameter(name) for name in ("roll_p_gain", "roll_f_gain", "roll_gyro_cutoff")}
+    assert told == {"roll_p_gain": 50.0, "roll_f_gain": 80.0, "roll_gyro_cutoff": 50.0}
+    assert flight.provenance.parameter("pitch_p_gain") is None
 
 
 def test_a_tail_that_is_a_motor_has_no_yaw_command(tmp_path):
@@ -248,6 +303,46 @@ def test_of_several_logs_the_longest_or_the_one_asked_for(tmp_path):
     assert sp.read(path, log=3).provenance.source == "a.bbl#3"
     with pytest.raises(FlightError, match="log 4 is asked for; the file holds 3"):
         sp.read(path, log=4)
+
+
+def test_an_end_that_says_why(tmp_path):
+    flight = sp.read(saved(tmp_path, log_of(20, end=b"E\xffEnd of log (disarm reason:4)\0")))
+    assert flight.provenance.damage == ()
+    assert not any("end mark" in note for note in flight.provenance.notes)
+
+
+def test_frames_that_stand_twice_or_go_back_cost_nothing_else(tmp_path):
+    """A stretch written again, and an I frame of another time: the clock goes on behind them."""
+    n = 320
+    rows = np.zeros((n, 3), dtype=np.int64)
+    rows[:, 0], rows[:, 1], rows[:, 2] = np.arange(n), 5_000_000 + 2000 * np.arange(n), np.arange(n) % 700
+    fields = (*made.ROTORFLIGHT[:2], Field("gyroADC[0]", 1, (0, 0), (3, 0)))
+    pieces = made.frames(fields, rows, interval=16)
+    top = made.header(fields, interval=16, share="1/1", more={})
+    wild = b"I" + made.vb(9) + made.vb(2_000_000) + made.svb(5)
+    for changed in ([*pieces[:100], *pieces[80:]], [*pieces[:160], wild, *pieces[160:]]):
+        flight = sp.read(saved(tmp_path, top + b"".join(changed) + made.END))
+        index = np.rint((flight.time("p") - 5.0) / 0.002).astype(int)
+        assert len(index) >= n - 2 * 16
+        assert np.all(np.diff(index) > 0)
+        assert np.rint(np.rad2deg(flight.values("p"))).astype(int).tolist() == index.tolist()
+        assert flight.provenance.damage
+
+
+def test_the_frame_before_lost_bytes_may_be_two_halves(tmp_path):
+    """Cut where the rest of another frame fits: it ends at a letter by chance, and is left out."""
+    n = 64
+    rows = np.zeros((n, 3), dtype=np.int64)
+    rows[:, 0], rows[:, 1] = np.arange(n), 5_000_000 + 2000 * np.arange(n)
+    fields = (*made.ROTORFLIGHT[:2], Field("gyroADC[0]", 1, (0, 0), (3, 0)))
+    pieces = made.frames(fields, rows, interval=16)
+    pieces[20] = pieces[20][:-1] + made.svb(60)  # the end of another frame
+    pieces[21] = pieces[21][:1] + b"\xff" * 40
+    top = made.header(fields, interval=16, share="1/1", more={})
+    flight = sp.read(saved(tmp_path, top + b"".join(pieces) + made.END))
+    assert any("may be spliced" in line for line in flight.provenance.damage)
+    assert np.all(flight.values("p") == 0.0)
+    assert len(flight.values("p")) == n - 12
 
 
 def test_a_clock_that_turns_over(tmp_path):

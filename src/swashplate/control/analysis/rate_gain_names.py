@@ -1,0 +1,114 @@
+"""Names of rate-loop gains and filters, ArduPilot's and Rotorflight's, and what they are in a loop of rad/s.
+
+Rotorflight gives the mixer command u = F target + P e + I int e - D d(rate)/dt of whole numbers, with rates in deg/s.
+Its scales are those of its pid.h since headers hold five gains an axis; the filter of the gyro (`gyro_cutoff`) and the
+bandwidth of the derivative (`d_cutoff`) are of first order and see the gyro alone, not the target (pid.c, modes 2, 3).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swashplate.arrays import Array
+
+ARDUPILOT = {"RLL": ("p", "mixer_roll"), "PIT": ("q", "mixer_pitch"), "YAW": ("r", "mixer_yaw")}
+"""Rate and mixer command by the axis' name."""
+ROTORFLIGHT = {"roll": ("p", "mixer_roll"), "pitch": ("q", "mixer_pitch"), "yaw": ("r", "mixer_yaw")}
+_SCALES = {
+    "roll": {"P": 6.66666e-6, "I": 2e-4, "D": 1e-7, "FF": 2.5e-5},
+    "pitch": {"P": 6.66666e-6, "I": 2e-4, "D": 1e-6, "FF": 2.5e-5},
+    "yaw": {"P": 6.666666e-5, "I": 5e-4, "D": 1e-6, "FF": 2.5e-5},
+}
+"""Command per deg/s, of a gain of one."""
+_ENDS = {
+    "FF": "f_gain", "P": "p_gain", "I": "i_gain", "D": "d_gain", "FLTG": "gyro_cutoff", "FLTD": "d_cutoff",
+}  # fmt: skip
+_ARDUPILOT_ENDS = ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD")
+_LARGEST = 1000.0
+_FILTER = 20.0  # Hz: FLTE where the log does not say it, and FLTD of a suggestion
+_GYRO, _SLOPE = (50.0, 50.0, 100.0), (15.0, 15.0, 20.0)  # Hz: Rotorflight's own, where the log does not say them
+
+
+def firmware_of(known: Mapping[str, float]) -> str:
+    """Whose parameters a log holds: "Rotorflight" or, where nothing says so, "ArduPilot"."""
+    return "Rotorflight" if any(f"{axis}_p_gain" in known for axis in ROTORFLIGHT) else "ArduPilot"
+
+
+def names_of(axis: str) -> dict[str, str]:
+    """The firmware's name by the short one, `P`, `I`, `D`, `FF` and filters."""
+    if axis in ROTORFLIGHT:
+        return {name: f"{axis}_{end}" for name, end in _ENDS.items()}
+    return {name: f"ATC_RAT_{axis}_{name}" for name in _ARDUPILOT_ENDS}
+
+
+def filters_of(axis: str, known: Mapping[str, float]) -> dict[str, float]:
+    """Corners [Hz] that a suggestion keeps, by their short names."""
+    if axis in ROTORFLIGHT:
+        index = tuple(ROTORFLIGHT).index(axis)
+        return {
+            "FLTG": known.get(f"{axis}_gyro_cutoff", _GYRO[index]),
+            "FLTD": known.get(f"{axis}_d_cutoff", _SLOPE[index]),
+        }
+    return {"FLTE": known.get(f"ATC_RAT_{axis}_FLTE", _FILTER), "FLTD": _FILTER}
+
+
+def short(gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains as a loop of rad/s has them, by short names, from either firmware's."""
+    own = {name: (axis, key) for axis in ROTORFLIGHT for key, name in names_of(axis).items()}
+    found = {}
+    for name, value in gains.items():
+        if name in own:
+            axis, key = own[name]
+            found[key] = float(value) * _unit(axis, key)
+        else:
+            found[name.rsplit("_", 1)[-1]] = float(value)
+    return found
+
+
+def written(axis: str, gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains of a loop of rad/s by the firmware's names and in its units."""
+    return {
+        name: _whole(gains[key] / _unit(axis, key)) if axis in ROTORFLIGHT else gains[key]
+        for key, name in names_of(axis).items()
+        if key in gains
+    }
+
+
+def representable(axis: str, grid: Mapping[str, Array]) -> dict[str, Array]:
+    """Of m sets of gains, shape (m,) each, the ones that the firmware can hold, rounded as it holds them."""
+    if axis not in ROTORFLIGHT:
+        return dict(grid)
+    counts = {key: np.round(values / _unit(axis, key)) for key, values in grid.items()}
+    held = np.all([(counts[key] >= 0.0) & (counts[key] <= _LARGEST) for key in ("FF", "P", "I", "D")], axis=0)
+    held &= counts["P"] >= 1.0
+    rows = np.stack([counts[key][held] for key in grid], axis=1)
+    each = np.unique(rows, axis=0)
+    return {key: each[:, k] * _unit(axis, key) for k, key in enumerate(grid)}
+
+
+def gain_text(name: str, value: float) -> str:
+    """A gain as a table shows it: a whole number where the firmware holds whole ones."""
+    return f"{value:.0f}" if name.endswith(("_gain", "_cutoff")) else f"{value:.4f}"
+
+
+def beware(axis: str, known: Mapping[str, float]) -> str:
+    """What of the firmware's law is not in the loop that was judged, in words; empty for ArduPilot's."""
+    if axis not in ROTORFLIGHT:
+        return ""
+    stops: Sequence[float] = [known[name] for name in ("yaw_stop_gain_0", "yaw_stop_gain_1") if name in known]
+    words = " Boost, relax and decay of the error are not in the loop that was judged."
+    if axis == "yaw" and stops and max(stops) > 100.0:
+        lost = 20.0 * math.log10(max(stops) / 100.0)
+        words += f" The stop gain of {max(stops):g} % multiplies P: take {lost:.1f} dB from the gain margin."
+    return words
+
+
+def _unit(axis: str, key: str) -> float:
+    return math.degrees(_SCALES[axis][key]) if key in _SCALES[axis] else 1.0
+
+
+def _whole(value: float) -> float:
+    return float(round(value))
