@@ -16,6 +16,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
+from swashplate import files
 from swashplate.errors import DocumentError, SwashError
 
 Schema = TypeVar("Schema")
@@ -209,12 +210,7 @@ def read_text(path: str | Path, *, form: Form, error: type[SwashError] = Documen
         error: where it is missing, cannot be read, is too large or no text.
     """
     try:
-        place = Path(path)
-        with place.open("rb") as file:
-            content = file.read(LARGEST_FILE[form] + 1)
-        if len(content) > LARGEST_FILE[form]:
-            raise error(f"has more than {LARGEST_FILE[form]:,} bytes, which no such file needs.", where=path, hint=hint)
-        return content.decode("utf-8-sig")
+        return files.read_text(path, most=LARGEST_FILE[form])
     except FileNotFoundError:
         raise error("there is no such file.", where=path, hint="Check the path.") from None
     except UnicodeDecodeError:

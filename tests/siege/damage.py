@@ -55,7 +55,7 @@ def damaged(content: bytes, chance: random.Random, *, others: Sequence[bytes] = 
 
 def _damage(found: bytearray, chance: random.Random, others: Sequence[bytes]) -> None:
     at = chance.randrange(min(len(found), _HEAD) if chance.random() < 0.5 else len(found))
-    kind = chance.randrange(11)
+    kind = chance.randrange(12)
     if kind == 0:
         found[at] ^= 1 << chance.randrange(8)
     elif kind == 1:
@@ -84,6 +84,8 @@ def _damage(found: bytearray, chance: random.Random, others: Sequence[bytes]) ->
         other = chance.choice(others)
         begin = chance.randrange(len(other))
         found[at : at + chance.choice((0, 50, 500))] = other[begin : begin + chance.choice((8, 100, 1000))]
+    elif kind == 10:  # what a disk holds after a power cut
+        found[at:] = bytes(chance.choice((len(found) - at, 512, 4096)))
     else:
         found[at:at] = chance.choice(ODD_WORDS).encode()
 

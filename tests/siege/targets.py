@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import io
 import json
-import random
 import tempfile
-import tomllib
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
-from scipy.io import savemat
 
 import made_autopilot_logs
 import made_blackbox_logs
 import made_logs
 import swashplate as sp
 from made_results import result
-from mutations import mutated
 from swashplate.bench.record_files import is_bench, read_bench
 from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.draws.robustness import draw_models
@@ -44,103 +37,8 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.links.servos import servo_mapping
 from swashplate.models.linear.expressions import parse_tie
 
-from .damage import ODD_FLOATS, damaged
-
-Use = Callable[[Path], object]
-
-
-@dataclass(frozen=True)
-class Target:
-    """A kind of file: whole ones, how one is damaged (by its seed), and what reads it."""
-
-    suffix: str
-    whole: tuple[bytes, ...]
-    mutate: Callable[[tuple[bytes, ...], random.Random], bytes]
-    use: Use
-
-    def mutant(self, chance: random.Random) -> bytes:
-        """A damaged file; the same chance gives the same bytes."""
-        return self.mutate(self.whole, chance)
-
-
-def _bytes(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
-    return damaged(chance.choice(whole), chance, others=whole)
-
-
-def _document(form: str) -> Callable[[tuple[bytes, ...], random.Random], bytes]:
-    """Mostly a document with a wrong entry, now and then wrong bytes."""
-
-    read = functools.cache(lambda text: tomllib.loads(text.decode()) if form == "toml" else json.loads(text))
-
-    def mutate(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
-        text = chance.choice(whole)
-        if chance.random() < 0.5:
-            return damaged(text, chance, others=whole)
-        return mutated(read(text), chance, form=form).encode("utf-8", errors="surrogatepass")
-
-    return mutate
-
-
-def _hdf5(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
-    """Wrong bytes, or a file that the library wrote well with something in it that nobody would write."""
-    content = chance.choice(whole)
-    if chance.random() < 0.4:
-        return damaged(content, chance, others=whole)
-    file = io.BytesIO(content)
-    with contextlib.suppress(Exception), h5py.File(file, "r+") as opened:
-        _change_hdf5(opened, chance)
-    return file.getvalue()
-
-
-def _change_hdf5(opened: h5py.File, chance: random.Random) -> None:
-    names: list[str] = []
-    opened.visit(names.append)
-    place = opened[chance.choice([*names, "/"])]
-    values = np.array(chance.choices(ODD_FLOATS, k=chance.choice((0, 1, 2, 5, 40))))
-    odd: Any = chance.choice((values, values.astype(np.float32), np.arange(3), "text", np.array([["a"]], "S3"), 7))
-    match chance.randrange(5):
-        case 0:
-            place.attrs[chance.choice([*place.attrs, "units", "x"])] = odd
-        case 1 if isinstance(place, h5py.Dataset) and place.size:
-            for _ in range(chance.choice((1, 3, 50))):
-                place[chance.randrange(place.shape[0])] = chance.choice(ODD_FLOATS)
-        case 2 if place.name != "/":
-            del opened[place.name]
-        case 3 if place.name != "/":
-            del opened[place.name]
-            opened[place.name] = odd
-        case _:
-            key = chance.choice(list(opened.attrs))
-            text = opened.attrs[key]
-            document = json.loads(text) if isinstance(text, str) and text[:1] in "[{" else None
-            opened.attrs[key] = mutated({"a": document}, chance, form="json")[5:-1] if document else odd
-
-
-def _matlab(whole: tuple[bytes, ...], chance: random.Random) -> bytes:
-    """Wrong bytes, or a file with fields of odd numbers and shapes."""
-    if chance.random() < 0.5:
-        return _bytes(whole, chance)
-    fields = made_logs.coax_record(40)
-    for _ in range(chance.choice((1, 1, 2, 3))):
-        name = chance.choice([*fields, "other"])
-        value = np.zeros(3) if name not in fields else fields[name]
-        value = np.array(value if np.issubdtype(np.asarray(value).dtype, np.floating) else np.zeros(3))
-        match chance.randrange(5):
-            case 0:
-                begin, step = chance.randrange(max(value.size, 1)), chance.choice((1, 7, 1000))
-                value.flat[begin::step] = chance.choice(ODD_FLOATS)
-            case 1:
-                value = np.zeros(chance.choice(((0,), (0, 0), (1,), (3, 1), (2, 2, 2), (40, 3))))
-            case 2:
-                value = value * chance.choice(ODD_FLOATS)
-            case 3:
-                value = np.array("text")
-            case _:
-                value = value.T.astype(chance.choice(("f4", "i1", "u8", "c16")))
-        fields[name] = value
-    file = io.BytesIO()
-    savemat(file, {"Data": fields}, do_compression=chance.random() < 0.5)
-    return file.getvalue()
+from .more_targets import MORE
+from .target import Target, Use, by_bytes, by_entries, by_hdf5, by_matlab
 
 
 # ---- what reads them ---------------------------------------------------------------------------------------------
@@ -358,16 +256,16 @@ def _rows(count: int) -> list[made_autopilot_logs.Row]:
     return made_autopilot_logs.ardupilot_rows()[:count]
 
 
-def _logs(whole: Callable[[], tuple[bytes, ...]], suffix: str, how: Any = _bytes) -> Callable[[], Target]:
+def _logs(whole: Callable[[], tuple[bytes, ...]], suffix: str, how: Any = by_bytes) -> Callable[[], Target]:
     return lambda: Target(suffix, whole(), how, _look)
 
 
 def _documents(form: str, whole: Callable[[], tuple[bytes, ...]], use: Use) -> Callable[[], Target]:
-    return lambda: Target(f".{form}", whole(), _document(form), use)
+    return lambda: Target(f".{form}", whole(), by_entries(form), use)
 
 
 def _texts(whole: tuple[bytes, ...], read: Callable[[str], object]) -> Callable[[], Target]:
-    return lambda: Target(".txt", whole, _bytes, _line(read))
+    return lambda: Target(".txt", whole, by_bytes, _line(read))
 
 
 def _saved_mat(compressed: bool) -> bytes:
@@ -384,9 +282,9 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "PX4 ULog": _logs(lambda: (made_autopilot_logs.ulog(15), made_autopilot_logs.ulog(15, dropout=True)), ".ulg"),
     "Blackbox log": _logs(_blackbox, ".bbl"),
     "ROS bag, first form": _logs(lambda: _bags(1), ".bag"),
-    "ROS bag, second form": lambda: Target("", _bags(2), _bytes, _look_at_bag),
-    "CoaX .mat": _logs(lambda: (_saved_mat(True), _saved_mat(False)), ".mat", _matlab),
-    "netCDF flight": _logs(lambda: (_written("a.nc", _flight().save),), ".nc", _hdf5),
+    "ROS bag, second form": lambda: Target("", _bags(2), by_bytes, _look_at_bag),
+    "CoaX .mat": _logs(lambda: (_saved_mat(True), _saved_mat(False)), ".mat", by_matlab),
+    "netCDF flight": _logs(lambda: (_written("a.nc", _flight().save),), ".nc", by_hdf5),
     "growing recording": _logs(lambda: (_written("a.growing", _growing),), ".growing"),
     "NanoBench CSV": _logs(lambda: (_nanobench(),), ".csv"),
     "Vicon export": _logs(lambda: (made_logs.vicon(VICON_ROWS).encode(),), ".csv"),
@@ -395,7 +293,7 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "bench record": _logs(_bench, ".csv"),
     "CSV map": _documents("toml", lambda: (MAPPING.encode(),), _with_flight("table.csv", TABLE)),
     "recorder calibration": _documents("toml", lambda: (RECORDER.encode(),), _with_flight("volts.csv", VOLTS)),
-    "frequency responses": lambda: Target(".nc", (_responses(),), _hdf5, _use_responses),
+    "frequency responses": lambda: Target(".nc", (_responses(),), by_hdf5, _use_responses),
     "card of a coaxial": _documents("toml", lambda: _packaged("models/data", "coax.toml"), _vehicle),
     "card of a helicopter": _documents("toml", lambda: _packaged("models/data", "raptor50.toml"), _vehicle),
     "structure": _documents("toml", lambda: _packaged("models/linear/structures", "thirteen_state.toml"), _vehicle),
@@ -409,6 +307,7 @@ TARGETS: Mapping[str, Callable[[], Target]] = {
     "ArduPilot model": _documents("json", lambda: (json.dumps(dict.fromkeys(KEYS, 0.5)).encode(),), read_ardupilot),
     "maneuver": _texts(MANEUVERS, sp.maneuver),
     "expression": _texts(EXPRESSIONS, parse_tie),
+    **MORE,
 }
 """By name, made when asked for: some take seconds."""
 

@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from swashplate.errors import SwashError
+from swashplate.errors import FlightError, SwashError
+from swashplate.flights import hdf5
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import result_file
 from swashplate.identification.core.result import Result
@@ -44,10 +45,7 @@ def load(
 
 
 def _holds_flight(path: Path) -> bool:
-    import h5py
-
     try:
-        with h5py.File(path, "r") as file:
-            return "streams" in file.attrs
-    except OSError:
+        return hdf5.read(path, wanted="swashplate_response") is None
+    except (FlightError, ValueError):
         return True  # missing or damaged: the reader of flights says how

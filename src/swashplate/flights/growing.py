@@ -175,6 +175,8 @@ def load(path: str | Path) -> Flight:
     """
     place = Path(path)
     try:
+        if not place.is_file():
+            raise OSError(errno.ENOENT, "there is no such file")
         with place.open("rb") as file:
             content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except (OSError, ValueError) as error:

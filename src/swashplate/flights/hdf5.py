@@ -1,112 +1,169 @@
-"""HDF5 files of others, looked through before anything in them is read.
-
-HDF5 can say that a data set's bytes lie in any other file (external storage, virtual data sets, external links), ask
-for a plugin that unpacks them, and claim sizes for which nothing was ever stored. None of our files does.
-"""
+"""HDF5 files, read in a process of their own (`hdf5_process`), so that no damaged file ends or stops this one."""
 
 from __future__ import annotations
 
+import atexit
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.errors import FlightError
-from swashplate.flights.readers.source import refuse_oversized
 
-_OWN_FILTERS = {
-    h5py.h5z.FILTER_DEFLATE,
-    h5py.h5z.FILTER_SHUFFLE,
-    h5py.h5z.FILTER_FLETCHER32,
-    h5py.h5z.FILTER_SCALEOFFSET,
-    h5py.h5z.FILTER_NBIT,
-}
-_DEEPEST = 8  # groups inside each other; ours have one
+_LAST = {"foreign", "failed", "refused"}
 
 
-def check(path: Path, file: h5py.File) -> None:
-    """Refuses a file that points outside of itself, needs a plugin, or claims more than it can hold.
+@dataclass(frozen=True)
+class Variable:
+    """A data set.
+
+    Attributes:
+        values: its numbers or texts, in its own type and shape.
+        attributes: its numbers and texts; lists where there are several.
+    """
+
+    values: NDArray[Any]
+    attributes: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group's attributes and data sets; the groups in it are told by their own names."""
+
+    attributes: Mapping[str, Any]
+    variables: dict[str, Variable] = field(default_factory=dict)
+
+
+def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
+    """All of a file: its groups by name, "" the root.
+
+    Args:
+        path: the file.
+        wanted: an attribute of the root.
+
+    Returns:
+        None where it has no such attribute: it is no file of ours, and nothing more of it is read.
 
     Raises:
-        FlightError: naming the part of the file.
+        FlightError: where the file points outside of itself, needs a plugin, claims more than it can hold, or where the
+            library ends its process or comes to no end.
+        ValueError: for damaged bytes, in the library's words.
     """
-    claimed = _claimed(path, file.id, "", set())
-    refuse_oversized(claimed, size=path.stat().st_size, where=str(path), what="its data sets together")
+    found: dict[str, Group] = {}
+    for told, content in _process().ask(path, wanted):
+        if "foreign" in told:
+            return None
+        if "failed" in told:
+            raise ValueError(told["failed"])
+        if "refused" in told:
+            problem, channel, hint = told["refused"]
+            raise FlightError(problem, where=path, channel=channel, hint=hint)
+        if "group" in told:
+            at = found.setdefault(told["group"], Group(told["attributes"]))
+        elif told:
+            kind = np.dtype(object) if "texts" in told else np.dtype(told["dtype"])
+            flat = np.array(told["texts"], kind) if "texts" in told else np.frombuffer(content, kind)
+            at.variables[told["variable"]] = Variable(flat.reshape(told["shape"]), told["attributes"])
+    return found
 
 
-def _claimed(path: Path, group: h5py.h5g.GroupID, name: str, seen: set[int]) -> int:
-    """Bytes that the data sets of a group claim, those of the groups in it included."""
-    if name.count("/") > _DEEPEST:
-        raise _refused(path, name, "its groups are nested too deeply")
-    claimed = 0
-    for link in list(group):
-        inner = f"{name}/{link.decode('utf-8', 'replace')}"
-        if group.links.get_info(link).type != h5py.h5l.TYPE_HARD:
-            raise _refused(path, inner, "it is a link, to another file perhaps")
-        place = h5py.h5o.get_info(group, link).addr
-        if place in seen:  # a group that lies within itself
-            continue
-        seen.add(place)
-        item = h5py.h5o.open(group, link)
-        if isinstance(item, h5py.h5g.GroupID):
-            claimed += _claimed(path, item, inner, seen)
-        elif isinstance(item, h5py.h5d.DatasetID):
-            claimed += _claimed_by(path, item, inner)
-    return claimed
+class _Process:
+    """The other process, started when it is first asked, and again after it was ended."""
+
+    def __init__(self) -> None:
+        self.owner = os.getpid()
+        self._running: subprocess.Popen[bytes] | None = None
+        self._one = threading.Lock()
+        atexit.register(self._close)
+
+    def ask(self, path: Path, wanted: str) -> Iterator[tuple[dict[str, Any], bytearray]]:
+        """The frames that answer a question; the last one is empty, or says what was wrong."""
+        question = json.dumps({"path": os.path.abspath(path), "wanted": wanted}).encode() + b"\n"
+        with self._one:
+            process = self._started(path)
+            whole = False
+            try:
+                process.stdin.write(question)  # type: ignore[union-attr]
+                process.stdin.flush()  # type: ignore[union-attr]
+                while not whole:
+                    text = self._bytes(process, int.from_bytes(self._bytes(process, 8), "little"))
+                    told = json.loads(text)
+                    content = self._bytes(process, told.get("bytes", 0))
+                    whole = not told or bool(_LAST & told.keys())
+                    yield told, content
+            except (EOFError, BrokenPipeError):
+                raise FlightError(
+                    f"the HDF5 library {self._end(process)} over it: it is damaged or forged.",
+                    where=path,
+                    hint="Copy it again.",
+                ) from None
+            finally:
+                if not whole:  # what is left of the answer belongs to nobody
+                    self._close()
+
+    def _started(self, path: Path) -> subprocess.Popen[bytes]:
+        if self._running is None or self._running.poll() is not None:
+            self._close()
+            code = f"import sys; sys.path[:] = {sys.path!r}; from swashplate.flights.hdf5_process import main; main()"
+            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+            try:
+                self._running = subprocess.Popen(
+                    [sys.executable, "-c", code],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    env=environment,
+                )
+            except OSError as error:
+                raise FlightError(f"a process to read it cannot be started: {error.strerror}.", where=path) from error
+        return self._running
+
+    @staticmethod
+    def _bytes(process: subprocess.Popen[bytes], count: int) -> bytearray:
+        found = bytearray(count)
+        view, at = memoryview(found), 0
+        while at < count:
+            got = process.stdout.readinto(view[at:])  # type: ignore[union-attr]
+            if not got:
+                raise EOFError
+            at += got
+        return found
+
+    @staticmethod
+    def _end(process: subprocess.Popen[bytes]) -> str:
+        code = process.wait()
+        if code == -signal.SIGXCPU:
+            return "came to no end"
+        return f"ended its process ({signal.Signals(-code).name if code < 0 else code})"
+
+    def _close(self) -> None:
+        running, self._running = self._running, None
+        if running is None:
+            return
+        own = self.owner == os.getpid()  # a fork has its parent's process
+        if own:
+            running.kill()
+        with suppress(OSError):
+            running.stdin.close()  # type: ignore[union-attr]
+        running.stdout.close()  # type: ignore[union-attr]
+        if own:
+            running.wait()
 
 
-def _claimed_by(path: Path, item: h5py.h5d.DatasetID, name: str) -> int:
-    made = item.get_create_plist()
-    if made.get_layout() == h5py.h5d.VIRTUAL:
-        raise _refused(path, name, "it is virtual: its numbers lie in other files")
-    if made.get_external_count():
-        raise _refused(path, name, "its numbers lie in other files")
-    for k in range(made.get_nfilters()):
-        if made.get_filter(k)[0] not in _OWN_FILTERS:
-            raise _refused(path, name, "it is packed by a plugin")
-    _check_scales(path, item, name)
-    return int(np.prod(item.shape or (), dtype=object)) * int(item.dtype.itemsize)
+_processes: list[_Process] = []
 
 
-def _check_scales(path: Path, item: h5py.h5d.DatasetID, name: str) -> None:
-    """HDF5 1.14 reads what says which axis is along which as if it were of the right type: with another one it writes
-    beyond its memory, and the process dies then or later."""
-    for attribute, right in _SCALES.items():
-        if not h5py.h5a.exists(item, attribute):
-            continue
-        found = h5py.h5a.open(item, attribute)
-        if not right(found.get_type()) or (attribute == b"DIMENSION_LIST" and found.shape != (item.rank,)):
-            raise _refused(path, f"{name}/{attribute.decode()}", "it is not of the type that HDF5 expects")
-
-
-def _lists_references(kind: h5py.h5t.TypeID) -> bool:
-    return isinstance(kind, h5py.h5t.TypeVlenID) and isinstance(kind.get_super(), h5py.h5t.TypeReferenceID)
-
-
-def _pairs_references(kind: h5py.h5t.TypeID) -> bool:
-    """Whether it is a reference and the number of an axis."""
-    if not isinstance(kind, h5py.h5t.TypeCompoundID) or kind.get_nmembers() != 2:
-        return False
-    first, second = kind.get_member_type(0), kind.get_member_type(1)
-    return isinstance(first, h5py.h5t.TypeReferenceID) and isinstance(second, h5py.h5t.TypeIntegerID)
-
-
-def _is_text(kind: h5py.h5t.TypeID) -> bool:
-    return isinstance(kind, h5py.h5t.TypeStringID) and not kind.is_variable_str()
-
-
-_SCALES = {
-    b"DIMENSION_LIST": _lists_references,
-    b"REFERENCE_LIST": _pairs_references,
-    b"CLASS": _is_text,
-    b"NAME": _is_text,
-}
-
-
-def _refused(path: Path, name: str, what: str) -> FlightError:
-    return FlightError(
-        f"{what}, and that is not read.",
-        where=path,
-        channel=name.removeprefix("/"),
-        hint="No file of swashplate's is so; do not trust this one.",
-    )
+def _process() -> _Process:
+    if not _processes or _processes[-1].owner != os.getpid():
+        _processes[:] = [_Process()]
+    return _processes[-1]

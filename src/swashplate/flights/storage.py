@@ -20,6 +20,7 @@ import xarray as xr
 from swashplate import documents
 from swashplate.atomic import write_bytes
 from swashplate.errors import FlightError
+from swashplate.flights import hdf5
 from swashplate.flights.provenance import LATEST, ProcessingStep, Provenance
 from swashplate.flights.schema import SCHEMA_VERSION
 
@@ -79,53 +80,38 @@ def save(flight: Parts, path: str | os.PathLike[str]) -> Path:
     return write_bytes(path, file.getbuffer())
 
 
-def _text(value: Any) -> str:
-    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
+def _groups(path: Path) -> dict[str, hdf5.Group]:
+    """What is in a file of ours, by the names of its groups."""
+    groups = hdf5.read(path, wanted="swashplate_schema")
+    if groups is None:
+        raise FlightError(
+            "is an HDF5 or netCDF file that swashplate did not write.",
+            where=path,
+            hint="Export its channels as CSV with units in the header.",
+        )
+    version = int(np.ravel(groups[""].attributes["swashplate_schema"])[0])
+    if version > SCHEMA_VERSION:
+        raise FlightError(
+            f"has schema version {version}; this swashplate knows versions up to {SCHEMA_VERSION}.",
+            where=path,
+            hint="Update swashplate.",
+        )
+    return groups
 
 
-def _checked_attributes(path: Path) -> dict[str, str]:
-    """The root's attributes, after the file has been looked through."""
-    import h5py  # a twentieth of a second that a log of another format need not wait
-
-    from swashplate.flights import hdf5
-
-    with h5py.File(path, "r") as file:
-        root = dict(file.attrs)
-        if "swashplate_schema" not in root:
-            raise FlightError(
-                "is an HDF5 or netCDF file that swashplate did not write.",
-                where=path,
-                hint="Export its channels as CSV with units in the header.",
-            )
-        version = int(np.ravel(root.pop("swashplate_schema"))[0])
-        if version > SCHEMA_VERSION:
-            raise FlightError(
-                f"has schema version {version}; this swashplate knows versions up to {SCHEMA_VERSION}.",
-                where=path,
-                hint="Update swashplate.",
-            )
-        hdf5.check(path, file)
-    return {name: _text(value) for name, value in root.items() if not name.startswith("_")}
-
-
-def _load_stream(path: Path, group: str) -> xr.Dataset:
-    with xr.open_dataset(path, group=group, engine=_ENGINE, decode_times=False, mask_and_scale=False) as data:
-        return data.load()
-
-
-def _check_stream(name: str, data: xr.Dataset, place: Path) -> None:
-    """Refuses a stream that `save` cannot have written."""
-    if "time" not in data.coords:
+def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
+    """A group's data set; refuses what `save` cannot have written."""
+    if "time" not in group.variables:
         raise FlightError("has no time.", where=place, channel=name, hint="Save it again.")
-    for variable, values in data.variables.items():
-        if values.dims != ("time",) or values.dtype.kind not in "fiub":
+    time = group.variables["time"].values
+    for variable, found in group.variables.items():
+        if found.values.shape != time.shape or found.values.ndim != 1 or found.values.dtype.kind not in "fiub":
             raise FlightError(
-                f"has the dimensions {values.dims} and the type {values.dtype}, expected numbers over time.",
+                f"has the shape {found.values.shape} and the type {found.values.dtype}, expected numbers over time.",
                 where=place,
                 channel=f"{name}/{variable}",
                 hint="Save it again.",
             )
-    time = data["time"].values
     if time.dtype.kind != "f" or not np.all(np.abs(time) <= LATEST) or not np.all(np.diff(time) > 0):
         raise FlightError(
             "the times do not increase: the file is damaged.",
@@ -133,6 +119,8 @@ def _check_stream(name: str, data: xr.Dataset, place: Path) -> None:
             channel=f"{name}/time",
             hint="Copy it again.",
         )
+    made = {variable: ("time", found.values, found.attributes) for variable, found in group.variables.items()}
+    return xr.Dataset(made, coords={"time": made.pop("time")}, attrs=group.attributes)
 
 
 def _attribute(attributes: Mapping[str, str], name: str, schema: type[Schema], place: Path) -> Schema:
@@ -151,11 +139,10 @@ def load(path: str | os.PathLike[str]) -> Parts:
     if not place.is_file():
         raise FlightError("there is no such file.", where=place, hint="Check the path.")
     try:
-        attributes = _checked_attributes(place)
-        groups = _attribute(attributes, "streams", list[tuple[str, str]], place)
-        streams = {name: _load_stream(place, group) for name, group in groups}
-        for name, data in streams.items():
-            _check_stream(name, data, place)
+        groups = _groups(place)
+        attributes = {name: str(value) for name, value in groups[""].attributes.items()}
+        named = _attribute(attributes, "streams", list[tuple[str, str]], place)
+        streams = {name: _stream(name, groups[group], place) for name, group in named}
         return Parts(
             streams=streams,
             provenance=_attribute(attributes, "provenance", Provenance, place),

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from swashplate.errors import CardError, SwashError
+from swashplate.files import read_text
 from swashplate.models.conventional.derivative_table import COLUMNS, MOTIONS, ROWS, split_name, unit
 
 _ROWS = {**{row.lower(): row for row in ROWS}, "u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}
@@ -50,8 +51,8 @@ def read_published(
         SwashError: for a file that cannot be read, or a name, number or unit in it.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(path).splitlines()
+    except (OSError, ValueError) as error:
         raise SwashError("cannot be read as a text file.", where=path) from error
     rows = [[cell.strip() for cell in row] for row in csv.reader(line for line in lines if not line.startswith("#"))]
     rows = [row for row in rows if any(row)]

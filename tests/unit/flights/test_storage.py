@@ -191,7 +191,7 @@ def test_a_stream_without_time_is_refused(tmp_path: Path) -> None:
     path = _flight().save(tmp_path / "a.nc")
     with h5py.File(path, "a") as file:
         file["stream_0"].create_dataset("single", data=3.0)
-    with pytest.raises(FlightError, match=r"motion/single: has the dimensions .*expected numbers over time"):
+    with pytest.raises(FlightError, match=r"motion/single: has the shape .*expected numbers over time"):
         read(path)
     with h5py.File(path, "a") as file:
         del file["stream_0/single"]
@@ -201,13 +201,10 @@ def test_a_stream_without_time_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("odd", [np.arange(40.0), np.array([["a"]], "S3"), 7], ids=["numbers", "words", "one"])
-def test_a_list_of_axes_of_another_type_is_refused_before_hdf5_reads_it(odd: object, tmp_path: Path) -> None:
+def test_a_list_of_axes_of_another_type_is_never_read(odd: object, tmp_path: Path) -> None:
     """HDF5 1.14 writes beyond its memory there: the process ends, at once or later."""
-    path = tmp_path / "a.nc"
-    t = np.arange(5) / 10.0
-    Flight({"log": stream(t, {"p": t})}, Provenance(source="a test", reader="tests", reader_version="1")).save(path)
+    path = _flight().save(tmp_path / "a.nc")
     with h5py.File(path, "r+") as file:
         place = next(item for item in file["stream_0"].values() if "DIMENSION_LIST" in item.attrs)
         place.attrs["DIMENSION_LIST"] = odd
-    with pytest.raises(FlightError, match="DIMENSION_LIST: it is not of the type"):
-        Flight.load(path)
+    assert Flight.load(path) == _flight()

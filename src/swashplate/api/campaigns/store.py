@@ -16,15 +16,29 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from swashplate import atomic, documents
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.errors import CampaignError
+from swashplate.files import read_bytes
 
 FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
 RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
 _SCHEMA = 1
+_LARGEST_RESULT = 2 << 30  # bytes
+
+
+class _Plan(msgspec.Struct):
+    """What `CampaignPlan.stored` writes."""
+
+    of: str
+    place: str
+    document: dict[str, Any]
+    files: dict[str, str]
+    program: dict[str, str]
+    portions: list[tuple[int, int, int, str, str]]
 
 
 class CampaignStore:
@@ -65,13 +79,17 @@ class CampaignStore:
             raise CampaignError(
                 "holds no campaign.", where=self.folder, hint="Begin one: swash campaign run FILE -o FOLDER"
             )
-        found = documents.read_document(self.folder / PLAN, form="json", error=CampaignError)
+        path = self.folder / PLAN
+        found = documents.read_document(path, form="json", error=CampaignError)
         if found.get("kind") != "campaign-plan" or found.get("schema") != _SCHEMA:
             raise CampaignError(
                 f"is of schema {found.get('schema')}, expected {_SCHEMA}.",
-                where=self.folder / PLAN,
+                where=path,
                 hint="Finish it with the version that began it, or begin anew in another folder.",
             )
+        documents.checked(
+            found, _Plan, where=path, error=CampaignError, hint="It is damaged: begin anew in another folder."
+        )
         return found
 
     def text(self) -> str:
@@ -142,11 +160,15 @@ class CampaignStore:
         """
         path = self.folder / RESULTS / f"{name}.npz"
         try:
-            with np.load(path, allow_pickle=False) as found:
+            content = io.BytesIO(read_bytes(path, most=_LARGEST_RESULT))
+            with zipfile.ZipFile(content) as packed:
+                if sum(entry.file_size for entry in packed.infolist()) > _LARGEST_RESULT:
+                    raise ValueError("it claims more than it can hold")
+            with np.load(content, allow_pickle=False) as found:
                 return {key: found[key] for key in found.files}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
             raise CampaignError(
-                f"is no result of a task: {error}.",
+                f"is no result of a task: {error or type(error).__name__}.",
                 where=path,
                 hint="Remove it and run `swash campaign resume`: the task is done again.",
             ) from None

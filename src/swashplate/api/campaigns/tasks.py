@@ -10,6 +10,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from swashplate.errors import CampaignError
+
+MOST_TASKS = 100_000
+"""Of a campaign: each is a file, and all are named before the first begins."""
+
 Columns = dict[str, NDArray[Any]]
 """A table by column: numbers or texts, all of the same length."""
 
@@ -59,7 +64,16 @@ def portions(*, count: int, batch: int, seed: int) -> tuple[Portion, ...]:
     Every task has a seed of its own, by SHA-256 from the campaign's seed and its first row: 48 bits, so that seeds that
     are counted up from it (each aircraft's sensors) meet those of no other task. A campaign that is made longer keeps
     the tasks that it had, but for a last one that was shorter.
+
+    Raises:
+        CampaignError: for more than `MOST_TASKS`.
     """
+    if count > MOST_TASKS * max(batch, 1):
+        raise CampaignError(
+            f"{count:,} rows in tasks of {batch:,} are more than {MOST_TASKS:,} tasks.",
+            channel="count",
+            hint="Give fewer rows, or more of them in a task ('batch').",
+        )
     return tuple(
         Portion(first, min(batch, count - first), seed_of(seed, first)) for first in range(0, count, max(batch, 1))
     )

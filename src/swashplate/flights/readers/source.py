@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from swashplate.errors import FlightError
+from swashplate.files import read_bytes
 from swashplate.flights.provenance import Provenance
 
 # The largest file that is read and the largest content it may unpack to: an hour at 400 Hz of 100 channels is 1.2 GB.
@@ -118,7 +119,7 @@ def open_source(path: str | os.PathLike[str]) -> Source:
                 where=place,
                 hint="Split it into shorter flights.",
             )
-        content = b"".join(file.read_bytes() for file in files)
+        content = b"".join(read_bytes(file, most=LARGEST_FILE) for file in files)
     except FileNotFoundError:
         raise FlightError("there is no such file.", where=place, hint="Check the path.") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte

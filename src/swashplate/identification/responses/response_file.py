@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import msgspec
 import numpy as np
 import xarray as xr
@@ -84,12 +83,12 @@ def load(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise FlightError("there is no such file.", where=path, hint="Make it with 'swash respond'.")
     try:
-        with h5py.File(path, "r") as file:
-            hdf5.check(path, file)
-        with xr.open_dataset(path, engine="h5netcdf", mask_and_scale=False) as found:
-            data = found.load()
-        schema = int(np.ravel(data.attrs["swashplate_response"])[0])
-        words = documents.parse_logged(data.attrs["words"], _Words, where=path, at="words", error=FlightError)
+        groups = hdf5.read(path, wanted="swashplate_response")
+        if groups is None:
+            raise ValueError("it says nothing of responses")
+        attributes, data = groups[""].attributes, groups[""].variables
+        schema = int(np.ravel(attributes["swashplate_response"])[0])
+        words = documents.parse_logged(attributes["words"], _Words, where=path, at="words", error=FlightError)
         arrays: dict[str, Any] = {name: np.asarray(data[name].values, dtype=np.float64) for name in _ARRAYS}
         response = data["response_real"].values + 1j * data["response_imag"].values
         beside: dict[str, Any] = {}

@@ -12,6 +12,7 @@ from swashplate.control.analysis.cascade_gains import largest_rate
 from swashplate.control.laws.ardupilot.law import RATE_OF_LOOPS, ArduPilotLaw
 from swashplate.control.laws.ardupilot.parameters import AXES, RATE, known, renamed
 from swashplate.errors import LinkError
+from swashplate.files import read_text
 from swashplate.links.ardupilot.mixing import mixer_of
 from swashplate.links.ardupilot.parameters import Parameters
 from swashplate.links.servos import ServoMapping
@@ -92,8 +93,8 @@ def read_parameter_file(path: str | Path) -> Parameters:
         LinkError: naming the line that is none, or that the file cannot be read.
     """
     try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(path).splitlines()
+    except (OSError, ValueError) as error:
         raise LinkError(f"cannot be read ({error}).", where=path) from None
     found: Parameters = {}
     for number, line in enumerate(lines, 1):

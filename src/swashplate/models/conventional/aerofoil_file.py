@@ -25,6 +25,7 @@ from scipy.interpolate import PchipInterpolator
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError
+from swashplate.files import read_text
 from swashplate.models.card import Card
 from swashplate.physics.tabled_blades import AerofoilTable
 from swashplate.registry import nearest
@@ -86,13 +87,9 @@ def aerofoil_of(name_or_file: str, card: Card) -> tuple[AerofoilTable, str]:
 
 
 def _text(path: Path) -> str:
-    if path.stat().st_size > _LARGEST_FILE:
-        raise CardError(
-            f"has {path.stat().st_size:,} bytes, expected an aerofoil table of at most {_LARGEST_FILE:,}.", where=path
-        )
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as fault:
+        return read_text(path, most=_LARGEST_FILE)
+    except (OSError, ValueError) as fault:
         raise CardError(f"cannot be read as text ({fault}).", where=path, hint="A table is a CSV file.") from fault
 
 

@@ -1,0 +1,36 @@
+"""Files of users, read whole and within bounds; nothing that is no file (a pipe, a device) is waited for."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+
+def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
+    """A file's bytes.
+
+    Args:
+        path: the file.
+        most: bytes that are read.
+
+    Raises:
+        OSError: where it is missing, cannot be read, is a folder, a pipe or a device (nobody may ever write into the
+            one, the other may have no end), or has more bytes.
+        ValueError: for a path with a zero byte.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as file:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "it is a pipe or a device, expected a file", os.fspath(path))
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise OSError(errno.EFBIG, f"it has more than {most:,} bytes", os.fspath(path))
+    return content
+
+
+def read_text(path: str | os.PathLike[str], *, most: int = 32 << 20) -> str:
+    """A text file (UTF-8, with or without a byte order mark). Raises as `read_bytes`, and UnicodeDecodeError."""
+    return read_bytes(Path(path), most=most).decode("utf-8-sig")

@@ -1,0 +1,193 @@
+"""The process that reads HDF5 files: with some damaged ones the library ends its process, with others it has no end.
+
+HDF5 can say that a data set's bytes lie in any other file (external storage, virtual data sets, external links), ask
+for a plugin that unpacks them, and claim sizes for which nothing was ever stored. None of our files does, and a file
+is looked through for it before anything in it is read.
+
+Lines in are JSON (`path`, `wanted`); each is answered by frames (see `frames`): the length of a JSON text as eight
+bytes, the text, and as many bytes as its entry `bytes` says.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from swashplate.errors import FlightError
+from swashplate.flights.readers.source import refuse_oversized
+
+Frame = tuple[dict[str, Any], bytes]
+
+MEMORY = 6 << 30
+"""Bytes that the process may have: three times the largest content."""
+_OWN_FILTERS = {
+    h5py.h5z.FILTER_DEFLATE,
+    h5py.h5z.FILTER_SHUFFLE,
+    h5py.h5z.FILTER_FLETCHER32,
+    h5py.h5z.FILTER_SCALEOFFSET,
+    h5py.h5z.FILTER_NBIT,
+}
+_DEEPEST = 8  # groups inside each other; ours have one
+_OF_NETCDF = {"REFERENCE_LIST", "CLASS", "DIMENSION_LIST", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
+_OF_NETCDF |= {"_NCProperties", "_nc3_strict"}
+
+
+def seconds(size: int) -> int:
+    """s of the processor that a file of so many bytes may take."""
+    return 3 + size // (20 << 20)
+
+
+def frames(path: Path, wanted: str) -> Iterator[Frame]:
+    """A file's groups and what is in them; a frame without entries is the last one.
+
+    Args:
+        path: the file.
+        wanted: an attribute of the root; without it {"foreign": True} is all that is told.
+
+    Yields:
+        {"group": name, "attributes": {...}} before the variables of a group ("" is the root), and for each of those
+        {"variable", "attributes", "shape", "dtype", "bytes"} with its numbers in their order, or "texts" for them.
+
+    Raises:
+        FlightError: where the file points outside of itself, needs a plugin, or claims more than it can hold.
+        Exception: whatever the library raises on damaged bytes.
+    """
+    with h5py.File(path, "r") as file:
+        if wanted and wanted not in file.attrs:
+            yield {"foreign": True}, b""
+            return
+        claimed = _claimed(path, file.id, "", set())
+        refuse_oversized(claimed, size=path.stat().st_size, where=str(path), what="its data sets together")
+        yield from _group(path, file, "", set())
+    yield {}, b""
+
+
+def _group(path: Path, group: h5py.Group, name: str, seen: set[int]) -> Iterator[Frame]:
+    yield {"group": name, "attributes": _attributes(group)}, b""
+    inner: list[tuple[str, h5py.Group]] = []
+    for key in group:
+        place = h5py.h5o.get_info(group.id, key.encode("utf-8", "surrogateescape")).addr
+        if place in seen:
+            continue
+        seen.add(place)
+        item = group[key]
+        if isinstance(item, h5py.Group):
+            inner.append((f"{name}/{key}".removeprefix("/"), item))
+        elif isinstance(item, h5py.Dataset):
+            yield _variable(path, key, item)
+    for below, item in inner:
+        yield from _group(path, item, below, seen)
+
+
+def _variable(path: Path, name: str, item: h5py.Dataset) -> Frame:
+    told: dict[str, Any] = {"variable": name, "attributes": _attributes(item), "shape": item.shape}
+    if h5py.check_string_dtype(item.dtype) is not None:
+        return told | {"texts": [_plain(text) for text in np.ravel(item.asstr(errors="replace")[()])]}, b""
+    if item.dtype.kind not in "fiub" or item.shape is None:
+        raise FlightError(f"has the type {item.dtype}, expected numbers or texts.", where=path, channel=item.name[1:])
+    values = np.ascontiguousarray(item[()])
+    if told["attributes"].get("dtype") == "bool":  # netCDF knows none: they are written as bytes
+        values, _ = values.astype(bool), told["attributes"].pop("dtype")
+    return told | {"dtype": values.dtype.str, "bytes": values.nbytes}, values.tobytes()
+
+
+def _attributes(of: h5py.Group | h5py.Dataset) -> dict[str, Any]:
+    return {name: _plain(of.attrs[name]) for name in of.attrs if name not in _OF_NETCDF}
+
+
+def _plain(value: Any) -> Any:
+    """A number, text or list of them as JSON has it; a list of one as its entry, as netCDF writes single numbers."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.ndarray):
+        found = [_plain(entry) for entry in value.ravel().tolist()]
+        return found[0] if len(found) == 1 else found
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    return value if isinstance(value, str | int | float | bool) else str(value)
+
+
+# ---- what is refused before it is read ----------------------------------------------------------------------------
+def _claimed(path: Path, group: h5py.h5g.GroupID, name: str, seen: set[int]) -> int:
+    """Bytes that the data sets of a group claim, those of the groups in it included."""
+    if name.count("/") > _DEEPEST:
+        raise _refused(path, name, "its groups are nested too deeply")
+    claimed = 0
+    for link in list(group):
+        inner = f"{name}/{link.decode('utf-8', 'replace')}"
+        if group.links.get_info(link).type != h5py.h5l.TYPE_HARD:
+            raise _refused(path, inner, "it is a link, to another file perhaps")
+        place = h5py.h5o.get_info(group, link).addr
+        if place in seen:  # a group that lies within itself
+            continue
+        seen.add(place)
+        item = h5py.h5o.open(group, link)
+        if isinstance(item, h5py.h5g.GroupID):
+            claimed += _claimed(path, item, inner, seen)
+        elif isinstance(item, h5py.h5d.DatasetID):
+            claimed += _claimed_by(path, item, inner)
+    return claimed
+
+
+def _claimed_by(path: Path, item: h5py.h5d.DatasetID, name: str) -> int:
+    made = item.get_create_plist()
+    if made.get_layout() == h5py.h5d.VIRTUAL:
+        raise _refused(path, name, "it is virtual: its numbers lie in other files")
+    if made.get_external_count():
+        raise _refused(path, name, "its numbers lie in other files")
+    for k in range(made.get_nfilters()):
+        if made.get_filter(k)[0] not in _OWN_FILTERS:
+            raise _refused(path, name, "it is packed by a plugin")
+    return int(np.prod(item.shape or (), dtype=object)) * int(item.dtype.itemsize)
+
+
+def _refused(path: Path, name: str, what: str) -> FlightError:
+    return FlightError(
+        f"{what}, and that is not read.",
+        where=path,
+        channel=name.removeprefix("/"),
+        hint="No file of swashplate's is so; do not trust this one.",
+    )
+
+
+# ---- the process --------------------------------------------------------------------------------------------------
+def answered(path: Path, wanted: str) -> Iterator[Frame]:
+    """`frames`, with what is raised as a last frame: {"refused": (problem, channel, hint)} or {"failed": words}."""
+    try:
+        yield from frames(path, wanted)
+    except FlightError as error:
+        yield {"refused": (error.problem, error.channel, error.hint)}, b""
+    except Exception as error:
+        yield {"failed": str(error) or type(error).__name__}, b""
+
+
+def main() -> None:
+    out = os.fdopen(os.dup(1), "wb")
+    for kind, most in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_DATA, MEMORY)):
+        with suppress(OSError, ValueError):  # a lower limit of the system stays
+            resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
+    for line in sys.stdin.buffer:
+        asked = json.loads(line)
+        path = Path(asked["path"])
+        with suppress(OSError):
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            most = int(used.ru_utime + used.ru_stime) + 1 + seconds(path.stat().st_size)
+            resource.setrlimit(resource.RLIMIT_CPU, (most, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+        for told, content in answered(path, asked["wanted"]):
+            text = json.dumps(told).encode()
+            out.write(len(text).to_bytes(8, "little") + text)
+            out.write(content)
+        out.flush()
+
+
+if __name__ == "__main__":
+    main()
