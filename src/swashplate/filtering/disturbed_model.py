@@ -169,15 +169,20 @@ class StochasticModel:
         C = jnp.concatenate([by_state, jnp.zeros((self.n_outputs, g + d))], 1)
         return A, C, self.process_noise(by_push, noise), jnp.diag(self.sensor_variances(noise))
 
+    def rates(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> Any:
+        """Rates of a state row under commands and disturbances."""
+        return self._rates(parameters)(x, self._driving(gust, u, voltage)) + self._push(gust)
+
     def slopes(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> tuple[Any, Any]:
         """Slopes of the rates by the state (states, states) and by the disturbances (states, gusts)."""
-        rates = self._rates(parameters)
+        push, wind = gust[:N_DISTURBANCES], gust[N_DISTURBANCES:]
 
-        def pushed(x: Any, w: Any) -> Any:
-            return rates(x, self._driving(w, u, voltage)) + self._push(w)
+        def moved(x: Any, wind: Any) -> Any:
+            return self.rates(x, jnp.concatenate([push, wind]), u=u, parameters=parameters, voltage=voltage)
 
-        by_x, by_gust = jax.jacfwd(pushed, argnums=(0, 1))(x, gust)
-        return by_x, by_gust
+        by_x, by_wind = jax.jacfwd(moved, argnums=(0, 1))(x, wind)
+        pushed = np.eye(x.shape[0])[:, self._disturbed]  # an acceleration is the rate of one state
+        return by_x, jnp.concatenate([pushed, by_wind], axis=1)
 
     def process_noise(self, by_push: Any, noise: Noise) -> Any:
         """Covariance of what a sample adds to states, gusts and drifts.

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from counted import COUNTING
 from swashplate.compiler import compiler, shared_library
 from swashplate.export.regression_c import RegressionCode, regression_code
 from swashplate.identification.recursive.equation import regression_equation
@@ -21,23 +22,6 @@ SIZES = """#include "regression.h"
 int memory_size(void); int work_size(void);
 int memory_size(void) { return (int)sizeof(regression_memory); }
 int work_size(void) { return (int)sizeof(regression_work); }
-"""
-COUNTING = """#include <cmath>
-static long operations = 0;
-struct Counted {
-  double value;
-  Counted(double v = 0) : value(v) {}
-  explicit operator double() const { return value; }
-};
-#define ARITHMETIC(o) static inline Counted operator o(Counted a, Counted b) { ++operations; return a.value o b.value; }
-ARITHMETIC(+) ARITHMETIC(-) ARITHMETIC(*) ARITHMETIC(/)
-#define CHANGE(o) static inline Counted &operator o(Counted &a, Counted b) { \\
-  ++operations; a.value o b.value; return a; }
-CHANGE(+=) CHANGE(-=) CHANGE(*=) CHANGE(/=)
-#define COMPARE(o) static inline bool operator o(Counted a, Counted b) { return a.value o b.value; }
-COMPARE(<) COMPARE(>) COMPARE(==) COMPARE(!=)
-static inline Counted operator-(Counted a) { return -a.value; }
-static inline Counted counted_root(Counted a) { ++operations; return std::sqrt(a.value); }
 """
 COUNT = """
 #include <cstdio>

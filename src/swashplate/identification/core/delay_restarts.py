@@ -22,14 +22,19 @@ _PROMISING = 50.0
 
 
 def minimise_over_valleys(
-    likelihood: Likelihood, *, iterations: int = 60, together: bool = False, progress: Progress | None = None
+    likelihood: Likelihood,
+    *,
+    iterations: int = 60,
+    tolerance: float = 0.05,
+    together: bool = False,
+    progress: Progress | None = None,
 ) -> Optimum:
     """`minimise`, and again from the best other value of every kinked entry where that is promising.
 
     Returns:
         The lowest optimum; its history is that of the search that led to it, after those that it beat.
     """
-    best = minimise(likelihood, iterations=iterations, together=together, progress=progress)
+    best = minimise(likelihood, iterations=iterations, tolerance=tolerance, together=together, progress=progress)
     for place in np.flatnonzero(likelihood.row.column("kinked") > 0.0):
         start = None if stopping.asked() else _elsewhere(likelihood, best, int(place))
         if start is None:
@@ -40,7 +45,9 @@ def minimise_over_valleys(
             if progress is not None:
                 progress(done + iteration, cost)
 
-        other = minimise(likelihood, start=start, iterations=iterations, together=together, progress=later)
+        other = minimise(
+            likelihood, start=start, iterations=iterations, tolerance=tolerance, together=together, progress=later
+        )
         if other.cost < best.cost:
             best = replace(other, history=best.history + other.history)
     likelihood.refresh(best.row)

@@ -19,14 +19,16 @@ import numpy as np
 from jaxtyping import Float
 
 from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import gain_at, predicted_covariance
+from swashplate.filtering.riccati import predicted_covariance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
+from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time.innovations import RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
@@ -44,7 +46,7 @@ from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 from swashplate.simulation.discretisation import held_series
 
 _LANES = 8
-"""Rows whose filters run side by side."""
+"""Rows whose filters run side by side, where there is more than one."""
 
 _STEP = 1e-4
 """Of a scaled entry, for slopes by differences."""
@@ -60,7 +62,7 @@ class Followed(NamedTuple):
 
 
 class FollowingError(PredictionError):
-    """`PredictionError` with a gain that follows: some twenty times the work, for wind; arguments are the same."""
+    """`PredictionError` with a gain that follows: some ten times the work, for wind; arguments are the same."""
 
     def __init__(self, table: Parameterization, pieces: Sequence[Record], *, noise: Noise) -> None:
         super().__init__(table, pieces, noise=noise)
@@ -70,6 +72,18 @@ class FollowingError(PredictionError):
     def constant(self) -> PredictionError:
         """The likelihood of the same row with a constant gain."""
         return self._constant
+
+    def traced(self) -> TracedCost:
+        """None: what JAX can differentiate as a whole has a constant gain, which is another likelihood.
+
+        Raises:
+            IdentificationError: always.
+        """
+        raise IdentificationError(
+            "the fit has a wind, whose likelihood (a gain that follows) NUTS does not draw from.",
+            channel="posterior",
+            hint="Take 'laplace', or fit the flight without --wind.",
+        )
 
     def cost(self, row: Array) -> float:
         """Negative log-likelihood of the counted innovations (without its constant)."""
@@ -144,8 +158,9 @@ class FollowingError(PredictionError):
         found = []
         for run in self._runs:
             placed = [run.placed(*given, row * self.row.scale) for row in rows]
-            placed += placed[-1:] * (-len(placed) % _LANES)
-            blocks = [placed[first : first + _LANES] for first in range(0, len(placed), _LANES)]
+            lanes = 1 if len(rows) == 1 else _LANES
+            placed += placed[-1:] * (-len(placed) % lanes)
+            blocks = [placed[first : first + lanes] for first in range(0, len(placed), lanes)]
             found.append(whole([_along_some(self.model, run, block) for block in blocks], len(rows)))
         return found
 
@@ -213,10 +228,17 @@ def _corrected(
     nu = y - model.measure(state.x, nuisance)
     C = jnp.pad(jax.jacfwd(lambda x: model.measure(x, nuisance))(state.x), ((0, 0), (0, P.shape[0] - n)))
     R = jnp.diag(model.sensor_variances(noise))
-    K = gain_at(P, C, R, jnp)
-    move, kept = K @ nu, jnp.eye(P.shape[0]) - K @ C
+    seen = C @ P
+    S = seen @ C.T + R
+    left, rows = jnp.column_stack([S, seen, nu]), []
+    for i in range(len(y)):  # eliminated row after row: L^-1 C P and L^-1 nu, L the Cholesky factor of S
+        row = left[0] / jnp.sqrt(left[0, 0])
+        rows.append(row[len(y) - i :])
+        left = left[1:, 1:] - row[1 : len(y) - i, None] * row[1:]
+    told = jnp.stack(rows)
+    move = told[:, :-1].T @ told[:, -1]
     corrected = FilterState(state.x + move[:n], state.gust + move[n : n + g], state.drift + move[n + g :])
-    return corrected, kept @ P @ kept.T + K @ R @ K.T, nu, C @ P @ C.T + R
+    return corrected, P - told[:, :-1].T @ told[:, :-1], nu, S
 
 
 def _predicted(
@@ -241,18 +263,19 @@ def _predicted(
     away = jnp.sqrt(2.0 * jnp.diag(air @ P @ air.T))[:, None] * speeds
     places = state.x + jnp.concatenate([away, -away])  # cubature of the third degree, as in StochasticModel.linear
     acting = model.acting(state)
-    slope = partial(model.slopes, u=u, parameters=parameters, voltage=volts)
-    by_x, by_gust = (jnp.mean(part, axis=0) for part in jax.vmap(lambda x: slope(x, acting))(places))
+    slopes = jax.vmap(lambda x: model.slopes(x, acting, u=u, parameters=parameters, voltage=volts))(places)
+    by_x, by_gust = (jnp.mean(part, axis=0) for part in slopes)
     by_x, held = held_series(by_x, model.dt, jnp.eye(n))
     by_gust = model.dt * held @ by_gust
     fade = model.fade(noise)
-    F = jnp.block(
-        [
-            [by_x, by_gust, by_gust[:, :d]],
-            [jnp.zeros((g, n)), jnp.diag(fade), jnp.zeros((g, d))],
-            [jnp.zeros((d, n + g)), jnp.eye(d)],
-        ]
-    )
-    after = jnp.mean(jax.vmap(lambda x: model.step(x, acting, u, parameters, volts))(places), axis=0)
-    moved = F @ P @ F.T + model.process_noise(by_gust[:, :d], noise)
+    every = jnp.concatenate([places, state.x[None]])
+    rates = jax.vmap(lambda x: model.rates(x, acting, u=u, parameters=parameters, voltage=volts))(every)
+    apart = jnp.mean(rates[:-1], axis=0) - rates[-1]  # what the spread of the air speed does on average
+    after = model.step(state.x, acting, u, parameters, volts) + model.dt * apart
+    # Disturbances only fade: F is full in the states' rows alone.
+    rows, kept = jnp.concatenate([by_x, by_gust, by_gust[:, :d]], axis=1), jnp.concatenate([fade, jnp.ones(d)])
+    led = rows @ P
+    across = led[:, n:] * kept
+    moved = jnp.block([[led @ rows.T, across], [across.T, kept[:, None] * P[n:, n:] * kept]])
+    moved = moved + model.process_noise(by_gust[:, :d], noise)
     return FilterState(after, fade * state.gust, state.drift), 0.5 * (moved + moved.T)

@@ -39,7 +39,10 @@ ITERATIONS = 60
 """At most, where nothing is said."""
 
 _FOLLOWING = 0.2
-"""A gain in log-likelihood that is too small to go on for, where an iteration takes ten seconds."""
+"""A gain in log-likelihood that is too small to go on for, where an iteration takes seconds."""
+
+_BEGIN = 1.0
+"""The same for a search that another goes on from."""
 
 FlightLikelihood = PredictionError | OutputError
 LikelihoodOf = Callable[[Parameterization, Sequence[Record], Question], FlightLikelihood]
@@ -196,9 +199,10 @@ def _quick(likelihood: FlightLikelihood) -> FlightLikelihood:
 
 
 def _scoring(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
-    first = minimise_over_valleys(_quick(likelihood), iterations=iterations, progress=progress)
-    if _quick(likelihood) is likelihood:
-        return first
+    quick = _quick(likelihood)
+    if quick is likelihood:
+        return minimise_over_valleys(likelihood, iterations=iterations, progress=progress)
+    first = minimise_over_valleys(quick, iterations=iterations, tolerance=_BEGIN, progress=progress)
     done = len(first.history) - 1
     last = minimise(
         likelihood, start=first.row, iterations=iterations, tolerance=_FOLLOWING, progress=_after(done, progress)

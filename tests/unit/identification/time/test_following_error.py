@@ -11,6 +11,7 @@ import pytest
 
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
+from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core.parameters import parameterize
@@ -82,3 +83,8 @@ def test_slopes_whiten_as_the_scores_count_them() -> None:
     flat = moved[0].reshape(len(row), -1)
     assert white[0].shape[1] == len(likelihood.model.output_names)
     np.testing.assert_allclose(np.diag(flat @ flat.T + rest), np.diag(information), rtol=0.2)
+
+
+def test_nuts_is_refused_where_it_would_draw_from_another_likelihood() -> None:
+    with pytest.raises(IdentificationError, match=r"has a wind.*NUTS does not draw from"):
+        _likelihood().traced()
