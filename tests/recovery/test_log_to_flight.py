@@ -63,7 +63,7 @@ def test_the_coax_from_its_real_log_to_a_hundred_aircraft(shared_data: Path) -> 
     """The August flight: what the fit found of delays is flown, in still air and in gusts of 0.3 m/s."""
     found = sp.demo()
     model = found.fit.model
-    made = sp.design_controller(model, sensors=SENSORS, allowed={"x": 0.1, "y": 0.1})
+    made = sp.design_controller(model, sensors=SENSORS)
     assert "identified" in made.late
     check = sp.check_controller(model, made.controller, gusts=indoor(0.3))
     assert check.problems == ()
@@ -98,7 +98,7 @@ def test_the_raptor_from_its_log_to_a_hundred_aircraft(tmp_path: Path) -> None:
     model = fit.model
     assert list(input_delays(model).values()) == pytest.approx([0.03] * 4, abs=0.001)
     sensors = "gyro@100,mocap@100+10ms"
-    hovers = sp.design_controller(model, sensors=sensors, allowed={"x": 0.1, "y": 0.1})
+    hovers = sp.design_controller(model, sensors=sensors)
     ahead = sp.design_controller(model, sensors=sensors, holding="speed", speeds=(0.0, 2.5, 5.0, 7.5, 10.0))
     flights = {}
     for air, gusts in (("still", None), ("0.3 m/s", indoor(0.3))):

@@ -237,8 +237,8 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
         caption=f"Mismatch, model over flight: {100 * inside:.0f} % of the points lie inside the envelopes of maximum "
-        "unnoticeable added dynamics (after MIL-HDBK-1797, coefficients from memory and not verified against its "
-        "text; found for the pitch of fighters: a measure, not a requirement).",
+        "unnoticeable added dynamics (after MIL-HDBK-1797; coefficients as a second program has them, not verified "
+        "against its text; found for the pitch of fighters: a measure, not a requirement).",
         alt=f"Mismatch of {len(found)} responses in gain and phase; {100 * inside:.0f} % inside the envelopes.",
         keys=tuple(keys),
     )

@@ -12,6 +12,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.result import Estimate, Result
+from swashplate.identification.one_step import in_words, one_step_effects
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.reporting.figures_fit import (
     cost_history,
@@ -32,6 +33,9 @@ def parameters(fit: Result[Any, Any]) -> Section:
     """Every estimated number, with where it comes from."""
     rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
+    asked_for = in_words(one_step_effects(fit))
+    if asked_for:
+        blocks.append(Text(f"Structure: the flights say that the model {asked_for}"))
     blocks.append(
         Table(
             "Parameters before and after the fit",

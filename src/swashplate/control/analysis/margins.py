@@ -143,6 +143,16 @@ def margins(frequencies: ArrayLike, loop: ArrayLike, names: tuple[str, ...]) -> 
     return Margins(axes, together, float(np.min(crossing_delays(w, L), initial=np.inf)))
 
 
+def promised_disc(sensitivities: NDArray[np.complex128]) -> float:
+    """What all loops at once stand at least: the disc by Perron's scaling, without refining it.
+
+    Args:
+        sensitivities: 1 / (1 + L) over frequency, shape (n, m, m).
+    """
+    half = sensitivities - 0.5 * np.eye(sensitivities.shape[-1])
+    return min(1.0 / max(_scaled(M, _perron(M)) for M in half), 2.0)
+
+
 def _axis(name: str, w: Array, loop: Any, half: Any) -> AxisMargins:
     worst = int(np.argmax(np.abs(half)))
     with warnings.catch_warnings():

@@ -144,7 +144,7 @@ def _shapes(plan: ObserverPlan, speeds: int) -> list[tuple[int, ...]]:
     n, m, late = plan.n, plan.inputs, sum(plan.delays)
     N, channels = len(plan.names), len(plan.channels)
     parameters = len(plan.equations.vehicle.parameter_names) + 2
-    of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), ()]
+    of_feedback = [(speeds,), (speeds, n), (speeds, m), (speeds, m, n + late + 4), (m,), (), (m,), (m,), (), (), (), ()]
     steady = [(plan.period, N, channels)] if plan.period else []
     return [(parameters,), (6,), (N,), (channels,), *steady, *of_feedback]
 

@@ -14,19 +14,26 @@ from typing import Any, Literal
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.law import Feedback
 from swashplate.control.lqg.optimal import regulator
-from swashplate.control.lqg.steady_loop import Watched
+from swashplate.control.lqg.steady_loop import Watched, crossovers
 from swashplate.control.lqg.weights import (
     ALLOWED,
+    DISC,
     EFFORT,
     EFFORTS,
+    LAG_AT_CROSSOVER,
+    PLACE,
     SUMS,
+    TIGHTER,
+    TIGHTEST,
     bryson,
     checked_weights,
     crossover_limits,
     square,
+    total_delays,
     typical,
 )
 from swashplate.errors import ControllerError
@@ -51,6 +58,7 @@ _SAMPLES = 20.0
 _ROUNDS, _LEAST_CUT, _MOST_CUT, _STUCK, _PATIENCE = 24, 0.25, 0.8, 0.98, 4
 """Of the search for the effort: rounds, bounds of one round's factor, share of a crossover that is no fall, and rounds
 without a fall that are tried."""
+_NO_HIGHER = 1.02
 _DAMPED = 0.3
 """Damping ratio from which a mode is left to itself."""
 _PACE, _REACH = 1.0, 1.5
@@ -85,7 +93,8 @@ def design(
         speeds: of the trims that the gains are scheduled over [m/s]; more than one needs holding "speed".
         allowed: deviations by state or integral that weigh as much as the effort (`ALLOWED`).
         effort: share of an input's range, one for all or by input. Where not given `EFFORT` and `EFFORTS`, less where
-            the loop at the input would cross above `crossover_limits`; integrals then weigh less too.
+            the loop at the input would cross above `crossover_limits`; integrals then weigh less too. Where neither
+            effort nor a level place is said, the place is held as tightly as the delays let it (`_tightened`).
         Q, R: weights instead of these, per second, over `design_states` and the inputs.
         unrest: what disturbs the vehicle, for the observer; by default what the card's identification learnt.
         voltage, environment: of the trims.
@@ -121,14 +130,19 @@ def design(
     numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan))
     own = checked_weights(vehicle, names, allowed or {}, effort, where=where)
 
-    def designed(shares: Array) -> list[Array]:
-        usual = bryson(vehicle, names, allowed=_eased(allowed or {}, shares), effort=_shared(vehicle, own, shares))
+    def designed(shares: Array, tight: float = 1.0) -> list[Array]:
+        deviations = {**_eased(shares, tight), **(allowed or {})}
+        usual = bryson(vehicle, names, allowed=deviations, effort=_shared(vehicle, own, shares))
         weights = usual[0] if Q is None else square(Q), usual[1] if R is None else square(R)
         return [regulated(model, plan, holding, *weights, where=where) for model in models]
 
     free = [R is None and name not in own for name in vehicle.input_names]
     most = np.where(free, crossover_limits(plan, models, computation=computation), np.inf)
-    gains = _slowed(designed, most, [Watched(plan, numbers, m, place=holding == "place") for m in models])
+    loops = [Watched(plan, numbers, m, place=holding == "place") for m in models]
+    gains, shares, tight = *_slowed(designed, most, loops), 1.0
+    if holding == "place" and Q is None and all(free) and not set(PLACE) & set(allowed or {}):
+        limit = LAG_AT_CROSSOVER / total_delays(plan, computation=computation)
+        gains, tight = _tightened(lambda share: designed(shares, share), gains, limit, loops)
     limits = np.array(vehicle.input_limits)
     feedback = Feedback(
         speeds=np.array(speeds, dtype=np.float64),
@@ -139,7 +153,8 @@ def design(
         voltage=np.array(float(around.voltage)),
         low=limits[:, 0],
         high=limits[:, 1],
-        reach=np.array(_REACH),
+        reach=np.array(_REACH * tight),
+        reach_down=np.array(_REACH),
         pace=np.array(_PACE),
         place=np.array(1.0 if holding == "place" else 0.0),
     )
@@ -160,29 +175,35 @@ def _shared(vehicle: Vehicle, own: Mapping[str, float], shares: Array) -> dict[s
     return {**dict(zip(vehicle.input_names, (u * s for u, s in zip(usual, shares, strict=True)), strict=True)), **own}
 
 
-def _eased(allowed: Mapping[str, float], shares: Array) -> dict[str, float]:
-    """Allowed deviations with the integrals' eased by the root of the smallest share.
+def _eased(shares: Array, tight: float) -> dict[str, float]:
+    """What is allowed where nothing is said: integrals by the root of the smallest share, and a tighter place.
 
     With an effort f times the usual, the poles of a chain of four integrators slow down by the root of f: so does the
     integral action, and stays as far below the loop that carries it.
     """
-    return {**{name: ALLOWED[name] / float(np.sqrt(np.min(shares))) for name in SUMS}, **allowed}
+    eased = {name: ALLOWED[name] / float(np.sqrt(np.min(shares))) for name in SUMS}
+    return {**eased, **{name: tight * eased.get(name, ALLOWED[name]) for name in PLACE}}
 
 
-def _slowed(designed: Callable[[Array], list[Array]], most: Array, loops: Sequence[Watched]) -> list[Array]:
+def _slowed(
+    designed: Callable[[Array], list[Array]], most: Array, loops: Sequence[Watched]
+) -> tuple[list[Array], Array]:
     """Gains whose loops cross no higher than `most` [rad/s], by less effort; one that no longer slows down stays.
 
     Args:
         designed: gains of all trims for shares of the usual effort by input.
         most: by input; infinite for what is not to be touched.
         loops: of the trims.
+
+    Returns:
+        The gains, and the shares.
     """
     shares, lowest, in_vain = np.ones(len(most)), np.full(len(most), np.inf), np.zeros(len(most))
     gains = designed(shares)
     for _ in range(_ROUNDS):
         if not np.any(np.isfinite(most)):
             break
-        found = np.max([loop.crossovers(own) for loop, own in zip(loops, gains, strict=True)], axis=0)
+        found = _highest(loops, gains)
         in_vain = np.where(found > _STUCK * lowest, in_vain + 1, 0)
         lowest = np.minimum(lowest, found)
         above = (found > most) & (in_vain < _PATIENCE)
@@ -190,7 +211,41 @@ def _slowed(designed: Callable[[Array], list[Array]], most: Array, loops: Sequen
             break
         shares = np.where(above, shares * np.clip(most / found, _LEAST_CUT, _MOST_CUT), shares)
         gains = designed(shares)
-    return gains
+    return gains, shares
+
+
+def _highest(loops: Sequence[Watched], gains: Sequence[Array]) -> Array:
+    """Crossover of every loop, the highest of all trims [rad/s]."""
+    return np.asarray(
+        np.max([crossovers(*loop.sensitivities(own)) for loop, own in zip(loops, gains, strict=True)], axis=0)
+    )
+
+
+def _tightened(
+    designed: Callable[[float], list[Array]], gains: list[Array], limit: Array, loops: Sequence[Watched]
+) -> tuple[list[Array], float]:
+    """Gains that hold the place as tightly as the delays let them, and what they allow of it over `ALLOWED`.
+
+    A fixed distance knows nothing of the vehicle: gusts moved a late CoaX half a metre while its loops crossed at half
+    of what their delays allow. The place is held more tightly, step by step, while no loop crosses above the limit
+    (one that does already, crosses no higher) and all at once keep the disc margin `DISC`.
+
+    Args:
+        designed: gains of all trims for a share of what is allowed of the place.
+        gains: with all of it.
+        limit: crossovers that the delays allow [rad/s], by input.
+        loops: of the trims.
+    """
+    (loop,), share = loops, 1.0
+    w, S = loop.sensitivities(gains[0])
+    most = np.maximum(limit, _NO_HIGHER * crossovers(w, S))
+    while promised_disc(S) >= DISC and share * TIGHTER > TIGHTEST:
+        tried = designed(share * TIGHTER)
+        w, S = loop.sensitivities(tried[0])
+        if promised_disc(S) < DISC or np.any(crossovers(w, S) > most):
+            break
+        gains, share = tried, share * TIGHTER
+    return gains, share
 
 
 def regulated(model: LinearModel, plan: ObserverPlan, holding: Holding, Q: Array, R: Array, *, where: str) -> Array:

@@ -45,8 +45,12 @@ class AirEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 UnrestEntry: Any = msgspec.defstruct("UnrestEntry", [(n, float) for n in Unrest._fields], forbid_unknown_fields=True)
+_ADDED = {"reach_down": 1.5}
+"""Numbers that older files do not have, and what stood for them."""
 FeedbackEntry: Any = msgspec.defstruct(
-    "FeedbackEntry", [(n, Any) for n in Feedback._fields], forbid_unknown_fields=True
+    "FeedbackEntry",
+    [*((n, Any) for n in Feedback._fields if n not in _ADDED), *((n, Any, value) for n, value in _ADDED.items())],
+    forbid_unknown_fields=True,
 )
 
 
@@ -68,7 +72,7 @@ class LqgFile(msgspec.Struct, forbid_unknown_fields=True):
     steady: list[list[list[float]]] | None = None
 
 
-_SINGLE = ("voltage", "reach", "pace", "place")
+_SINGLE = ("voltage", "reach", "reach_down", "pace", "place")
 
 
 def lqg_document(controller: Lqg) -> dict[str, Any]:

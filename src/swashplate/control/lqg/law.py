@@ -23,7 +23,7 @@ class Feedback(NamedTuple):
         battery: command per volt below the trims' voltage that keeps what the battery takes, m.
         voltage: of the trims [V].
         low, high: limits of the inputs, m.
-        reach: errors of place beyond this are cut [m].
+        reach, reach_down: errors of place and of height beyond these are cut [m].
         pace: the asked speed changes no faster [m/s^2].
         place: 1 holds a place, 0 a speed.
     """
@@ -37,6 +37,7 @@ class Feedback(NamedTuple):
     low: Any
     high: Any
     reach: Any
+    reach_down: Any
     pace: Any
     place: Any
 
@@ -117,7 +118,7 @@ def lqr_law(
     away = {name: here[name] - trim_x[i] for i, name in enumerate(names)}
     away["x"] = f.place * _limited(c * along + s * across, -f.reach, f.reach, xp)
     away["y"] = f.place * _limited(c * across - s * along, -f.reach, f.reach, xp)
-    away["z"] = _limited(here["z"] - z, -f.reach, f.reach, xp)
+    away["z"] = _limited(here["z"] - z, -f.reach_down, f.reach_down, xp)
     away["psi"] = turned
     away["u"] = away["u"] - beyond
     away["v"] = away["v"] - (1.0 - f.place) * right

@@ -93,8 +93,8 @@ class Watched:
         K, C = _gains(self.plan, self.model, gains, self.known, self.place)
         return _compensator(self.known, K, C, self.gain, self.plan.dt)
 
-    def crossovers(self, gains: Array, *, points: int = 160) -> Array:
-        """Highest frequency at which each loop's gain is one, the others closed [rad/s]; 0 where it never is.
+    def sensitivities(self, gains: Array, *, points: int = 160) -> tuple[Array, Complex]:
+        """1 / (1 + L) over frequency [rad/s], shapes (n,) and (n, inputs, inputs), opened at the inputs.
 
         Where no steady observer exists, of the loops fed with the states.
         """
@@ -105,10 +105,14 @@ class Watched:
         K, C = _gains(plan, self.model, gains, known, self.place)
         A, B, H = _plant(fed)
         L = -response(z, *_compensator(known, K, C, self.gain, plan.dt)) @ response(z, A, B, H, None)
-        S = np.linalg.inv(np.eye(plan.inputs) + L)
-        above = np.abs(1.0 / np.einsum("kii->ki", S) - 1.0) >= 1.0
-        last = np.where(above.any(axis=0), len(w) - 1 - np.argmax(above[::-1], axis=0), 0)
-        return np.where(above.any(axis=0), w[last], 0.0)
+        return w, np.linalg.inv(np.eye(plan.inputs) + L)
+
+
+def crossovers(w: Array, S: Complex) -> Array:
+    """Highest frequency at which each loop's gain is one, the others closed [rad/s]; 0 where it never is."""
+    above = np.abs(1.0 / np.einsum("kii->ki", S) - 1.0) >= 1.0
+    last = np.where(above.any(axis=0), len(w) - 1 - np.argmax(above[::-1], axis=0), 0)
+    return np.where(above.any(axis=0), w[last], 0.0)
 
 
 def steady_loop(

@@ -30,6 +30,11 @@ EFFORTS: Mapping[str, float] = dict.fromkeys(("motor_lower", "motor_upper"), 0.0
 SUMS = ("sum_ahead", "sum_right", "sum_down", "sum_heading")
 LAG_AT_CROSSOVER = 1.0 / 3.0
 """rad that delay and sampling together may take from a loop's phase at its crossover."""
+DISC = 2.0 * np.tan(np.pi / 8.0)
+"""Disc margin of 45 degrees and 7.7 dB: what a place held more tightly must leave of all loops at once."""
+TIGHTER, TIGHTEST = 0.84, 0.1
+"""A step towards a tighter place, and the last, as shares of what `ALLOWED` allows."""
+PLACE = ("x", "y", "sum_ahead", "sum_right")
 _ABOVE = 1.2
 """Times the frequency of a mode that only an input holds: its loop must cross above it."""
 _DAMPED = 0.05

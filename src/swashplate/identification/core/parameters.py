@@ -114,6 +114,10 @@ class Parameterization:
             if covariance[i, j] != 0.0
         )
 
+    def wider(self, names: Sequence[str]) -> Parameterization:
+        """The same and more parameters, from the card's values and without priors."""
+        return replace(self, free=(*self.free, *parameterize(self.vehicle, list(names)).free))
+
     def without(self, names: Iterable[str]) -> Parameterization:
         """The same with some parameters fixed at the card."""
         dropped = set(names)

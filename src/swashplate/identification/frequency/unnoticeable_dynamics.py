@@ -16,8 +16,9 @@ _BOUNDS = {
     "phase_high": ((68.89, 1100.12, -275.22), (1.0, 39.94, 9.99), 0.0059),
     "phase_low": ((475.32, 184100.0, 29456.1), (1.0, 11.66, 0.0389), -0.0072),
 }
-"""MIL-HDBK-1797 (1997), the envelopes of Hodgkinson et al., as rational functions. Recalled, not looked up; the tests
-hold them against the envelopes' known shape."""
+"""MIL-HDBK-1797 (1997), the envelopes of Hodgkinson et al., as rational functions. Another program has the same ones
+(C. Regan 2006, LoesBound.m: four digits, without the leads, unchecked there too); the leads are recalled. Neither was
+held against the standard's text; the tests hold them against that copy and the envelopes' known shape."""
 
 
 def envelopes(omega: Array) -> dict[str, Array]:

@@ -171,6 +171,11 @@ class PredictionError:
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
 
+    def widened(self, added: Sequence[str]) -> PredictionError:
+        """The same likelihood with more of the vehicle's numbers free, under a constant gain."""
+        table = self.table.wider(added)
+        return PredictionError(table, self.pieces, noise=self.noise, estimate_noise=self.estimate_noise)
+
     @property
     def constant(self) -> PredictionError:
         """The likelihood of the same row with a constant gain."""

@@ -45,6 +45,7 @@ _USUAL: Mapping[str, Any] = {
     "in_plane": "blade-element",
     "yaw_at_blades": True,
     "precession_torque": True,
+    "stiff_blades": True,
     "tip_loss": True,
     "induced_factor": True,
     "ground_effect": "none",

@@ -39,6 +39,8 @@ class HelicopterOptions(NamedTuple):
         tip_loss: the main blades lift from `rotor_root_cutout` to `rotor_tip_loss` of the radius, not over all of it.
         induced_factor: the main rotor's induced power is `rotor_induced_factor` times that of an even inflow.
         delta3: flapping changes the main blades' pitch by `rotor_delta3` times the flapping angle.
+        stiff_blades: the disc moves at the frequency of the regressing flap mode (`flapping.regressing_pace`), which
+            first order alone makes too fast: 2 % at a flapping frequency of 1.04 per turn, 45 % at 1.9.
         stabilator: the horizontal tail's incidence follows air speed, collective and pitch rate (`stabilator_*`), in
             place of `tailplane_incidence`.
         aerofoil: the main blades' table of lift, drag and moment (`aerofoil_file`), in place of `rotor_lift_slope`,
@@ -66,6 +68,7 @@ class HelicopterOptions(NamedTuple):
     induced_factor: bool = False
     delta3: bool = False
     stabilator: bool = False
+    stiff_blades: bool = False
     ground_effect: str = "none"
     aerofoil: AerofoilTable | None = None
 
@@ -103,6 +106,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "induced_factor",
             "delta3",
             "stabilator",
+            "stiff_blades",
         ),
         (True, False),
     ),

@@ -103,6 +103,8 @@ def main_rotor(
         chord=par.rotor_chord,
         radius=par.rotor_radius,
     )
+    if options.stiff_blades:
+        held = held._replace(stiffness_pace=flapping.regressing_pace(held.excess, xp))
     flaps = None  # by which flapping changes the blades' pitch
     if options.delta3:
         flaps = par.rotor_delta3

@@ -160,6 +160,7 @@ def section_of_loops(loops: Sequence[LoopWorth]) -> Section:
     panels = (
         ("gain margin [dB]", [loop.gain for loop in loops], GAIN_KEPT),
         ("phase margin [deg]", [loop.phase for loop in loops], PHASE_KEPT),
+        ("delay margin [ms]", [1e3 * loop.delay if np.isfinite(loop.delay) else None for loop in loops], None),
         ("largest sensitivity [-]", [loop.peak for loop in loops], PEAK_KEPT),
     )
     traces = []
@@ -167,18 +168,18 @@ def section_of_loops(loops: Sequence[LoopWorth]) -> Section:
         number = "" if i == 0 else str(i + 1)
         dots = line(values, places, name=title, color=BLUE, axis=number)
         ends = [-0.5, len(loops) - 0.5]
-        traces += [
-            {**dots, "mode": "markers", "marker": {"color": BLUE, "size": 8}},
-            line([kept, kept], ends, name="limit", color=VERMILION, dash="dash", axis=number),
-        ]
+        traces.append({**dots, "mode": "markers", "marker": {"color": BLUE, "size": 8}})
+        if kept is not None:
+            traces.append(line([kept, kept], ends, name="limit", color=VERMILION, dash="dash", axis=number))
         ticks = {"tickvals": places, "ticktext": names}
         layout[f"yaxis{number}"] = axis("", anchor=f"x{number}", range=ends[::-1], **ticks)
-        layout[f"xaxis{number}"] = axis(title, anchor=f"y{number}", domain=[0.37 * i, 0.37 * i + 0.26])
+        layout[f"xaxis{number}"] = axis(title, anchor=f"y{number}", domain=[0.27 * i, 0.27 * i + 0.19])
     figure = Figure(
         "margins",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        "Each loop broken with the others closed; margins lie right of their limit, the sensitivity left of it.",
+        "Each loop broken with the others closed; margins lie right of their limit, the sensitivity left of it; the "
+        "delay margin has none.",
         f"Margins of the loops {', '.join(names)}.",
         keys=(Key("found", BLUE, "circle"), Key("limit", VERMILION, "dash")),
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swashplate.control.analysis.margins import promised_disc
 from swashplate.control.analysis.stability import loop_modes
 from swashplate.control.analysis.stability_limit import with_servos
 from swashplate.control.controller_file import read_controller, save_controller
@@ -15,6 +16,8 @@ from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
 from swashplate.control.lqg.observability import in_words, observability
 from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
+from swashplate.control.lqg.steady_loop import Watched, crossovers
+from swashplate.control.lqg.weights import DISC, total_delays
 from swashplate.errors import ControllerError
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.catalogue import vehicle
@@ -92,6 +95,29 @@ def test_margins_and_spread(made: Lqg) -> None:
     assert all(np.degrees(a.phase) > 35.0 for a in found.margins.axes)
     assert 0.02 < found.spread["x"] < 0.1
     assert found.uncertainty["eta_bar"] == pytest.approx(0.0064, rel=0.1)
+
+
+def test_a_place_is_held_as_tightly_as_delays_and_margins_allow(made: Lqg) -> None:
+    """One step tighter would cross too high or stand less than 45 degrees; what was said is not changed."""
+    share = float(made.feedback.reach) / float(made.feedback.reach_down)
+    assert 0.1 < share < 1.0
+    kept = {name: share * allowed for name, allowed in (("x", 0.3), ("y", 0.3))}
+    found = analyse(made).margins
+    assert found.together.alpha >= DISC - 0.01
+    loop = Watched(made.plan, made.numbers, linearize(made.vehicle, made.start), place=True)
+    wide = design(made.vehicle, sensors=suite(SENSORS), rate=100.0, delays=0.02, allowed={"x": 0.3, "y": 0.3})
+    assert float(wide.feedback.reach) == float(wide.feedback.reach_down)
+    (w, S), (_, S_wide) = (loop.sensitivities(np.asarray(c.feedback.gains)[0]) for c in (made, wide))
+    most = np.maximum(1.0 / (3.0 * total_delays(made.plan)), 1.02 * crossovers(w, S_wide))
+    assert np.all(crossovers(w, S) <= most)
+    assert promised_disc(S) >= DISC
+    said = {name: 0.84 * value for name, value in kept.items()}
+    sums = dict.fromkeys(("sum_ahead", "sum_right"), 0.84 * share * 0.6)
+    tighter = design(made.vehicle, sensors=suite(SENSORS), rate=100.0, delays=0.02, allowed={**said, **sums})
+    w, S = loop.sensitivities(np.asarray(tighter.feedback.gains)[0])
+    assert promised_disc(S) < DISC or np.any(crossovers(w, S) > most)
+    strays, strayed = (analyse(controller).spread["x"] for controller in (made, wide))
+    assert strays < 0.85 * strayed
 
 
 def test_servo_lags_are_first_order() -> None:

@@ -13,6 +13,7 @@ from rolling import biased, gusty
 from swashplate.errors import IdentificationError
 from swashplate.identification.core.nested import EffectTest, chance_of, holm
 from swashplate.identification.nested import fit_nested
+from swashplate.identification.one_step import one_step_effects
 
 HOW = {"outputs": list(OUTPUTS), "method": "filter-error"}
 
@@ -46,7 +47,11 @@ def test_missing_physics_is_found_and_only_where_it_is_missing(offset: float) ->
         value, sigma = added.values["offset"]
         assert abs(value - offset) < 3.0 * sigma
         assert "freeing it moves" in added.words
-    (asked,) = fit_nested(vehicle, flight, free=[*free, "offset"], effects=[EFFECT], **HOW).tests
+    fits = fit_nested(vehicle, flight, free=[*free, "offset"], effects=[EFFECT], **HOW)
+    (asked,) = fits.tests
+    (step,) = one_step_effects(fits.fit, [EFFECT])
+    assert step.asked
+    assert step.verdict == asked.verdict
     assert asked.asked
     assert asked.gain == pytest.approx(added.gain, abs=0.2)
     assert asked.verdict == added.verdict

@@ -44,6 +44,33 @@ def hover(vehicle: Vehicle, *, climb: float = 0.0) -> tuple[list[float], list[fl
     return x, u
 
 
+def fastest(vehicle: Vehicle) -> float:
+    """Frequency of the fastest oscillation at hover [Hz], by central differences on plain floats."""
+    x, u = hover(vehicle)
+    par, columns = vehicle.values(), []
+    for i in range(len(x)):
+        ends = [vehicle.rates([v + step * (j == i) for j, v in enumerate(x)], u, par) for step in (1e-6, -1e-6)]
+        columns.append((np.array(ends[0]) - np.array(ends[1])) / 2e-6)
+    return float(np.max(np.abs(np.linalg.eigvals(np.stack(columns, axis=1)).imag))) / (2.0 * math.pi)
+
+
+def test_the_discs_of_stiff_blades_move_as_second_order_blades_on_a_free_body() -> None:
+    """Two counter-rotating discs with their inertia on a fuselage that they tilt: 48.2 Hz; 37.9 on a fixed hub."""
+    vehicle = sp.vehicle("ingenuity")
+    par = vehicle.values()
+    turn, disc = par.rotor_speed, 0.5 * par.rotor_blades * par.blade_inertia
+    spring, body = par.hub_stiffness, par.inertia_xx
+    mass = np.array([[disc, 0.0, disc], [0.0, disc, disc], [0.0, 0.0, body]])
+    damping = 2.0j * turn * disc * np.array([[-1.0, 0.0, -1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    stiffness = spring * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 0.0]])
+    free = [np.linalg.solve(mass, part) for part in (stiffness, damping)]
+    whole = np.block([[np.zeros((3, 3)), np.eye(3)], [-free[0], -free[1]]])
+    modes = np.abs(np.linalg.eigvals(whole).imag) / (2.0 * math.pi)
+    slow = float(np.min(modes[modes > 1.0]))
+    assert fastest(vehicle) == pytest.approx(slow, rel=0.02)
+    assert fastest(sp.vehicle("ingenuity", stiff_blades=False)) > 1.3 * slow
+
+
 def acting(vehicle: Vehicle, x: list[float], u: list[float]) -> Any:
     return acting_at(vehicle, x, u, environment_of(vehicle))
 

@@ -1,0 +1,182 @@
+"""What one step from a fit says of the parts of the physics that it has and of those that it lacks.
+
+Nothing is fitted again. Where the numbers of a part are free their covariance says how far they are from none of it
+(Wald 1943); for one that is held out the slope of the likelihood by its numbers says it (Rao 1948). Both are the first
+step of the fits that `nested` makes in full, with the same allowance for coloured residuals and bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.identification.core import accuracy
+from swashplate.identification.core.nested import MOVED, EffectTest, chance_of, holm
+from swashplate.identification.core.result import Result, bounds_of
+from swashplate.identification.core.time_fit import LAGS
+from swashplate.models.choices import PhysicalEffect
+
+_SINGULAR = 1e14
+"""Condition of a block of information beyond which the flights cannot tell its numbers apart."""
+
+
+def one_step_effects(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None = None) -> tuple[EffectTest, ...]:
+    """A test of every effect that a vehicle's model names, by one step; empty where nothing can be said.
+
+    Args:
+        fit: of a vehicle, as its estimator returned it. What it has is judged always. What it lacks is judged where its
+            likelihood is still there and frees more numbers without being compiled anew (`widened`).
+        effects: to judge; the model's own where None.
+    """
+    if fit.failed or not fit.converged:
+        return ()
+    if effects is None:
+        effects = fit.model.traits.effects(fit.model.card)
+    inside = [effect for effect in effects if all(name in fit.names for name in effect.without)]
+    tests = [_without(fit, effect) for effect in inside]
+    likelihood = fit.fitted.likelihood if fit.fitted is not None else None
+    if hasattr(likelihood, "widened"):
+        values = fit.model.card.values()
+        tied = {estimate.name for estimate in fit.estimates if estimate.tie}
+        outside = [
+            effect
+            for effect in effects
+            if not any(name in fit.names or name in tied for name in effect.without)
+            and all(values[name] == value for name, value in effect.without.items())
+        ]
+        tests += _with(fit, outside)
+    return holm(tests)
+
+
+def in_words(tests: Sequence[EffectTest]) -> str:
+    """One line: what the flights ask for, and what freeing it would move; "" for no tests."""
+    told = [test for test in tests if not test.refused]
+    if not told:
+        return ""
+    parts = []
+    for test in told:
+        if test.verdict == "needed":
+            far = f"{np.sqrt(2.0 * test.gain):.0f} sigma"
+            moved = [f"{name} by {by:+.0f} sigma" for name, by in test.moved.items() if abs(by) > MOVED]
+            word = "needs" if test.asked else "lacks"
+            parts.append(f"{word} {test.effect.name} ({far}; freeing it moves {', '.join(moved) or 'nothing else'})")
+    idle = [test.effect.name for test in told if test.verdict != "needed"]
+    line = "; ".join(parts) or "no part of the physics is asked for"
+    rest = f"; not asked for: {', '.join(idle)}" if idle else ""
+    return f"{line}{rest}. By one step from this fit; --nested fits them."
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Information on tested numbers and on the others, at an optimum of the others."""
+
+    tested: Array
+    others: Array
+    between: Array
+
+    @property
+    def alone(self) -> Array:
+        """Of the tested numbers with the others free."""
+        return np.asarray(self.tested - self.between @ np.linalg.solve(self.others, self.between.T))
+
+
+def _without(fit: Result[Any, Any], effect: PhysicalEffect) -> EffectTest:
+    """An effect that is free: how far its numbers are from none, and how the others stand without it."""
+    names = list(effect.without)
+    at = [fit.names.index(name) for name in names]
+    rest = [i for i in range(len(fit.names)) if i not in at]
+    wide = fit.covariance_corrected if np.all(np.isfinite(fit.covariance_corrected)) else fit.covariance
+    own, across = wide[np.ix_(at, at)], wide[np.ix_(rest, at)]
+    if any(fit[name].at_bound for name in names) or np.linalg.cond(own) > _SINGULAR:
+        return EffectTest(effect, True, refused="it stands on a bound, or the flights do not tell it.")
+    away = np.array([fit[name].value - effect.without[name] for name in names])
+    pull = np.linalg.solve(own, away)
+    held = np.sqrt(np.maximum(np.diag(wide)[rest] - np.einsum("ij,ij->i", across @ np.linalg.inv(own), across), 0.0))
+    by = across @ pull
+    moved = {fit.names[i]: float(m / s) for i, m, s in zip(rest, by, held, strict=True) if s > 0.0}
+    return _test(fit, effect, True, float(away @ pull), {n: (fit[n].value, fit[n].best_sigma) for n in names}, moved)
+
+
+def _with(fit: Result[Any, Any], effects: Sequence[PhysicalEffect]) -> list[EffectTest]:
+    """Effects that are held out: the slope of the likelihood where they are not, all in one evaluation."""
+    if not effects or fit.fitted is None:
+        return []
+    added = [name for effect in effects for name in effect.without]
+    likelihood = fit.fitted.likelihood.widened(added)
+    places = {name: i for i, name in enumerate(fit.fitted.likelihood.row.names)}
+    row = np.array(
+        [
+            fit.fitted.row[places[entry.name]] if entry.name in places else entry.start / entry.scale
+            for entry in likelihood.row.entries
+        ]
+    )
+    likelihood.refresh(row)
+    _, slope, information = likelihood.scores(row)
+    _, by_prior, prior = likelihood.row.prior(row)
+    slope, whole = slope + by_prior, information + prior
+    plain = accuracy.covariance(likelihood.row, information, prior)
+    white, sensitivities, elsewhere = likelihood.whitened(row)
+    lags = round(LAGS / likelihood.pieces[0].dt)
+    corrected = accuracy.corrected_covariance(plain, elsewhere + prior, white, sensitivities, lags=lags)
+    names, scale = list(likelihood.row.names), likelihood.row.scale
+    stopped = {name for name in fit.names if fit[name].at_bound}
+    free = [i for i, name in enumerate(names) if name not in added and name not in stopped]
+    tests = []
+    for effect in effects:
+        at = [names.index(name) for name in effect.without]
+        split = _Split(whole[np.ix_(at, at)], whole[np.ix_(free, free)], whole[np.ix_(at, free)])
+        if not np.all(np.diag(split.tested) > 0.0) or np.linalg.cond(split.alone) > _SINGULAR:
+            tests.append(EffectTest(effect, False, refused="no flight moves it by itself."))
+            continue
+        left = slope[at] - split.between @ np.linalg.solve(split.others, slope[free])
+        step = -np.linalg.solve(split.alone, left)
+        inside = np.ix_(at, at)
+        colour = max(1.0, float(np.trace(np.linalg.solve(plain[inside], corrected[inside]))) / len(at))
+        others = -np.linalg.solve(split.others, split.between.T @ step)
+        sigmas = {name: fit[name].best_sigma for name in fit.names}
+        moved = {
+            names[i]: float(by * scale[i] / sigmas[names[i]])
+            for i, by in zip(free, others, strict=True)
+            if sigmas.get(names[i], 0.0) > 0.0
+        }
+        spread = np.sqrt(colour * np.diag(np.linalg.inv(split.alone))) * scale[at]
+        values = {
+            name: (effect.without[name] + float(s * scale[i]), float(sigma))
+            for name, i, s, sigma in zip(effect.without, at, step, spread, strict=True)
+        }
+        tests.append(_test(fit, effect, False, float(-left @ step) / colour, values, moved))
+    return tests
+
+
+def _test(
+    fit: Result[Any, Any],
+    effect: PhysicalEffect,
+    asked: bool,
+    statistic: float,
+    values: dict[str, tuple[float, float]],
+    moved: dict[str, float],
+) -> EffectTest:
+    """The chance of a statistic where the effect is not there; a step beyond a bound is none."""
+    names = list(values)
+    low, high = bounds_of(fit.model, names)
+    without = np.array([effect.without[name] for name in names])
+    bounded = tuple(n for n, at in zip(names, (without <= low) | (without >= high), strict=True) if at)
+    outside = [n for n, lo, hi in zip(names, low, high, strict=True) if not lo <= values[n][0] <= hi]
+    if outside and not asked and len(names) == 1:
+        statistic = 0.0
+    chance = chance_of(statistic, len(names), len(bounded))
+    return EffectTest(
+        effect,
+        asked,
+        gain=0.5 * statistic,
+        scale=1.0,
+        bounded=bounded,
+        chance=chance,
+        adjusted=chance,
+        values=values,
+        moved=dict(sorted(moved.items(), key=lambda one: -abs(one[1]))),
+    )
