@@ -3,7 +3,7 @@
     python scripts/choose_by_blocks.py august|july
 
 Each third of the flight's longest record is predicted by what the other two taught, with their delays, trims and noise;
-no other flight is looked at. About two minutes of processor time. The table is in docs/decisions/0099.
+no other flight is looked at. Some minutes of processor time. The table is in docs/decisions/0099.
 """
 
 from __future__ import annotations
@@ -24,6 +24,10 @@ from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.estimates import LAGS, found_at
+from swashplate.identification.time.feedback import excitation
+from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.identify import hold_unexcited
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.models.vehicle import Vehicle
@@ -36,7 +40,9 @@ CHOICES: dict[str, tuple[tuple[float, float], ...]] = {
     "balanced": ((0.25, 1.0), (0.25, 2.0)),
     "asymmetric": ((0.25, 2.0),),
 }
-"""What is freed, all of it also where the flight does not move an axis by itself; horizons after the likelihood."""
+"""What is freed, and horizons after the likelihood."""
+HELD = ("full",)
+"""Of these, what only an axis could tell that the flight does not move by itself is held, as by default."""
 BLOCKS, AHEAD, EVERY = 3, 1.0, 0.05
 JUDGED = ("phi", "theta", "p", "q")
 """Their mean decides."""
@@ -53,16 +59,28 @@ def block(record: Record, number: int) -> Record:
 
 
 def learnt(
-    coax: Vehicle, choice: str, horizons: Sequence[tuple[float, float]], pieces: list[Record]
+    coax: Vehicle,
+    choice: str,
+    horizons: Sequence[tuple[float, float]],
+    pieces: list[Record],
+    axes: Sequence[AxisExcitation],
 ) -> Iterator[Learnt]:
     """What the likelihood finds in the pieces, and what each horizon makes of it."""
     table = parameterize(coax, choice)
+    if choice in HELD:
+        table, _ = hold_unexcited(table, axes)
     likelihood = PredictionError(table, pieces)
     optimum = minimise_over_valleys(likelihood)
     rows = {"likelihood": optimum.row}
+    lags = round(LAGS / likelihood.model.dt)
+    known = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags).corrected
     for first, last in horizons:
-        criterion = MultiStepErrors(likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING)
-        rows[f"{first:g} to {last:g} s ahead"] = criterion.whole(minimise(criterion, start=criterion.start).row)
+        for how, beside in (("alone", None), ("beside the likelihood", known)):
+            criterion = MultiStepErrors(
+                likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
+            )
+            found = minimise(criterion, start=criterion.start)
+            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(found.row)
     for name, row in rows.items():
         numbers = (row * likelihood.row.scale)[: len(table.names)]
         told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.unpack(row)[1]))
@@ -84,13 +102,14 @@ def main(flight: str) -> int:
     coax = sp.vehicle("coax")
     pieces = records(sp.read(FLIGHTS[flight]).condition(rate=100.0, cutoff=0.0), coax)
     whole = max(pieces, key=lambda piece: piece.time.size)
+    axes = excitation(coax, whole, measured_states(whole, Nuisance()))
     print(f"| in {flight.capitalize()} | criterion | {' | '.join(CHANNELS)} | mean of {', '.join(JUDGED)} |")
     print("|" + " --- |" * (3 + len(CHANNELS)))
     for choice, horizons in CHOICES.items():
         made: dict[str, list[tuple[Array, Array]]] = {}
         for left in range(BLOCKS):
             others = [block(whole, i) for i in range(BLOCKS) if i != left]
-            for name, *model in learnt(coax, choice, horizons, others):
+            for name, *model in learnt(coax, choice, horizons, others, axes):
                 made.setdefault(name, []).append(errors(model[0], block(whole, left), *model[1:]))
         for name, parts in made.items():
             wrong, moved = (np.concatenate(part).mean(axis=0) for part in zip(*parts, strict=True))

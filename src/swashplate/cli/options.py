@@ -52,7 +52,7 @@ HorizonAhead = Annotated[
     typer.Option(
         "--horizon",
         metavar="FIRST,LAST",
-        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,2.",
+        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,1.",
     ),
 ]
 CloseLoop = Annotated[
