@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from swashplate.api.live import live, show_replay
     from swashplate.api.load import load
     from swashplate.api.monte_carlo import monte_carlo
+    from swashplate.api.needed_excitation import needed_excitation
     from swashplate.api.nested import identify_nested
     from swashplate.api.observability import observability
     from swashplate.api.open_logs import open_logs
@@ -193,6 +194,7 @@ __all__ = [
     "maneuver",
     "merge",
     "monte_carlo",
+    "needed_excitation",
     "new_card",
     "observability",
     "observe",

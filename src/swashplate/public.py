@@ -57,6 +57,7 @@ _LIGHT: Mapping[str, str] = {
     "plan_maneuver": "swashplate.flights.maneuvers.planned:plan_maneuver",
     "rate_loop_steps": "swashplate.control.analysis.rate_loop_steps:rate_loop_steps",
     "read": "swashplate.flights.readers.read:read",
+    "needed_excitation": "swashplate.api.needed_excitation:needed_excitation",
     "open_logs": "swashplate.api.open_logs:open_logs",
     "plot_logs": "swashplate.api.plot_logs:plot_logs",
     "read_control": "swashplate.export.control_json:read_control",

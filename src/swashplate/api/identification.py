@@ -27,6 +27,7 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.report import structure_of
 from swashplate.reporting.structure import Report
 from swashplate.reporting.summary import banners, summary
+from swashplate.validation.controller_law import check_closed
 from swashplate.validation.validation import Validation
 from swashplate.validation.verb import validate
 
@@ -102,6 +103,7 @@ def identify_and_validate(
     keep_unexcited: bool = False,
     wind: bool = False,
     horizon: Sequence[float] | None = None,
+    close_loop: Sequence[str] = (),
     posterior: str | None = None,
     names: Sequence[str] | None = None,
     say: Say = silent,
@@ -114,6 +116,7 @@ def identify_and_validate(
         hold_out: conditioned flights that the fit never sees.
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
         iterations, keep_unexcited, wind, horizon: as of `identify`.
+        close_loop: as of `validate`.
         posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`). One that did
             not converge is left out, and `refused` says why.
         names: what the user calls the flights and the hold-outs, for messages.
@@ -136,6 +139,8 @@ def identify_and_validate(
                 channel="posterior",
                 hint="Leave --horizon away, or take 'laplace'.",
             )
+    if close_loop:
+        check_closed(vehicle, close_loop)
     if vehicle.structure is None or method in TRACKED:
         parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
     if method in TRACKED:
@@ -170,5 +175,7 @@ def identify_and_validate(
     if unseen and not fit.failed:
         validating = "validating on what the fit has not seen"
         say(validating)
-        validation = validate(fit, unseen, progress=lambda i, n: say(validating, done=i, total=n))
+        validation = validate(
+            fit, unseen, close_loop=close_loop, progress=lambda i, n: say(validating, done=i, total=n)
+        )
     return Identification(fit, validation, refused)

@@ -69,6 +69,7 @@ def identify(
         ),
     ] = False,
     horizon: options.HorizonAhead = None,
+    close_loop: options.CloseLoop = "",
     posterior: Annotated[
         str | None,
         typer.Option(
@@ -98,7 +99,7 @@ def identify(
     from swashplate.identification.core.stopping import stoppable
 
     card, texts = options.prior_card_name(prior)
-    names = [name.strip() for name in free.split(",") if name.strip()]
+    names = list(options.names(free))
     held, priors = options.fixed_values(fix), options.prior_values(texts)
     prior_card, aircraft = None if card is None else sp.vehicle(card).card, sp.vehicle(vehicle)
     called, how = [*flight, *(hold_out or [])], asked(mapping, unit, drop_bad_stamps)
@@ -112,6 +113,7 @@ def identify(
                 ("--posterior", posterior is not None),
                 ("--wind", wind),
                 ("--keep-unexcited", keep_unexcited),
+                ("--close-loop", bool(close_loop)),
             )
             if given
         ]
@@ -125,7 +127,7 @@ def identify(
             "hold_out": read[len(flight) :],
             "free": names[0] if len(names) == 1 else names,
             "method": method,
-            "outputs": None if outputs is None else [name.strip() for name in outputs.split(",") if name.strip()],
+            "outputs": None if outputs is None else options.names(outputs),
             "ties": tuple(tie or ()),
             "fixed": held or None,
             "priors": priors or None,
@@ -142,6 +144,7 @@ def identify(
             keep_unexcited=keep_unexcited,
             wind=wind,
             horizon=options.seconds_ahead(horizon),
+            close_loop=options.names(close_loop),
             posterior=posterior,
             **asked_for,
         )

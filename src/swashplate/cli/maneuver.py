@@ -177,6 +177,27 @@ def design(
             typer.echo(f"\nWritten: {', '.join(map(str, written))}")
 
 
+@app.command("need", short_help="Say how far the next flight must move, and what else it must have.")
+def need(
+    validation: Annotated[
+        Path, typer.Argument(metavar="FILE", help="validation.json of `swash identify --hold-out` or `swash validate`.")
+    ],
+    fit: Annotated[float, typer.Option("--fit", help="Prediction fit that the flight is to show [%].")] = 70.0,
+    ahead: Annotated[float, typer.Option("--ahead", help="Seconds ahead.")] = 1.0,
+    json: options.Json = False,
+) -> None:
+    """Say what the next flight must have for a model to show what it can.
+
+    The error of a prediction hardly changes from flight to flight, so each channel must move by that error over the
+    share that may be missed. Axes whose command only answered the motion need an excitation of their own.
+    """
+    import swashplate as sp
+    from swashplate.cli.console import as_json
+
+    found = sp.needed_excitation(validation, fit=fit, horizon=ahead)
+    typer.echo(as_json(found.to_document()) if json else repr(found))
+
+
 def _limit(item: str) -> tuple[str, float]:
     name, equals, value = item.partition("=")
     try:

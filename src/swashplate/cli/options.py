@@ -52,7 +52,16 @@ HorizonAhead = Annotated[
     typer.Option(
         "--horizon",
         metavar="FIRST,LAST",
-        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,2.",
+        help="After maximum likelihood, minimise errors FIRST, 2 FIRST, ... LAST seconds ahead, e.g. 0.25,1.",
+    ),
+]
+CloseLoop = Annotated[
+    str,
+    typer.Option(
+        "--close-loop",
+        metavar="AXES",
+        help="Predict the hold-outs also with the controller of these axes (yaw,heave), as the first seconds tell it, "
+        "in the place of its recorded command.",
     ),
 ]
 FlightName = Annotated[str, typer.Argument(metavar="FLIGHT", help=f"{_FLIGHT}.", autocompletion=_flight_names)]
@@ -89,6 +98,11 @@ def split_assignment(text: str, *, option: str) -> tuple[str, str]:
         example = _EXAMPLES.get(option, "mass=0.333")
         raise SwashError(f"'{text}' is not NAME=VALUE.", channel=option, hint=f"Example: {option} {example}")
     return name, value
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names, separated by commas."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def numbers(text: str, *, option: str, count: int | None = None) -> list[float]:

@@ -83,6 +83,15 @@ def floors_table(validation: Validation) -> TextTable:
     return table(head, rows, keys=2)
 
 
+def closed_table(validation: Validation) -> TextTable:
+    """Fits with loops closed beside those on the recorded inputs, by channel and horizon."""
+    from swashplate.validation.floors import CLOSED_ROWS
+
+    head = ("channel", "ahead [s]", *(words for words, _ in CLOSED_ROWS))
+    rows = [(f.channel, f"{f.horizon:g}", *(cell(f) for _, cell in CLOSED_ROWS)) for f in validation.loop_closed]
+    return table(head, rows, keys=2)
+
+
 def parameter_table(vehicle: Vehicle) -> TextTable:
     """Every number of a card with its unit, status and source."""
     rows = [

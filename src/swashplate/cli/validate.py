@@ -32,6 +32,7 @@ def validate(
             "--calibration", help="First seconds of each flight, from which delays and trims are estimated.", min=1.0
         ),
     ] = 5.0,
+    close_loop: options.CloseLoop = "",
     band: flying.BandOption = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
@@ -51,14 +52,17 @@ def validate(
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.outputs import folder_when_complete
     from swashplate.cli.reading import asked, conditioned, read_all
-    from swashplate.cli.tables import floors_table, validation_table
+    from swashplate.cli.tables import closed_table, floors_table, validation_table
     from swashplate.flights.overlap import check_disjoint
     from swashplate.identification.core.records import records
 
     how, limits = asked(mapping, unit, drop_bad_stamps), flying.band(band)
     judged, other = sp.vehicle(model), None if published is None else sp.vehicle(published)
     names = flying.renamed(rename, option="--rename")
+    closing = options.names(close_loop)
     if judged.structure is not None:
+        if closing:
+            raise SwashError(f"'{model}' is a state-space model: it flies along the inputs.", channel="--close-loop")
         linear = judged
         flying.carried_out(
             lambda say: sp.validate_linear(
@@ -95,6 +99,7 @@ def validate(
                 horizons=ahead,
                 every=every,
                 calibration=calibration,
+                close_loop=closing,
                 progress=lambda done, total: line.say("predicting", done=done, total=total),
             )
             assert isinstance(validation, sp.Validation)  # `records` has found the pose
@@ -110,8 +115,11 @@ def validate(
         if validation.floors:
             typer.echo("\nWhat the model's scores stand beside")
             screen.print(floors_table(validation))
-        for one in validation.contacts:
-            typer.echo(f"\n{one.words}")
+        if validation.loop_closed:
+            typer.echo("\nWith the controller in the place of the recorded command")
+            screen.print(closed_table(validation))
+        for words in (*(one.words for one in validation.contacts), *(law.words for law in validation.laws)):
+            typer.echo(f"\n{words}")
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:
             typer.echo(f"\nReport: {out / 'report.html'}")

@@ -26,6 +26,42 @@ class ScoredRecord(NamedTuple):
     promised: Array
 
 
+class ClosedRecord(NamedTuple):
+    """A record at one horizon, from starts at `time` [s] (s,): states (s, 12) predicted with loops closed and on the
+    recorded inputs, those that came, and those at the start."""
+
+    time: Array
+    closed: Array
+    recorded: Array
+    truth: Array
+    first: Array
+
+
+LOOP_CLOSED = "loop closed"
+
+
+def closed_floors(by_horizon: Mapping[float, Sequence[ClosedRecord]]) -> tuple[Floor, ...]:
+    """Fits with loops closed, and by how much they lead those on the recorded inputs (same blocks for both)."""
+    made: list[Floor] = []
+    for horizon, records in by_horizon.items():
+        moved = [(r.truth - r.first) ** 2 for r in records]
+        squares = {
+            LOOP_CLOSED: [(r.closed - r.truth) ** 2 for r in records],
+            "model": [(r.recorded - r.truth) ** 2 for r in records],
+        }
+        nothing = np.full(len(PREDICTED), np.nan)
+        made += floors(
+            PREDICTED,
+            horizon,
+            [r.time for r in records],
+            squares,
+            dict.fromkeys(squares, moved),
+            expected=nothing,
+            ceilings=(),
+        )
+    return tuple(made)
+
+
 def motion_of(record: Record, truth: Array, starts: NDArray[np.intp]) -> FilteredMotion:
     """A record as the black box sees it.
 

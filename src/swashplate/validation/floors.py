@@ -131,6 +131,22 @@ ROWS: tuple[tuple[str, Callable[[Floor], str]], ...] = (
 """What stands beside the scores, by row: words, and the cell of a channel."""
 
 
+def _signed(value: float) -> str:
+    return "-" if not math.isfinite(value) else f"{value:+.0f}" if abs(value) < 1000.0 else "<-999"
+
+
+CLOSED_ROWS: tuple[tuple[str, Callable[[Floor], str]], ...] = (
+    ("on recorded inputs", lambda f: _percent(f.fit - f.lead)),
+    ("loop closed", lambda f: _percent(f.fit)),
+    ("95 % from", lambda f: _percent(f.low)),
+    ("to", lambda f: _percent(f.high)),
+    ("gain", lambda f: _signed(f.lead)),
+    ("95 % from", lambda f: _signed(f.lead_low)),
+    ("to", lambda f: _signed(f.lead_high)),
+)
+"""What is told of fits with loops closed, the same way [%]."""
+
+
 def floors(
     channels: Sequence[str],
     horizon: float,

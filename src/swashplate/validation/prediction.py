@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +29,8 @@ from swashplate.identification.time.record_filter import (
 from swashplate.identification.time.start_states import mean_velocity, steady_flight
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import lengthened
+from swashplate.validation.closed_loop import closed_ahead
+from swashplate.validation.controller_law import Law, learnt
 from swashplate.validation.spans import HORIZONS
 
 SETTLING = 2.0
@@ -45,6 +48,8 @@ class Predictions:
         innovations: one-step prediction errors (n, outputs), and `covariance` their model covariance.
         disturbances: what the observer saw act beside the equations, gusts and drifts together, at every sample (n, 6):
             accelerations of u, v, w [m/s^2] and p, q, r [rad/s^2].
+        closed: as `states`, with the loops of `laws` closed; None where none was asked for.
+        laws: the controllers, from the seconds before the first start.
     """
 
     starts: NDArray[np.intp]
@@ -53,6 +58,8 @@ class Predictions:
     innovations: Array
     covariance: Array
     disturbances: Array
+    closed: Array | None = None
+    laws: tuple[Law, ...] = ()
 
 
 def predict(
@@ -64,11 +71,13 @@ def predict(
     horizon: float = max(HORIZONS),
     every: float = 0.1,
     settling: float = SETTLING,
+    close_loop: Sequence[str] = (),
 ) -> Predictions:
     """Predict `horizon` seconds ahead from starts every `every` seconds, the first after `settling` seconds.
 
     At each start the observer has seen the record up to that sample and nothing after it. From there on the equations
-    run on the recorded inputs; gusts fade and drifts stay as the observer last saw them.
+    run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
+    are predicted again with their controller, as the seconds before tell it, in the place of their recorded command.
     """
     model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
     n, ahead = record.time.size, round(horizon / record.dt)
@@ -80,6 +89,11 @@ def predict(
     begin = begun(model, numbers, seen_at_start(vehicle, record))
     innovations, filtered = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
     kept = [vehicle.index(name) for name in PREDICTED]
+    laws = learnt(vehicle, record, filtered.x[:, kept], axes=close_loop, seconds=settling)
+    closed = None
+    if laws:
+        answered = closed_ahead(model, filtered, numbers, laws, record.inputs, reaching, voltage, starts, ahead)
+        closed = answered[..., kept]
     return Predictions(
         starts=starts,
         states=ahead_of(model, filtered, numbers, reaching, voltage, starts, ahead)[..., kept],
@@ -87,6 +101,8 @@ def predict(
         innovations=innovations,
         covariance=np.asarray(begin.gain.covariance),
         disturbances=filtered.gust[:, :N_DISTURBANCES] + filtered.drift,
+        closed=closed,
+        laws=laws,
     )
 
 

@@ -29,7 +29,8 @@ from swashplate.validation import innovations
 from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.calibration import calibrate
 from swashplate.validation.contact import Contact, contact
-from swashplate.validation.flight_floors import ScoredRecord, flight_floors, motion_of
+from swashplate.validation.controller_law import Law, check_closed
+from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
 from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
 from swashplate.validation.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
@@ -62,6 +63,7 @@ def validate(
     horizons: Sequence[float] = HORIZONS,
     every: float = 0.1,
     calibration: float = CALIBRATION,
+    close_loop: Sequence[str] = (),
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation:
     """Predict unseen flights from many start points and judge the result.
@@ -78,11 +80,13 @@ def validate(
         horizons: seconds ahead.
         every: seconds between starts.
         calibration: seconds at the start of each record.
+        close_loop: axes ("yaw", "heave") whose controller, as those seconds tell it, also predicts in the place of the
+            recorded command, which answers gusts that no prediction knows.
         progress: called with the number of records done and their number.
 
     Raises:
         FlightError: where no record is long enough for calibration and the shortest horizon.
-        SwashError: for a calibration that is too short to tell anything.
+        SwashError: for a calibration that is too short to tell anything, or an axis whose loop cannot be closed.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     enable_double_precision()
@@ -97,6 +101,7 @@ def validate(
     flights = tuple(monitored(flight, vehicle) for flight in as_flights(flights))
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
+    check_closed(vehicle, close_loop)
     shortest = calibration + _STARTS + min(horizons)
     all_pieces = records(flights, vehicle)
     pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
@@ -113,6 +118,8 @@ def validate(
     contacts: list[Contact | None] = []
     judged: list[AxisExcitation] = []
     measured: list[Array] = []
+    looped: dict[float, list[ClosedRecord]] = {}
+    laws: list[Law] = []
     examples: list[Example] = []
     checks: list[tuple[Array, Array]] = []
     likelihoods: list[dict[str, float]] = []
@@ -125,12 +132,19 @@ def validate(
                 rivals[name] = rivals["model"]
                 continue
             nuisance = calibrate(flown, piece, noise=noise, prior=prior, seconds=calibration, trims=trims)
-            rivals[name] = _Rival(
+            predictions = predict(
                 flown,
-                nuisance,
-                predict(flown, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=every, settling=calibration),
+                piece,
+                noise=noise,
+                nuisance=nuisance,
+                horizon=ahead,
+                every=every,
+                settling=calibration,
+                close_loop=() if rivals else close_loop,
             )
+            rivals[name] = _Rival(flown, nuisance, predictions)
         own = rivals["model"]
+        laws.extend(own.predictions.laws)
         calibrated.append(own.nuisance)
         truth = measured_states(piece, own.nuisance)
         # The tracked point as it is: that is what a controller saw, whatever the lever arm.
@@ -142,6 +156,9 @@ def validate(
                 starts, made = _at_horizon(piece, rivals, horizon)
                 for name, part in made.items():
                     parts.setdefault((name, horizon), []).append(part)
+                if own.predictions.closed is not None:
+                    predicted = own.predictions.closed[: len(starts), round(horizon / piece.dt) - 1]
+                    looped.setdefault(horizon, []).append(ClosedRecord(piece.time[starts], predicted, *made["model"]))
                 promised = sigma[round(horizon / piece.dt) - 1]
                 scored.setdefault(horizon, []).append(
                     ScoredRecord(piece.name, motion_of(piece, truth, starts), promised)
@@ -192,6 +209,8 @@ def validate(
         floors=beside,
         contacts=tuple(one for one in contacts if one is not None),
         without_contact=_scores(_without_contact(parts, scored, contacts)),
+        loop_closed=closed_floors(looped),
+        laws=tuple(laws),
     )
 
 

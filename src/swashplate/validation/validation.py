@@ -16,6 +16,7 @@ from swashplate.identification.core.records import Record
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 from swashplate.validation.contact import Contact
+from swashplate.validation.controller_law import Law
 from swashplate.validation.floors import ROWS, Floor
 
 PREDICTORS = ("model", "published card", "hold", "constant rates")
@@ -109,6 +110,8 @@ class Validation(Shown):
         floors: what the model's scores stand beside, per channel and horizon.
         contacts: proposed masks; none was applied.
         without_contact: the model's scores from starts that no mask touches.
+        loop_closed: fits with controllers in the place of recorded commands, and their lead over the model's on those;
+            nothing where no loop was closed. `laws`: the controllers.
     """
 
     vehicle: Vehicle
@@ -127,6 +130,14 @@ class Validation(Shown):
     floors: tuple[Floor, ...] = ()
     contacts: tuple[Contact, ...] = ()
     without_contact: tuple[Score, ...] = ()
+    loop_closed: tuple[Floor, ...] = ()
+    laws: tuple[Law, ...] = ()
+
+    @property
+    def not_logged(self) -> tuple[str, ...]:
+        """Rotor speeds and voltage that the model has and some flight does not."""
+        speeds = [name for name in self.vehicle.state_names if name.startswith("omega")]
+        return tuple(name for name in (*speeds, "voltage") if any(name not in flight for flight in self.flights))
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""
@@ -149,9 +160,12 @@ class Validation(Shown):
             "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "contacts": [vars(one) | {"words": one.words} for one in self.contacts],
             "scores_without_contact": [vars(score) for score in self.without_contact],
+            "loop_closed": [vars(floor) for floor in self.loop_closed],
+            "laws": [vars(law) for law in self.laws],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
+            "not_logged": list(self.not_logged),
             "thresholds": dict(self.thresholds),
             "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
             "settings": dict(self.settings),
@@ -176,14 +190,15 @@ class Validation(Shown):
             for predictor in PREDICTORS:
                 row = (fits.get((channel, horizon, predictor), float("nan")) for channel in channels)
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
-            masked = {s.channel: s.fit for s in self.without_contact if s.horizon == horizon}
-            if masked:
-                row = (masked.get(channel, float("nan")) for channel in channels)
-                lines.append(f"  {'no contact':16s}" + "".join(f"{value:9.1f}" for value in row))
+            beside_it = (("no contact", self.without_contact), ("loop closed", self.loop_closed))
+            for words, others in beside_it:
+                found = {s.channel: s.fit for s in others if s.horizon == horizon}
+                if found:
+                    row = (found.get(channel, float("nan")) for channel in channels)
+                    lines.append(f"  {words:16s}" + "".join(f"{value:9.1f}" for value in row))
             beside = {f.channel: f for f in self.floors if f.horizon == horizon}
             for words, cell in ROWS if beside else ():
                 row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
                 lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
-        return "\n".join(
-            [*lines, *(c.words for c in self.contacts), *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)]
-        )
+        told = [*(c.words for c in self.contacts), *(law.words for law in self.laws)]
+        return "\n".join([*lines, *told, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

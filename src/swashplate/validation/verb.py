@@ -27,6 +27,7 @@ def validate(
     horizons: Sequence[float] = HORIZONS,
     every: float = 0.1,
     calibration: float = CALIBRATION,
+    close_loop: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation: ...
@@ -41,6 +42,7 @@ def validate(
     horizons: Sequence[float] = HORIZONS,
     every: float = 0.1,
     calibration: float = CALIBRATION,
+    close_loop: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation | Verification: ...
@@ -54,6 +56,7 @@ def validate(
     horizons: Sequence[float] = HORIZONS,
     every: float = 0.1,
     calibration: float = CALIBRATION,
+    close_loop: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation | Verification:
@@ -71,6 +74,7 @@ def validate(
         horizons: seconds ahead.
         every: seconds between starts.
         calibration: seconds at the start of each record that tell its delays and trims.
+        close_loop: axes ("yaw", "heave") whose controller also predicts in the place of the recorded command.
         outputs: channels to compare, for models that are flown along the inputs; all that both have where None.
         progress: called with the number of records done and their number.
 
@@ -79,7 +83,8 @@ def validate(
 
     Raises:
         FlightError: where no record is long enough, or the flights lack what the model needs.
-        SwashError: for a calibration that is too short, or `published` beside a model that has no card to compare with.
+        SwashError: for a calibration that is too short, an axis whose loop cannot be closed, or `published` beside a
+            model that has no card to compare with.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     model, flown = fitted(model), as_flights(flights)
@@ -96,8 +101,11 @@ def validate(
             horizons=horizons,
             every=every,
             calibration=calibration,
+            close_loop=close_loop,
             progress=progress,
         )
+    if close_loop:
+        raise SwashError("closes nothing: such a model is flown along the recorded inputs alone.", channel="close_loop")
     if published is not None:
         raise SwashError(
             "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"

@@ -42,6 +42,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     "link px4": ("link_px4", "check_autopilot"),
     "maneuver check": ("plan_maneuver", "maneuver"),
     "maneuver design": ("design_maneuver",),
+    "maneuver need": ("needed_excitation",),
     "open": ("open_logs",),
     "plot": ("plot_logs",),
     "replay": ("replay", "show_replay", "film_replay"),

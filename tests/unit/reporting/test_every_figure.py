@@ -99,6 +99,7 @@ WITHOUT = {
     "TimeDetails": "the result shows them",
     "TransferFunctionDetails": "the result shows them",
     "TransferFunctions": "the result shows it",
+    "NeededExcitation": "a handful of numbers",
     "Trim": "one point's numbers; `trim_curve` shows many",
     "Vehicle": "`trim_curve`, `derivatives` and `linearize` show what it does",
     "WrittenStructure": "words",

@@ -41,7 +41,7 @@ def _record() -> Record:
     return record
 
 
-def _predicted(record: Record, *, nuisance: Nuisance | None = None) -> Predictions:
+def _predicted(record: Record, *, nuisance: Nuisance | None = None, close_loop: tuple[str, ...] = ()) -> Predictions:
     return predict(
         sp.vehicle("coax"),
         record,
@@ -50,6 +50,7 @@ def _predicted(record: Record, *, nuisance: Nuisance | None = None) -> Predictio
         horizon=max(HORIZONS),
         every=EVERY,
         settling=CALIBRATION,
+        close_loop=close_loop,
     )
 
 
@@ -69,6 +70,24 @@ def test_a_prediction_has_seen_nothing_after_its_start() -> None:
     np.testing.assert_array_equal(after.states[: place + 1], before.states[: place + 1])
     np.testing.assert_array_equal(after.filtered[: start + 1], before.filtered[: start + 1])
     assert np.abs(after.states[place + 1] - before.states[place + 1]).max() > 1e-6
+
+
+def test_a_closed_loop_uses_nothing_that_was_recorded_of_its_axis_after_the_start() -> None:
+    """Another yaw command after a start changes the prediction on recorded inputs, and not the one in closed loop."""
+    record, place = _record(), 4
+    late = Nuisance(delay_motor=0.045)
+    before = _predicted(record, nuisance=late, close_loop=("yaw",))
+    start = int(before.starts[place])
+    inputs = record.inputs.copy()
+    inputs[start + 1 :, :2] += np.array([-0.05, 0.05]) * np.linspace(0.5, 1.0, len(inputs) - start - 1)[:, None]
+    after = _predicted(replace(record, inputs=inputs), nuisance=late, close_loop=("yaw",))
+    assert before.closed is not None
+    assert after.closed is not None
+    assert [law.axis for law in before.laws] == ["yaw"]
+    np.testing.assert_allclose(after.closed[: place + 1], before.closed[: place + 1], rtol=0.0, atol=1e-12)
+    r = PREDICTED.index("r")
+    assert np.abs(after.states[place, :, r] - before.states[place, :, r]).max() > 0.1
+    assert np.abs(after.closed[place + 1, :, r] - before.closed[place + 1, :, r]).max() > 1e-6
 
 
 def test_predictions_begin_one_sample_after_their_start() -> None:

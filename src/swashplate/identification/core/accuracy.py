@@ -83,6 +83,12 @@ def corrected_covariance(
     return np.asarray(plain @ middle @ plain)
 
 
+def information_beyond(covariance: Array, prior: Array) -> Array:
+    """The information in a covariance (p, p) that the priors (p, p) had not; nothing where they had more."""
+    stretch, turn = np.linalg.eigh(np.linalg.pinv(covariance, hermitian=True) - prior)
+    return np.asarray((turn * np.maximum(stretch, 0.0)) @ turn.T)
+
+
 def sandwich(plain: Array, residuals: Sequence[Array], slopes: Sequence[Array], *, lags: int) -> Array:
     """Covariance by what the residuals are, whatever their size and their size over frequency: M^-1 B M^-1.
 

@@ -4,7 +4,8 @@ Maximum likelihood weighs one-step errors, in which a model that is wrong a litt
 least a second later. Here predictions start from the filter's states every so often, run on the recorded inputs with
 nothing measured, and are compared after each of some horizons (multi-step prediction errors: Farina and Piroddi 2010;
 direct and iterated predictions of a wrong model: Findley 1983). Noise, gains and start states stay as the likelihood
-found them; parameters and the records' constants move.
+found them; parameters and the records' constants move. What the likelihood knows of them stands beside the errors as a
+prior, with its corrected covariance: the errors move what one step hardly tells, and leave the rest.
 
 The recorded inputs of a flight under feedback answer the gusts that the prediction cannot know, so that long horizons
 lean towards output error with its bias: see docs/explanation/flights-under-feedback.md.
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.identification.core import robust
+from swashplate.identification.core import accuracy, robust
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 
@@ -30,6 +31,10 @@ Places = NDArray[np.intp]
 
 _MOVED = ("parameter", "nuisance")
 """Groups of entries that the criterion moves."""
+
+TWICE = 2.0
+"""By what the covariance is multiplied where the likelihood and the errors ahead tell the same records: as if the two
+erred together, (a + b)^2 <= 2 a^2 + 2 b^2."""
 
 _MEMORY = 2.0
 """Longest horizons over which the errors of overlapping predictions are taken to be correlated."""
@@ -55,7 +60,7 @@ class Horizon:
                 f"is {', '.join(f'{n:g}' for n in numbers) or 'empty'}, expected FIRST,LAST in seconds, "
                 "0 < FIRST <= LAST, or one number.",
                 channel="horizon",
-                hint="For example 0.25,2.",
+                hint="For example 0.25,1.",
             )
         return cls(numbers[0], numbers[-1])
 
@@ -100,13 +105,22 @@ class MultiStepErrors:
         pieces: its records.
         horizon: how far ahead.
         settling: seconds at the start of every record that are left out.
+        known: corrected covariance (p, p) of the likelihood's scaled row at its optimum, priors included; None: the
+            errors ahead and the priors alone.
 
     Raises:
         IdentificationError: where no record is long enough, or predictions diverge where the search begins.
     """
 
     def __init__(
-        self, base: PredictsAhead, row: Array, pieces: Sequence[Record], *, horizon: Horizon, settling: float = 0.0
+        self,
+        base: PredictsAhead,
+        row: Array,
+        pieces: Sequence[Record],
+        *,
+        horizon: Horizon,
+        settling: float = 0.0,
+        known: Array | None = None,
     ) -> None:
         dt = pieces[0].dt
         steps = horizon.samples(dt)
@@ -127,6 +141,11 @@ class MultiStepErrors:
             tuple(base.row.entries[place] for place in self._places),
             tuple((at[i], at[j], c) for i, j, c in base.row.prior_correlations if i in at and j in at),
         )
+        moved = np.ix_(self._places, self._places)
+        self.known = np.zeros((len(self.row), len(self.row)))
+        if known is not None:
+            prior = base.row.prior(self._found)[2]
+            self.known = accuracy.information_beyond(known[moved], prior[moved])
         errors = np.concatenate(base.errors_ahead(self._found, self.ahead))
         wild = np.asarray(~np.isfinite(errors).all(axis=(1, 2)))
         if wild.any():
@@ -166,7 +185,13 @@ class MultiStepErrors:
     def cost(self, row: Array) -> float:
         with np.errstate(over="ignore", invalid="ignore"):
             errors = np.concatenate(self._base.errors_ahead(self.whole(row), self.ahead))
-        return self._cost(errors) if np.isfinite(errors).all() else float("inf")
+        return self._cost(errors) + self._apart(row)[0] if np.isfinite(errors).all() else float("inf")
+
+    def _apart(self, row: Array) -> tuple[float, Array]:
+        """Cost and gradient of how far the row is from what the likelihood found."""
+        away = row - self.start
+        pull = self.known @ away
+        return 0.5 * float(away @ pull), pull
 
     def _cost(self, errors: Array) -> float:
         # Huber's knee is in sizes of an error, not of its share.
@@ -181,15 +206,16 @@ class MultiStepErrors:
         weight = robust.weights(white / np.sqrt(self._share)).ravel()
         flat = (slopes * self._scale).reshape(len(slopes), -1)
         weighted = flat * weight
-        return self._cost(errors), weighted @ white.ravel(), weighted @ flat.T
+        apart, pull = self._apart(row)
+        return self._cost(errors) + apart, weighted @ white.ravel() + pull, weighted @ flat.T + self.known
 
     def whitened(self, row: Array) -> tuple[list[Array], list[Array], Array]:
-        """Per record: whitened errors (starts, horizons x outputs) and their sensitivities (p, ...); nothing else."""
+        """Per record: whitened errors (starts, horizons x outputs) and sensitivities (p, ...); what is known beside."""
         errors, slopes = self._moved(row)
         kept = [i for i, part in enumerate(errors) if len(part)]
         white = [(errors[i] * self._scale).reshape(len(errors[i]), -1) for i in kept]
         moved = [(slopes[i] * self._scale).reshape(*slopes[i].shape[:2], -1) for i in kept]
-        return white, moved, np.zeros((len(self.row), len(self.row)))
+        return white, moved, self.known
 
     def _moved(self, row: Array) -> tuple[list[Array], list[Array]]:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -12,7 +12,7 @@ from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.comparison import Comparison
-from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
+from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.result import Constant, Estimate, Fitted, Result, correlation_of
@@ -113,8 +113,6 @@ def solve(
         IdentificationError: where the model diverges, at the first guess or ahead.
     """
     optimum = minimise(likelihood, start=start, iterations=iterations, tolerance=0.02, around=around, progress=progress)
-    if horizon is not None:
-        return _solved_ahead(likelihood, optimum, horizon, iterations=iterations, progress=progress)
     row = likelihood.row
     known = np.zeros_like(optimum.information)  # beforehand, of the model's parameters
     of_model = np.ix_(row.places("parameter"), row.places("parameter"))
@@ -123,23 +121,31 @@ def solve(
     lags = round(LAGS / likelihood.records[0].dt)
     white, sensitivities, rest = likelihood.whitened(optimum.row)
     corrected = accuracy.corrected_covariance(plain, rest + known, white, sensitivities, lags=lags)
+    if horizon is not None:
+        return _solved_ahead(likelihood, optimum, horizon, corrected, iterations=iterations, progress=progress)
     units = np.outer(row.scale, row.scale)
     named = dict(zip(row.names, map(float, _numbers(row, likelihood.sized(optimum.row))), strict=True))
     return Solved(named, likelihood, optimum, plain * units, corrected * units, row, optimum.row)
 
 
 def _solved_ahead(
-    likelihood: RecordLikelihood, first: Optimum, horizon: Horizon, *, iterations: int, progress: Progress | None
+    likelihood: RecordLikelihood,
+    first: Optimum,
+    horizon: Horizon,
+    known: Array,
+    *,
+    iterations: int,
+    progress: Progress | None,
 ) -> Solved:
-    """The optimum of the errors ahead, from that of the likelihood."""
+    """The optimum of the errors ahead, from that of the likelihood and beside what that knows (p, p)."""
     if not isinstance(likelihood, TimeErrors):
         raise IdentificationError("no filter runs ahead of its record with this method.", channel="horizon")
-    criterion = MultiStepErrors(likelihood, first.row, likelihood.records, horizon=horizon)
+    criterion = MultiStepErrors(likelihood, first.row, likelihood.records, horizon=horizon, known=known)
     optimum = minimise(criterion, start=criterion.start, iterations=iterations, tolerance=0.02, progress=progress)
     row, prior = criterion.row, criterion.row.prior(optimum.row)[2]
     plain = accuracy.covariance(row, optimum.information, prior)
     white, sensitivities, rest = criterion.whitened(optimum.row)
-    corrected = accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
+    corrected = TWICE * accuracy.corrected_covariance(plain, rest + prior, white, sensitivities, lags=criterion.lags)
     units, whole = np.outer(row.scale, row.scale), criterion.whole(optimum.row)
     named = dict(zip(likelihood.row.names, map(float, _numbers(likelihood.row, whole)), strict=True))
     return Solved(named, likelihood, optimum, plain * units, corrected * units, row, whole, horizon)

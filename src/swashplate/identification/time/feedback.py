@@ -36,7 +36,7 @@ _LAGS = 0.3
 _MOVED = 1e-4
 
 
-_MOTION: Mapping[str, tuple[tuple[str, ...], str]] = {
+MOTION: Mapping[str, tuple[tuple[str, ...], str]] = {
     "roll": (("phi", "p", "lateral", "v"), "p"),
     "pitch": (("theta", "q", "forward", "u"), "q"),
     "yaw": (("psi", "r"), "r"),
@@ -75,7 +75,7 @@ def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array])
     still = power < _MOVED
     explained, later, peak, phase = float("nan"), float("nan"), 0.0, float("nan")
     if not still:
-        answered, response = _MOTION[axis.name]
+        answered, response = MOTION[axis.name]
         moved = [motion[name] for name in answered]
         explained = _explained(command, moved, rate)
         later = _explained(command[::-1], [signal[::-1] for signal in moved], rate)

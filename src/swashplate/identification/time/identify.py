@@ -14,7 +14,7 @@ from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
-from swashplate.identification.core.multi_step import Horizon, MultiStepErrors, told_horizon
+from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import POSE, Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
@@ -93,7 +93,7 @@ def identify_flight(
     )
     notes = [] if axes else [_UNJUDGED]
     if method == "prediction-error" and not question.keep_unexcited:
-        table, held = _hold_unexcited(table, axes)
+        table, held = hold_unexcited(table, axes)
         notes += held
     likelihood = likelihood_of(table, pieces, question)
     where = ", ".join(piece.name for piece in pieces)
@@ -250,7 +250,7 @@ def _long_enough(pieces: list[Record]) -> list[Record]:
 _UNJUDGED = "the model names no axes: whether the flights move each by itself was not judged"
 
 
-def _hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:
+def hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:
     """Fix what only unexcited axes could tell, at its prior where it has one."""
     notes = []
     for axis in table.vehicle.traits.axes:
@@ -275,14 +275,18 @@ def _found(
     progress: Progress | None,
 ) -> tuple[Found, Array]:
     """What the search says, or the search for small errors ahead that follows it; and the likelihood's whole row."""
+    lags = round(LAGS / likelihood.model.dt)
+    first = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags)
     if horizon is None:
-        lags = round(LAGS / likelihood.model.dt)
-        return found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags), optimum.row
+        return first, optimum.row
     assert isinstance(likelihood, PredictionError)  # no other estimator takes a horizon
-    criterion = MultiStepErrors(likelihood, optimum.row, likelihood.pieces, horizon=horizon, settling=SETTLING)
+    criterion = MultiStepErrors(
+        likelihood, optimum.row, likelihood.pieces, horizon=horizon, settling=SETTLING, known=first.corrected
+    )
     ahead = minimise(criterion, start=criterion.start, iterations=iterations, progress=progress)
     ahead = replace(ahead, converged=ahead.converged and optimum.converged)
-    return found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags), criterion.whole(ahead.row)
+    found = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
+    return replace(found, corrected=TWICE * found.corrected), criterion.whole(ahead.row)
 
 
 def _identified(

@@ -40,7 +40,7 @@ _DIRECTIONS = 8
 _TOGETHER = 32
 """Samples whose slopes are taken side by side: what stays in a core's cache."""
 
-_RUNS = 64
+RUNS = 64
 """Predictions that run side by side."""
 
 
@@ -206,8 +206,8 @@ def ahead_of(
         starts: samples. ahead: how many samples to predict.
     """
     parts = [np.zeros((0, ahead, len(model.vehicle.state_names)))]
-    for first in range(0, len(starts), _RUNS):
-        here = np.pad(starts[first : first + _RUNS], (0, max(0, first + _RUNS - len(starts))), mode="edge")
+    for first in range(0, len(starts), RUNS):
+        here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
         rows = here[:, None] + np.arange(ahead)
         begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], states)
         parts.append(_ahead_of(model, begin, numbers, commands[rows], voltage[rows]))

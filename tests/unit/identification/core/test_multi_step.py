@@ -44,13 +44,16 @@ def _filter_error() -> TimeErrors:
     return VehicleErrors(table, pieces, method="filter-error", **how)
 
 
-def _criterion() -> MultiStepErrors:
+def _criterion(*, sigma: float | None = None) -> MultiStepErrors:
+    """The criterion alone, or beside a likelihood that knows every scaled entry to a sigma."""
     base = _filter_error()
-    return MultiStepErrors(base, base.row.starts(), base.records, horizon=Horizon(*AHEAD))
+    known = None if sigma is None else sigma**2 * np.eye(len(base.row))
+    return MultiStepErrors(base, base.row.starts(), base.records, horizon=Horizon(*AHEAD), known=known)
 
 
-def test_gradient_and_slopes_are_those_of_the_cost() -> None:
-    criterion = _criterion()
+@pytest.mark.parametrize("sigma", [None, 0.03])
+def test_gradient_and_slopes_are_those_of_the_cost(sigma: float | None) -> None:
+    criterion = _criterion(sigma=sigma)
     row = criterion.start + 0.05 * np.random.default_rng(1).standard_normal(len(criterion.row))
     cost, gradient, information = criterion.scores(row)
     assert cost == pytest.approx(criterion.cost(row), rel=1e-12)
@@ -60,6 +63,17 @@ def test_gradient_and_slopes_are_those_of_the_cost() -> None:
         slope = (criterion.cost(row + step) - criterion.cost(row - step)) / (2.0 * step[place])
         size = float(np.sqrt(information[place, place]))
         assert gradient[place] == pytest.approx(slope, rel=1e-4, abs=1e-4 * size), criterion.row.names[place]
+
+
+def test_what_the_likelihood_knows_stays() -> None:
+    """Known well, the row hardly moves; known as well as by the priors alone, it moves as if nothing were known."""
+    alone, firmly, hardly = (
+        minimise(c, start=c.start, iterations=5).row - c.start
+        for c in (_criterion(), _criterion(sigma=1e-4), _criterion(sigma=1e6))
+    )
+    assert np.abs(alone).max() > 0.05
+    assert np.abs(firmly).max() < 0.01
+    np.testing.assert_allclose(hardly, alone, rtol=0.02, atol=1e-3)
 
 
 def test_only_parameters_and_constants_move() -> None:

@@ -1,0 +1,123 @@
+"""Choice of what a fit frees and how far ahead it looks, by blocked cross-validation inside one flight: a table.
+
+    python scripts/choose_by_blocks.py august|july
+
+Each third of the flight's longest record is predicted by what the other two taught, with their delays, trims and noise;
+no other flight is looked at. Some minutes of processor time. The table is in docs/decisions/0099.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from real_flights import CHANNELS, FLIGHTS
+
+import swashplate as sp
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.delay_restarts import minimise_over_valleys
+from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import Record, records
+from swashplate.identification.core.scoring import minimise
+from swashplate.identification.time.estimates import LAGS, found_at
+from swashplate.identification.time.feedback import excitation
+from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.identify import hold_unexcited
+from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.identification.time.prediction_error import SETTLING, PredictionError
+from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.validation.prediction import predict
+
+CHOICES: dict[str, tuple[tuple[float, float], ...]] = {
+    "full": (),
+    "balanced": ((0.25, 1.0), (0.25, 2.0)),
+    "asymmetric": ((0.25, 2.0),),
+}
+"""What is freed, and horizons after the likelihood."""
+HELD = ("full",)
+"""Of these, what only an axis could tell that the flight does not move by itself is held, as by default."""
+BLOCKS, AHEAD, EVERY = 3, 1.0, 0.05
+JUDGED = ("phi", "theta", "p", "q")
+"""Their mean decides."""
+
+Learnt = tuple[str, Vehicle, Noise, Nuisance]
+
+
+def block(record: Record, number: int) -> Record:
+    """One of the equal parts of a record."""
+    edges = np.linspace(0, record.time.size, BLOCKS + 1).astype(int)
+    rows = slice(edges[number], edges[number + 1])
+    parts = {name: getattr(record, name)[rows] for name in ("time", "inputs", "outputs", "voltage")}
+    return replace(record, name=f"{record.name}, part {number + 1}", **parts)
+
+
+def learnt(
+    coax: Vehicle,
+    choice: str,
+    horizons: Sequence[tuple[float, float]],
+    pieces: list[Record],
+    axes: Sequence[AxisExcitation],
+) -> Iterator[Learnt]:
+    """What the likelihood finds in the pieces, and what each horizon makes of it."""
+    table = parameterize(coax, choice)
+    if choice in HELD:
+        table, _ = hold_unexcited(table, axes)
+    likelihood = PredictionError(table, pieces)
+    optimum = minimise_over_valleys(likelihood)
+    rows = {"likelihood": optimum.row}
+    lags = round(LAGS / likelihood.model.dt)
+    known = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags).corrected
+    for first, last in horizons:
+        for how, beside in (("alone", None), ("beside the likelihood", known)):
+            criterion = MultiStepErrors(
+                likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
+            )
+            found = minimise(criterion, start=criterion.start)
+            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(found.row)
+    for name, row in rows.items():
+        numbers = (row * likelihood.row.scale)[: len(table.names)]
+        told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.unpack(row)[1]))
+        yield name, table.vehicle.with_values(table.identified(numbers)), likelihood.noise_of(row), told
+
+
+def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -> tuple[Array, Array]:
+    """Squared errors and squared movements (starts, 12)."""
+    found = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD, every=EVERY, settling=SETTLING)
+    truth, ahead = measured_states(record, nuisance), round(AHEAD / record.dt)
+    counted = found.starts + ahead < record.time.size - 10  # rates at the end are one-sided
+    first = found.starts[counted]
+    return (found.states[counted, ahead - 1] - truth[first + ahead]) ** 2, (truth[first + ahead] - truth[first]) ** 2
+
+
+def main(flight: str) -> int:
+    enable_double_precision()
+    enable_compilation_cache()
+    coax = sp.vehicle("coax")
+    pieces = records(sp.read(FLIGHTS[flight]).condition(rate=100.0, cutoff=0.0), coax)
+    whole = max(pieces, key=lambda piece: piece.time.size)
+    axes = excitation(coax, whole, measured_states(whole, Nuisance()))
+    print(f"| in {flight.capitalize()} | criterion | {' | '.join(CHANNELS)} | mean of {', '.join(JUDGED)} |")
+    print("|" + " --- |" * (3 + len(CHANNELS)))
+    for choice, horizons in CHOICES.items():
+        made: dict[str, list[tuple[Array, Array]]] = {}
+        for left in range(BLOCKS):
+            others = [block(whole, i) for i in range(BLOCKS) if i != left]
+            for name, *model in learnt(coax, choice, horizons, others, axes):
+                made.setdefault(name, []).append(errors(model[0], block(whole, left), *model[1:]))
+        for name, parts in made.items():
+            wrong, moved = (np.concatenate(part).mean(axis=0) for part in zip(*parts, strict=True))
+            fit = dict(zip(PREDICTED, 100.0 * (1.0 - np.sqrt(wrong / moved)), strict=True))
+            mean = float(np.mean([fit[c] for c in JUDGED]))
+            print(f"| `{choice}` | {name} | {' | '.join(f'{fit[c]:.0f}' for c in CHANNELS)} | {mean:.1f} |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
