@@ -16,7 +16,9 @@ FILES = (flying.RESPONSES, "responses.json", "report.html")
 
 
 def combine(
-    operation: Annotated[str, typer.Argument(metavar="OPERATION", help="product, ratio, inverse, closed or broken.")],
+    operation: Annotated[
+        str, typer.Argument(metavar="OPERATION", help="product, ratio, inverse, negative, closed or broken.")
+    ],
     responses: Annotated[
         list[str],
         typer.Argument(
@@ -27,7 +29,7 @@ def combine(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Multiply, divide, invert frequency responses, close or open a loop; errors and coherence are carried through.
+    """Multiply, divide, invert, negate frequency responses, close or open a loop, with errors and coherence.
 
     closed: L / (1 + L) of a broken loop L with negative feedback. broken: L = T / (1 - T) of the closed one. Writes
     responses.nc, responses.json and report.html to --out, for fit-tf and compare.

@@ -110,8 +110,9 @@ def of_state_space(model: StateSpaceModel, *, name: str) -> Linear:
     """An identified (or ready) linear model with its present numbers.
 
     Raises:
-        CardError: where its left side cannot be solved for the states' derivatives.
+        CardError: where its left side cannot be solved for the states' derivatives, or entries have own delays.
     """
+    model.refuse_entry_delays("exports hold the delay of")
     numbers = model.numbers()
     return Linear(
         name,

@@ -11,6 +11,8 @@ SECTION = "input_delays"
 """Section of the card's `observer` with a delay for each input by name [s]."""
 BY_OUTPUT = "input_delays_by_output"
 """The same by "output/input" where an input reaches outputs after different times [s]."""
+BY_ENTRY = "input_delays_by_entry"
+"""Of a linear model, delays of single entries of G by "state_dot/input" [s]: only its structure holds them."""
 _LONGEST = 1.0
 
 
@@ -22,8 +24,15 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
     all in them; the equations have none of it. A linear model's card has one for each input.
 
     Raises:
-        CardError: where an input reaches outputs after different times.
+        CardError: where an input reaches outputs, or acts in equations, after different times.
     """
+    if apart := vehicle.card.observer.get(BY_ENTRY):
+        listed = ", ".join(f"{n} {d:g} s" for n, d in apart.items())
+        raise CardError(
+            f"has delays of single entries of G ({listed}): expected one delay of each input.",
+            where=vehicle.card.where,
+            hint="Give the file one delay per input; fits to responses and verification hold those of entries.",
+        )
     if apart := vehicle.card.observer.get(BY_OUTPUT):
         found: dict[str, set[float]] = {}
         for name, delay in apart.items():

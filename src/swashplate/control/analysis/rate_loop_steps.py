@@ -109,13 +109,15 @@ def stepped(
         for name in ("FF", "P", "I", "D", "FLTT", "FLTE", "FLTD", "FLTG")
     }
     m = max(value.size for value in k.values())
+    model, owner = model.wide  # one input for every time at which the command acts
     a, b, c, d = model.explicit()
-    i, o, n = model.inputs.index(command), model.outputs.index(rate), a.shape[0]
-    dt = 1.0 / RATE
-    held = expm(np.block([[a, b[:, [i]]], [np.zeros((1, n + 1))]]) * dt)
-    ad, bd, cd, dd = held[:n, :n], held[:n, n], c[o], float(d[o, i])
-    late = max(1, round(model.delay(rate, command) * RATE))  # one step at least: commands act after it
-    waiting = [np.zeros(m)] * late
+    driven = [k for k, j in enumerate(owner) if model.inputs[j] == command]
+    o, n, dt = model.outputs.index(rate), a.shape[0], 1.0 / RATE
+    held = expm(np.block([[a, b[:, driven]], [np.zeros((len(driven), n + len(driven)))]]) * dt)
+    ad, bd, cd, dd = held[:n, :n], held[:n, n:], c[o], d[o, driven]
+    # One step at least: commands act after it.
+    late = np.array([max(1, round(model.delay(rate, model.inputs[k]) * RATE)) for k in driven])
+    given = np.zeros((int(late.max()), m))
     wanted, slow, filtered, sloped, before, summed, x = *np.zeros((6, m)), np.zeros((n, m))
     target_share, error_share, slope_share, gyro_share = (
         np.where(k[name] > 0.0, 1.0 - np.exp(-2.0 * np.pi * k[name] * dt), 1.0)
@@ -125,8 +127,8 @@ def stepped(
     seen, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
     found = np.full((round(seconds * RATE) + 1, m), np.nan)
     for step in range(len(found)):
-        acting = waiting.pop(0)
-        y = cd @ x + dd * acting
+        acting = given[-late]
+        y = cd @ x + dd @ acting
         flying &= np.abs(y) < _WILD * max(1.0, abs(target))
         found[step, flying] = y[flying]
         wanted = wanted + target_share * (target - wanted)
@@ -136,8 +138,9 @@ def stepped(
         changing = -slow if of_gyro else filtered
         sloped = sloped + slope_share * ((changing - before) / dt - sloped)
         before = changing
-        waiting.append(k["FF"] * wanted + k["P"] * filtered + k["I"] * summed + k["D"] * sloped + disturbance)
-        x = (ad @ x + np.outer(bd, acting)) * flying
+        asked = k["FF"] * wanted + k["P"] * filtered + k["I"] * summed + k["D"] * sloped + disturbance
+        given = np.concatenate([given[1:], asked[None]])
+        x = (ad @ x + bd @ acting) * flying
     return found
 
 

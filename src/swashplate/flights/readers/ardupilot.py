@@ -41,6 +41,7 @@ class _Message:
         fields: field -> (channel, unit in the log).
         suffix: of channels that an earlier message has taken.
         instance: (field, number) where the message carries several sensors.
+        total: channel that is the sum of all fields, "" for none.
     """
 
     name: str
@@ -48,6 +49,7 @@ class _Message:
     fields: Mapping[str, tuple[str, str]]
     suffix: str = ""
     instance: tuple[tuple[str, ...], int] | None = None
+    total: str = ""
 
 
 _INSTANCE = ("I", "Inst", "Instance", "C")
@@ -62,6 +64,14 @@ _ANGLES = {
 _ESTIMATE = {
     "PN": ("x", "m"), "PE": ("y", "m"), "PD": ("z", "m"), "VN": ("vx", "m/s"), "VE": ("vy", "m/s"), "VD": ("vz", "m/s"),
 }  # fmt: skip
+
+
+def _controller(message: str, axis: str) -> _Message:
+    """The terms of a rate controller, whose sum goes to the mixer."""
+    terms = {"P": "p", "I": "i", "D": "d", "FF": "f", "DFF": "df"}
+    fields = {field: (f"pid_{term}_{axis}", "1") for field, term in terms.items()}
+    return _Message(message, f"pid_{axis}", fields, total=f"pid_{axis}")
+
 
 _MESSAGES = (
     _Message("RATE", "rates", {
@@ -82,6 +92,7 @@ _MESSAGES = (
         "Gx": ("p", "deg/s"), "Gy": ("q", "deg/s"), "Gz": ("r", "deg/s"),
         "Ax": ("ax", "m/s^2"), "Ay": ("ay", "m/s^2"), "Az": ("az", "m/s^2"),
     }, "sid"),
+    _controller("PIDR", "roll"), _controller("PIDP", "pitch"), _controller("PIDY", "yaw"),
     _Message("RCIN", "received", {f"C{i}": (f"rcin_{i}", "us") for i in range(1, 17)}),
     _Message("RCOU", "sent", {f"C{i}": (f"rcout_{i}", "us") for i in range(1, 17)}),
     _Message("RPM", "rotor", {"RPM": ("omega_rotor", "rpm"), "rpm1": ("omega_rotor", "rpm")}, "", (_INSTANCE, 0)),
@@ -126,6 +137,8 @@ def read(source: Source, options: Options) -> Flight:
     found, end, said = _one_run(found)
     told = story(found, end=end)
     notes: list[str] = list(found.notes)
+    if "Plane" in told.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
+        found = Messages({n: t for n, t in found.tables.items() if n[:3] != "PID"}, found.notes, found.damage)
     streams = _streams(found, told.events, notes)
     if not streams:
         raise FlightError(
@@ -195,6 +208,8 @@ def _streams(found: Messages, events: tuple[Event, ...], notes: list[str]) -> di
             if channel.startswith(("rcin", "rcout")) and not values.any():
                 continue  # a channel that nothing is connected to
             columns[name] = (values, target_unit if channel == "sid_target" else unit)
+        if message.total and columns:
+            columns[message.total] = (np.sum([values for values, _ in columns.values()], axis=0), "1")
         made = clocked.made_stream(message.stream, seconds(table), columns, notes=notes)
         if made is not None:
             streams[message.stream] = made

@@ -31,7 +31,8 @@ def autopilot_gains(flights: Sequence[Flight]) -> dict[str, dict[str, float]]:
 def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str, ...]:
     """Other commands on the same time base in all flights, which may have moved with the first of the named inputs.
 
-    A command has the unit "1", or none where that input has none (a table without units).
+    A command has the unit "1", or none where that input has none (a table without units). The terms of a controller
+    (`pid_p_roll`) are no commands: their sum is in the command.
     """
 
     def commands(flight: Flight) -> set[str]:
@@ -47,7 +48,9 @@ def bystanders_of(flights: Sequence[Flight], named: Sequence[str]) -> tuple[str,
         }
 
     shared = set.intersection(*(commands(flight) for flight in flights))
-    return tuple(sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith(INJECTED)))
+    return tuple(
+        sorted(name for name in shared - set(named) - set(QUATERNION) if not name.startswith((*INJECTED, "pid_")))
+    )
 
 
 def slowest_of(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, float]:

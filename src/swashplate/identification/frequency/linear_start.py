@@ -71,15 +71,15 @@ def by_regression(
     lag = dict.fromkeys(model.inputs, 0.0)
     for _ in range(2):
         for name in model.inputs:
-            if name in model.delays:
+            if any(key.rpartition("/")[2] == name for key in model.delays):
                 cost = [_regressed(model, rows, omega, states, spread, {**lag, name: float(d)})[1] for d in DELAYS]
                 lag[name] = float(DELAYS[int(np.argmin(cost))])
     values, _ = _regressed(model, rows, omega, states, spread, lag)
     if values is None:
         return None
     for name, expression in model.delays.items():
-        if expression.text in model.free and name in lag:
-            values[expression.text] = lag[name]
+        if expression.text in model.free:
+            values[expression.text] = lag[name.rpartition("/")[2]]
     return model.with_values(_bounded(model, values))
 
 

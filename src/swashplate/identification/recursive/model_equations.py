@@ -30,7 +30,8 @@ def model_equations(
             continue
         text = " + ".join([*terms, BIAS]).replace("+ -", "- ")
         used = {term.partition("*")[2] for term in terms}
-        late = {n: float(model.delays[n](numbers)) for n in model.inputs if n in model.delays and n in used}
+        known = {n: model.delays.get(f"{state}_dot/{n}", model.delays.get(n)) for n in model.inputs if n in used}
+        late = {n: float(expression(numbers)) for n, expression in known.items() if expression is not None}
         found.append(regression_equation(f"{state}_dot = {text}", delays=late))
     return tuple(found), tuple(left_out)
 

@@ -18,7 +18,7 @@ from swashplate.errors import IdentificationError
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.registry import listed, nearest
 
-Operation = Literal["product", "ratio", "inverse", "closed", "broken"]
+Operation = Literal["product", "ratio", "inverse", "negative", "closed", "broken"]
 OPERATIONS: tuple[Operation, ...] = get_args(Operation)
 _OF_TWO = ("product", "ratio")
 
@@ -33,9 +33,9 @@ def combine(
 
     Args:
         operation: "product" first times second (one behind the other), "ratio" first over second (what lies between
-            two outputs of the same input), "inverse" 1 / first, "closed" L / (1 + L) from a broken loop L with negative
-            feedback, "broken" T / (1 - T) from the closed one: at the actuator from command and total of a PID message,
-            at the stick from stick and rate.
+            two outputs of the same input), "inverse" 1 / first, "negative" -first (the loop broken at the actuator is
+            minus the controller's output by the command), "closed" L / (1 + L) from a broken loop L with negative
+            feedback, "broken" T / (1 - T) from the closed one, as at the stick from demand and rate.
         first, second: responses of one pair each, see `FrequencyResponse.select`. The second is interpolated between
             its frequencies; where either has none there is no result.
 
@@ -66,6 +66,8 @@ def combine(
         noise, error = noise + noise2, np.hypot(error, error2)
     elif operation == "inverse":
         h = unity / h
+    elif operation == "negative":
+        h = -h
     else:
         through = np.abs(unity / (unity + h)) if operation == "closed" else np.abs(unity / (unity - h))
         _fits(operation, first, None)

@@ -169,6 +169,8 @@ def _answer(
     ends: Array,
 ) -> Complex:
     omega, length, u, _ = piece
+    model, owner = model.wide
+    u = u[:, owner]
     m, s = model.matrices(), 1j * omega[:, None, None]
     edge = ends[0] - ends[1] * np.exp(-1j * omega * length)[:, None]
     left = np.linalg.inv(s * m["M"] - m["F"])

@@ -83,6 +83,10 @@ def answers(model: StateSpaceModel, outputs: Sequence[str], inputs: Array, dt: f
         The outputs forced by each input alone (n_t, k, m); what each constant does to them (n_t, k, 2 n + k): one per
         mode, one shift per mode, one bias per output.
     """
+    if model.entry_delays:
+        wide, owner = model.wide
+        parts, constants = answers(wide, outputs, inputs[:, owner], dt)
+        return parts @ np.eye(len(model.inputs))[list(owner)], constants
     a, b, c, d = model.explicit()
     rows = [model.outputs.index(o) for o in outputs]
     lags = [tuple(model.delay(o, i) / dt for i in model.inputs) for o in outputs]

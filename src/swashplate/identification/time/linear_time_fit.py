@@ -107,12 +107,14 @@ def linear_records(
 
     Raises:
         IdentificationError: no free parameter, names that are no outputs, delays that differ between outputs.
+        CardError: delays of single entries.
     """
     if not model.free:
         raise IdentificationError("has no free parameter.", channel=model.name)
     unknown = [o for o in (*outputs, *biases) if o not in model.outputs]
     if unknown:
         raise IdentificationError(f"is no output of '{model.name}'.", channel=", ".join(unknown))
+    model.refuse_entry_delays("a fit in time holds the delay of")
     delays = tuple(_delay_of(model, outputs, i) for i in model.inputs)
     pieces = []
     for flight in flights:

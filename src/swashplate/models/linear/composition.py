@@ -1,6 +1,7 @@
 """Structures composed of parts: "compose:body+flap+inflow" as the document of a state-space model file.
 
-A pair among the parts ("compose:body+flap+r/pedal") gives that response a delay of its own.
+A pair among the parts ("compose:body+flap+r/pedal") gives that response a delay of its own, a derivative and an input
+("compose:body+flap+r_dot/pedal") that entry of G.
 
 What the parts are is said in `structure_parts`. Quasi-steady body and first-order tip-path plane: Tischler and Remple
 2012, ch. 15, and Mettler, Tischler and Kanade 1999; inflow: Pitt and Peters 1981, Chen and Hindson 1986.
@@ -8,7 +9,7 @@ What the parts are is said in `structure_parts`. Quasi-steady body and first-ord
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swashplate.errors import CardError
@@ -52,7 +53,7 @@ def parts_of(text: str) -> tuple[str, ...]:
 
 
 def pairs_of(text: str) -> tuple[str, ...]:
-    """The responses (output/input) with a delay of their own that "compose:body+flap+r/pedal" names."""
+    """The responses (output/input) or entries (state_dot/input) with a delay of their own that a name holds."""
     return tuple(part for part in _named(text) if "/" in part)
 
 
@@ -82,7 +83,8 @@ def document(text: str) -> dict[str, Any]:
     """The model file of "compose:..." as a document.
 
     Args:
-        text: parts; an output and input among them ("r/pedal") has a delay of its own in that response.
+        text: parts; an output and input among them ("r/pedal") has a delay of its own in that response, a derivative
+            and input ("r_dot/pedal") in that equation.
 
     Raises:
         CardError: an unknown part, parts that make no sense together, a pair that they do not have.
@@ -128,21 +130,30 @@ def document(text: str) -> dict[str, Any]:
         "equations": equations,
         "left": left,
         "outputs": outputs,
-        "delays": _delays(text, pairs, tuple(inputs), tuple(outputs)),
+        "delays": _delays(text, pairs, tuple(inputs), tuple(outputs), equations),
     }
     if "body" in names:
         found["trim"] = {state: _TRIM_NAMES[state] for state in TRIM}
     return found | {"parameters": _parameters(found)}
 
 
-def _delays(text: str, pairs: Sequence[str], inputs: Sequence[str], outputs: Sequence[str]) -> dict[str, str]:
-    """One delay for each input, and one for each pair that is named; an input whose pairs all are has none left."""
+def _delays(
+    text: str,
+    pairs: Sequence[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    equations: Mapping[str, Mapping[str, str]],
+) -> dict[str, str]:
+    """One delay for each input, and one for each pair or entry that is named; an input whose all are has none left."""
     own: dict[str, str] = {}
+    entries = [f"{row}_dot/{name}" for row, found in equations.items() for name in found if name in inputs]
     for pair in pairs:
         output, _, name = pair.partition("/")
-        if output not in outputs or name not in inputs:
-            near = nearest(pair, [f"{o}/{i}" for o in outputs for i in inputs])
-            listed = f"Outputs are {', '.join(outputs)}; inputs are {', '.join(inputs)}."
+        if pair not in entries and (output not in outputs or name not in inputs):
+            near = nearest(pair, [*entries, *(f"{o}/{i}" for o in outputs for i in inputs)])
+            listed = f"Outputs are {', '.join(outputs)}; inputs are {', '.join(inputs)}; entries are " + ", ".join(
+                entries
+            )
             raise CardError(
                 f"'{pair}' is no pair output/input of these parts, which could have a delay of its own.",
                 where=text,
@@ -151,7 +162,12 @@ def _delays(text: str, pairs: Sequence[str], inputs: Sequence[str], outputs: Seq
         if pair in own:
             raise CardError(f"'{pair}' is named twice.", where=text)
         own[pair] = f"tau_{output}_{SHORT[name]}"
-    shared = [name for name in inputs if any(f"{output}/{name}" not in own for output in outputs)]
+    shared = [
+        name
+        for name in inputs
+        if any(f"{output}/{name}" not in own for output in outputs)
+        and any(entry not in own for entry in entries if entry.endswith(f"/{name}"))
+    ]
     return {name: f"tau_{SHORT[name]}" for name in shared} | own
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter
-from swashplate.models.delays import BY_OUTPUT, SECTION
+from swashplate.models.delays import BY_ENTRY, BY_OUTPUT, SECTION
 from swashplate.models.linear.card_vehicle import NAME, SIZE, entry_name, entry_unit, linear
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
@@ -116,7 +116,9 @@ def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, 
 
 
 def _delays(model: StateSpaceModel) -> dict[str, dict[str, float]]:
-    """Sections of the card's observer: the delay of each input, or of each response where outputs differ."""
+    """Sections of the card's observer: delays of inputs, of responses where outputs differ, or of entries."""
+    if model.entry_delays:
+        return {BY_ENTRY: {name: float(model.delays[name](model.numbers())) for name in model.entry_delays}}
     every = {name: {model.delay(output, name) for output in model.outputs} or {0.0} for name in model.inputs}
     if all(len(found) == 1 for found in every.values()):
         return {SECTION: {name: max(0.0, *found) for name, found in every.items()}}

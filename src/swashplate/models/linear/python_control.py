@@ -56,6 +56,15 @@ def state_space(
     return control.ss(whole.A, whole.B, whole.C, whole.D, inputs=list(inputs), outputs=list(outputs))
 
 
+def joined(wide: Any, shares: Array, *, inputs: Sequence[str]) -> Any:
+    """A `control.StateSpace` some of whose inputs are one, by which input drives which (n_wide, n_inputs)."""
+    control = library("control", what="to_control")
+    return control.ss(
+        wide.A, wide.B @ shares, wide.C, wide.D @ shares,
+        states=wide.state_labels, inputs=list(inputs), outputs=wide.output_labels,
+    )  # fmt: skip
+
+
 def transfer_function(numerator: Array, denominator: Array, *, delay: float, pade: int | None, name: str) -> Any:
     """A `control.TransferFunction`, its delay [s] as a Padé polynomial; see `state_space` for `pade`."""
     control = library("control", what="to_control")

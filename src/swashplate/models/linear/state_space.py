@@ -2,6 +2,9 @@
 
     M dx/dt = F x + G u(t - tau),    y = H0 x + H1 dx/dt + D u(t - tau)
 
+A delay belongs to an input, to one response, or to one entry of G. Where entries of one input act at different times
+the input is taken as several, one for each time (`wide`).
+
 (Tischler and Remple 2012, eq. 13.1). The response and its derivatives are exact: with T = (j omega M - F)^-1 an entry
 f of F changes H = C T G by C T (dF/df) T G, one outer product each; entries change with parameters by complex steps,
 which are exact to rounding for a grammar of arithmetic (Squire and Trapp 1998).
@@ -18,7 +21,7 @@ import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.errors import CardError
-from swashplate.models.linear import python_control
+from swashplate.models.linear import late_entries, python_control
 from swashplate.models.linear.expressions import Expression
 
 MATRICES = ("M", "F", "G", "H0", "H1", "D")
@@ -72,7 +75,7 @@ class StateSpaceModel:
         states, inputs, outputs: names; units by name in `units`.
         parameters: by name, in the file's order.
         elements: entries of the matrices (M is the identity where nothing is said).
-        delays: expressions [s] by input, or by "output/input" for one response.
+        delays: expressions [s] by input, by "output/input" (one response) or by "state_dot/input" (one entry of G).
         units: by state, input and output.
         document: the file's own structure, from which the model is written again.
     """
@@ -196,8 +199,42 @@ class StateSpaceModel:
         a, b = np.linalg.solve(m["M"], m["F"]), np.linalg.solve(m["M"], m["G"])
         return np.asarray(a), np.asarray(b), m["H0"] + m["H1"] @ a, m["D"] + m["H1"] @ b
 
+    @cached_property
+    def entry_delays(self) -> dict[str, tuple[int, int]]:
+        """The delays of single entries of G, each with its row and column."""
+        return late_entries.places(self)
+
+    @cached_property
+    def wide(self) -> tuple[StateSpaceModel, tuple[int, ...]]:
+        """The same model with one more input for every entry of G that has a delay of its own.
+
+        Returns:
+            The model, and for each of its inputs which input of this one drives it.
+        """
+        return late_entries.widened(self)
+
+    def refuse_entry_delays(self, what: str) -> None:
+        """Say that something holds no delays of single entries.
+
+        Raises:
+            CardError: where the model has any.
+        """
+        if self.entry_delays:
+            raise CardError(
+                f"is a delay of one entry of G, and {what} an input as a whole.",
+                where=self.name,
+                channel=", ".join(self.entry_delays),
+                hint="Give the input one delay in [delays]; fits to responses and verification hold those of entries.",
+            )
+
     def delay(self, output: str, input: str) -> float:
-        """Delay of one response [s]."""
+        """Delay of one response [s].
+
+        Raises:
+            CardError: where entries of that input have delays of their own.
+        """
+        if any(self.inputs[j] == input for _, j in self.entry_delays.values()):
+            self.refuse_entry_delays("this needs the delay of")
         expression = self.delays.get(f"{output}/{input}", self.delays.get(input))
         return 0.0 if expression is None else float(expression(self.numbers()))
 
@@ -208,6 +245,9 @@ class StateSpaceModel:
 
     def response(self, omega: Array) -> Complex:
         """H(j omega) with its delays, shape (n_f, n_outputs, n_inputs)."""
+        if self.entry_delays:
+            wide, owner = self.wide
+            return np.asarray(wide.response(omega) @ late_entries.shares(owner))
         m, s = self.matrices(), 1j * np.asarray(omega)[:, None, None]
         x = np.linalg.solve(s * m["M"] - m["F"], np.broadcast_to(m["G"] + 0j, (len(omega), *m["G"].shape)))
         h = (m["H0"] + s * m["H1"]) @ x + m["D"]
@@ -224,6 +264,9 @@ class StateSpaceModel:
         Raises:
             SwashError: an order outside 0 to 12.
         """
+        if self.entry_delays:
+            wide, owner = self.wide
+            return python_control.joined(wide.to_control(pade=pade), late_entries.shares(owner), inputs=self.inputs)
         numbers = self.numbers()
         return python_control.state_space(
             self.explicit(),
@@ -257,6 +300,8 @@ class StateSpaceModel:
         Returns:
             Per pair the response (n,) and the slopes (n, len(free)).
         """
+        if self.entry_delays:
+            return late_entries.sensitivities(self, free, numbers, pairs)
         changes = dict(zip(free, map(float, numbers), strict=True))
         values = self.numbers(changes)
         m = {name: np.eye(*s) if name == "M" else np.zeros(s) for name, s in self._shapes.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from swashplate.errors import CardError
@@ -35,6 +35,48 @@ def units(given: Mapping[str, Any], *, path: str) -> None:
                 where=path,
                 channel=entry,
                 hint="Convert the model's numbers, or give the channel another name.",
+            )
+
+
+def delays(
+    names: Collection[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    entries: Collection[tuple[str, str]],
+    *,
+    path: str,
+) -> None:
+    """That delays belong to inputs, to responses (output/input) or to entries (state_dot/input), not to several.
+
+    Args:
+        names: of the delays.
+        inputs, outputs: of the model. entries: state and input of each entry of G.
+        path: of the file.
+
+    Raises:
+        CardError: naming the entry.
+    """
+    of_entries: dict[str, str] = {}
+    listed = ", ".join(f"{state}_dot/{name}" for state, name in sorted(entries))
+    for name in names:
+        row, _, column = name.rpartition("/")
+        if column in inputs and (name == column or row in outputs):
+            continue
+        if (row.removesuffix("_dot"), column) not in entries or not row.endswith("_dot"):
+            raise CardError(
+                "is no input, no 'output/input' and no 'state_dot/input' of an entry of this model.",
+                where=path,
+                channel=f"delays.{name}",
+                hint=f"Inputs are {', '.join(inputs)}; entries are {listed}.",
+            )
+        of_entries[column] = name
+    for name in names:
+        row, _, column = name.rpartition("/")
+        if row in outputs and column in of_entries:
+            raise CardError(
+                f"is the delay of a response, {of_entries[column]} that of an entry: expected one kind for an input.",
+                where=path,
+                channel=f"delays.{name}",
             )
 
 

@@ -21,7 +21,7 @@ of = {}                                      # coefficients of states and inputs
 rates = {w = "1"}                            # coefficients of the states' derivatives
 # specific_force = "z", at = ["x_s", "y_s", "z_s"]   an accelerometer at a place from the centre of gravity
 [delays]
-collective = "tau"                           # by input, or by "output/input"
+collective = "tau"                           # by input, by "output/input", or by "w_dot/collective": one entry
 [limits]                                     # of inputs, from the trim; only a controller needs them
 collective = [-1.0, 1.0]
 [trim]                                       # where the model stands if not in hover: accelerometers need it
@@ -315,15 +315,10 @@ class _Reader:
             self._row(output.get("rates", {}), row, f"{entry}.rates", of_states="H1", of_inputs=None)
             if "specific_force" in output:
                 self._specific_force(row, name, output)
-        delays = {}
-        for name, text in self._table("delays").items():
-            parts = name.split("/")
-            if parts[-1] not in self.inputs or (len(parts) == 2 and parts[0] not in self.outputs) or len(parts) > 2:
-                raise CardError(
-                    "is no input and no 'output/input' of this model.", where=self.path, channel=f"delays.{name}"
-                )
-            delays[name] = self._expression(text, f"delays.{name}")
-            self.used |= delays[name].names
+        delays = {name: self._expression(text, f"delays.{name}") for name, text in self._table("delays").items()}
+        self.used = self.used.union(*(expression.names for expression in delays.values()))
+        entries = {(self.states[e.row], self.inputs[e.column]) for e in self.elements if e.matrix == "G"}
+        checks.delays(delays, self.inputs, self.outputs, entries, path=self.path)
         checks.limits(self._table("limits"), self.inputs, path=self.path)
         checks.shape(self._table("shape"), path=self.path)
         idle = sorted(set(self.parameters) - self.used)

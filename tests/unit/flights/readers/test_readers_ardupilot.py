@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import swashplate as sp
 from made_autopilot_logs import ARDUPILOT, CHIRP, Row, ardupilot_rows, dataflash, dataflash_text, fmt
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
@@ -36,6 +37,47 @@ def test_every_message_becomes_a_stream_at_its_own_rate_in_si(tmp_path: Path) ->
     assert_allclose(np.unique(flight.values("rcin_2")), 1.5e-3 + 1e-6 * np.arange(7), rtol=1e-12)
     assert flight["p_imu"].attrs["units"] == "rad/s"
     assert flight["mixer_collective"].attrs["units"] == "1"
+
+
+_PID = "TimeUS,Tar,Act,Err,P,I,D,FF,DFF,Dmod,SRate,Flags"
+
+
+def _loop(seconds: float = 60.0, rate: float = 200.0) -> tuple[list[Row], dict[str, tuple[int, str, str]], np.ndarray]:
+    """Rows of a roll loop in gusts: rate = 40 / (s + 3) of the command, P 0.1 and I 0.2, a chirp at the mixer."""
+    n, random = round(seconds * rate), np.random.default_rng(5)
+    time = 20.0 + np.arange(n) / rate
+    chirp = 0.1 * np.sin(2.0 * np.pi * np.cumsum(np.geomspace(0.2, 12.0, n)) / rate)
+    p, summed, gust, rows = 0.0, 0.0, 0.0, []
+    for k in range(n):
+        proportional = -0.1 * p
+        summed -= 0.2 * p / rate
+        command = proportional + summed + chirp[k]
+        us = round(1e6 * float(time[k]))
+        rows.append(("RATE", (us, 0.0, np.degrees(p), command, *[0.0] * 8, 0.5 + 1e-4 * (k % 2))))
+        rows.append(("PIDR", (us, 0.0, p, -p, proportional, summed, 0.0, 0.0, 0.0, 1.0, 0.0, 0)))
+        gust += (-2.0 * gust + 0.5 * random.standard_normal()) / rate
+        p += (-3.0 * p + 40.0 * command + gust) / rate
+    return rows, {**ARDUPILOT, "PIDR": (80, "QffffffffffB", _PID)}, chirp
+
+
+def test_terms_of_the_rate_controller_tell_the_loop_at_the_actuator(tmp_path: Path) -> None:
+    rows, formats, chirp = _loop()
+    flight = _flight(tmp_path, dataflash(rows, formats))
+    total = sum(flight.values(f"pid_{term}_roll") for term in ("p", "i", "d", "f", "df"))
+    assert_allclose(flight.values("pid_roll"), total, atol=1e-7)
+    assert flight["pid_roll"].attrs["units"] == "1"
+    channels = {name: flight.values(name) for name in ("mixer_roll", "pid_roll", "p")} | {"injected": chirp}
+    log = Flight.from_arrays(flight.time("pid_roll"), channels, units={"injected": "1", "pid_roll": "1"})
+    found = sp.respond(log, inputs=("mixer_roll",), outputs=("pid_roll",), references=("injected",), band=(0.4, 8.0))
+    loop = sp.combine("negative", found)
+    s = 1j * loop.omega
+    ratio = loop.response[:, 0, 0] / ((0.1 + 0.2 / s) * 40.0 / (s + 3.0))
+    # A sample passes from rate to command, and Euler's steps are half a sample late.
+    assert np.max(np.abs(np.log(np.abs(ratio)))) < 0.1
+    told = sp.combine("closed", loop)
+    assert_allclose(told.response[:, 0, 0], loop.response[:, 0, 0] / (1.0 + loop.response[:, 0, 0]), rtol=1e-12)
+    plane = [("MSG", (20_000_000, "ArduPlane V4.5.0")), *rows[:2000]]
+    assert "pid_roll" not in _flight(tmp_path, dataflash(plane, formats), name="plane.bin")
 
 
 def test_second_opinions_get_a_suffix_and_unused_channels_are_left_out(tmp_path: Path) -> None:

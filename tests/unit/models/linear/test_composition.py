@@ -129,6 +129,16 @@ def test_a_pair_among_the_parts_has_a_delay_of_its_own() -> None:
     assert set(structure("compose:yaw+r/pedal").delays) == {"r/pedal", "collective"}
 
 
+def test_a_derivative_and_an_input_among_the_parts_have_a_delay_of_that_entry() -> None:
+    model = structure("compose:cyclic+q_dot/lateral").with_values({"tau_lat": 0.02, "tau_q_dot_lat": 0.06, "Mlat": 3.0})
+    assert model.delays.keys() == {"lateral", "longitudinal", "q_dot/lateral"}
+    assert parse(to_toml(model)).delays.keys() == model.delays.keys()
+    # An input whose entries all have their own has no other delay.
+    assert set(structure("compose:yaw+r_dot/pedal").delays) == {"r_dot/pedal", "collective"}
+    with pytest.raises(CardError, match=r"'q_dot/pedal' is no pair .* entries are"):
+        structure("compose:cyclic+q_dot/pedal")
+
+
 def test_order_of_the_parts_does_not_matter() -> None:
     one, other = (structure(f"compose:{text}") for text in ("body+flap+inflow", "inflow + flap+body"))
     assert to_toml(one) == to_toml(other)
