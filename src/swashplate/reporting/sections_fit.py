@@ -32,6 +32,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     """Every estimated number, with where it comes from."""
     rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
+    blocks += [Text(fit.beside_truth)] if fit.beside_truth else []
     blocks.append(
         Table(
             "Parameters before and after the fit",
@@ -42,6 +43,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
                 "identified",
                 "σ plain",
                 "σ corrected",
+                *(["truth"] if fit.truth else []),
                 "change",
                 "change / σ",
                 "prior share",
@@ -102,6 +104,7 @@ def _row(fit: Result[Any, Any], e: Estimate) -> tuple[Cell, ...]:
         Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
         Cell(sigma_words(e.sigma), number=True),
         Cell(sigma_words(e.sigma_corrected), number=True),
+        *([Cell(value_words(fit.truth[e.name]) if e.name in fit.truth else "–", number=True)] if fit.truth else []),
         Cell(relative, number=True),
         Cell(sigmas, number=True),
         Cell(f"{100.0 * e.prior_share:.0f} %", number=True, tone="caution" if e.prior_share > PRIOR_HEAVY else "plain"),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import DataSource, sources_of
+from swashplate.identification.core.sources import DataSource
 from swashplate.reporting.figures_validation import middle_horizon
 from swashplate.reporting.sections_data import method_words, used_twice
 from swashplate.reporting.sections_fit import PRIOR_HEAVY
@@ -22,7 +22,7 @@ _TONES = {"good": "good", "usable": "caution", "poor": "bad"}
 def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
     """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
     found: list[tuple[str, str]] = []
-    flights = (*(fit.data if fit else ()), *(sources_of(validation.flights) if validation else ()))
+    flights = (*(fit.data if fit else ()), *(validation.data if validation else ()))
     simulated = [f for f in flights if f.simulated]
     if simulated:
         names = list(dict.fromkeys(f.name or "unnamed" for f in simulated))
@@ -69,7 +69,7 @@ def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
         words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.model.card.called}' identified from {source}")
     if validation:
         words.append(
-            f"tested on {_names(sources_of(validation.flights))}"
+            f"tested on {_names(validation.data)}"
             + (", which the fit never saw" if fit and not used_twice(fit, validation) else "")
         )
     return "What", ", ".join(words) + ".", "plain"

@@ -39,7 +39,7 @@ function facts(log) {
 
 function entry(log) {
   const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
-  const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, log.name), off);
+  const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, ...log.name.split(/(?<=[_.@-])/).flatMap((part) => [part, make("wbr")])), off);
   return { item: make("li", { "data-log": log.id }, name, told), clock: clock(log), line, told };
 }
 
