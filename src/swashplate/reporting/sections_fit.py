@@ -139,11 +139,11 @@ def comparison(fit: Result[Any, Any]) -> Section:
     intro = (
         "Each model sample was predicted one sample ahead from everything measured before it, so the lines should "
         "lie on top of each other and only the residuals below tell how good they are. How the model does seconds "
-        "ahead stands under Prediction. Velocities and rates are the filter's estimates beside the slopes of the "
-        "measured pose."
+        "ahead stands under Prediction. Velocities and rates are the filter's estimates, compared with the slopes of "
+        "the measured pose."
         if one_step
-        else "The model ran on the recorded inputs alone. Velocities and rates are its states beside the slopes of the "
-        "measured pose."
+        else "The model ran on the recorded inputs alone. Velocities and rates are its states, compared with the slopes of "
+        "the measured pose."
     )
     blocks: list[Block] = [
         Text(f"{intro} Where the cost did not count a sample (settling, outliers), no model is drawn.")

@@ -50,7 +50,7 @@ def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
         rows += [_prediction(validation), _verdict(validation)]
     elif fit:
         rows.append(
-            ("Prediction", "not tested: no flight was held out. Do not trust the model before it was.", "caution")
+            ("Prediction", "not tested: no flight was held out. Do not trust the model before it is tested.", "caution")
         )
         rows.append(_changes(fit))
     rows.append(_warnings(fit, validation))
@@ -124,7 +124,7 @@ def _changes(fit: Result[Any, Any]) -> Line:
         key=lambda e: -abs(e.value - e.start) / e.best_sigma,
     )[:3]
     words = [f"{e.name} {value_words(e.start)} → {value_words(e.value, e.best_sigma)}" for e in moved]
-    return "Change", f"Moved most for its uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
+    return "Change", f"Largest changes for their uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
 
 
 def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
