@@ -142,8 +142,8 @@ def comparison(fit: Result[Any, Any]) -> Section:
         "ahead stands under Prediction. Velocities and rates are the filter's estimates, compared with the slopes of "
         "the measured pose."
         if one_step
-        else "The model ran on the recorded inputs alone. Velocities and rates are its states, compared with the slopes "
-        "of the measured pose."
+        else "The model ran on the recorded inputs alone. Velocities and rates are its states, compared with the "
+        "slopes of the measured pose."
     )
     blocks: list[Block] = [
         Text(f"{intro} Where the cost did not count a sample (settling, outliers), no model is drawn.")

@@ -47,8 +47,8 @@ def prior(fit: Result[Any, Any]) -> Section | None:
                 ),
                 tuple(_row(e) for e in estimates),
                 note="Flight alone: without the prior's information, one parameter at a time. Apart: the "
-                "difference of flight alone and prior, over its standard deviation, coloured residuals allowed for. It is "
-                "a linear extrapolation: far from the prior only its direction counts.",
+                "difference of flight alone and prior, over its standard deviation, coloured residuals allowed for. "
+                "It is a linear extrapolation: far from the prior only its direction counts.",
             )
         )
     if held:
