@@ -239,7 +239,7 @@ def validation(*, name: str = "hover.mat", simulated: bool = False) -> Validatio
         examples=tuple(examples),
         records=(piece,),
         measured=(states,),
-        flights=(unseen,),
+        data=sources_of((unseen,)),
         settings={
             "every": 0.1,
             "horizons": list(HORIZONS),

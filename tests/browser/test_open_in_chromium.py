@@ -185,6 +185,10 @@ def test_two_logs_lie_over_each_other_and_are_aligned(browser: Any, address: str
     visit.page.click("[aria-label='close three.csv']")
     drawn(visit, logs=2)
     assert visit.of("document.querySelectorAll('.chart')[0].querySelectorAll('.key').length") == 4
+    visit.page.click("[aria-label='close one.csv']")
+    drawn(visit)
+    assert visit.of("swash.state.offset(swash.state.ready()[0])") == 0, "what stays first is on its own clock"
+    assert visit.text("#span").startswith("2.50 to")
     visit.close()
 
 

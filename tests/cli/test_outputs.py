@@ -18,7 +18,7 @@ import swashplate as sp
 from swashplate.api import identification
 from swashplate.cli.app import app
 from swashplate.cli.console import as_json
-from swashplate.cli.outputs import folder_when_complete, place_of
+from swashplate.cli.outputs import folder_when_complete, place_of, told
 from swashplate.errors import IdentificationError, SwashError
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
@@ -66,7 +66,7 @@ def _validation(fit: Result[Any, Any], flights: list[Flight]) -> Validation:
         examples=(),
         records=(),
         measured=(),
-        flights=tuple(flights),
+        data=sources_of(flights),
         settings={},
     )
 
@@ -313,6 +313,35 @@ def test_a_vehicle_is_an_argument_or_an_option_in_every_verb() -> None:
         swash("simulate", "rmaxx", "--maneuver", "doublet:roll,0.5s,0.2", "-o", "a.nc")
     )
     assert "Did you mean 'rotor_body'?" in one_message(swash("fit-ss", "rotor_bodi", "responses.nc"))
+    for words in (("validate", "rmaxx"), ("validate", "--vehicle", "rmaxx"), ("validate", "--model=rmaxx")):
+        assert "Did you mean 'rmax'?" in one_message(swash(*words, "--flight", "none.nc"))
+    assert "Did you mean 'rmax'?" in one_message(swash("maneuver", "design", "--vehicle", "rmaxx", "--unknown", "mass"))
+    assert "--model: is given more than once" in one_message(swash("validate", "--vehicle", "a", "--model", "b"))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("trim raptor50 --set mas=3", "Did you mean 'mass'?"),
+        ("trim raptor50 --option bars=true", "Did you mean 'bar'?"),
+        ("trim coax --option rottor=true", "Did you mean 'rotor'?"),
+        ("vehicles rmaxx", "Did you mean 'rmax'?"),
+        ("vehicles lst", "Did you mean 'list'?"),
+        ("structures hybird", "Did you mean 'hybrid'?"),
+        ("bench plann", "Did you mean 'plan'?"),
+        ("data fetch coax65", "Did you mean 'coax56'?"),
+    ],
+)
+def test_a_name_that_is_nearly_right_is_asked_after(line: str, words: str) -> None:
+    done = swash(*line.split())
+    assert done.code == 2
+    assert words in done.err
+
+
+def test_the_last_line_names_what_was_written(tmp_path: Path) -> None:
+    ours = ("responses.nc", "report.html")
+    assert told(tmp_path / "mine.nc", ours) == f"Written: {tmp_path / 'mine.nc'}"
+    assert told(tmp_path / "study", ours) == f"Report: {tmp_path / 'study' / 'report.html'}"
 
 
 def test_what_was_meant_comes_before_a_long_list(tmp_path: Path) -> None:

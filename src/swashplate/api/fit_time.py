@@ -75,4 +75,4 @@ def fit_time(
     unseen = uniform_records(hold_out, channels, rate=rate, cutoff=cutoff, names=names) or records
     verification = marked(verify(fit.solution, unseen, outputs=wanted), fit.settings["records"])
     material = ResponseMaterial(time_fit=fit, verification=verification)
-    return LinearStudy(material, fitted=records, structure=fit.solution)
+    return LinearStudy(material, structure=fit.solution)

@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 from swashplate import atomic
 from swashplate.api.report_folder import ReportFolder
-from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.frequency.handling_readings import Line
 from swashplate.identification.responses.response_warnings import damaged
@@ -31,7 +30,6 @@ class LinearStudy(ReportFolder):
 
     Attributes:
         material: responses, fits, trials, search, verification, rival and gains, as far as there are any.
-        fitted: flights that the fit was made from, where it was made from flights.
         margins: read off the responses and the model.
         structure: matrices of named expressions, which `model` is made of; None where there is no model.
         remarks: what the user must know beside the fit's own warnings.
@@ -40,7 +38,6 @@ class LinearStudy(ReportFolder):
     files: ClassVar[tuple[str, ...]] = ("report.html", "fit.json", "model.toml", "verification.json")
 
     material: ResponseMaterial
-    fitted: tuple[Flight, ...] = ()
     margins: tuple[Line, ...] = ()
     structure: StateSpaceModel | None = None
     remarks: tuple[str, ...] = ()
@@ -64,9 +61,9 @@ class LinearStudy(ReportFolder):
     @property
     def problems(self) -> tuple[str, ...]:
         """What could not be computed, and logs that are damaged; empty where all is well."""
-        flights = (*self.fitted, *(self.verification.flights if self.verification else ()))
         own = () if self.fit is None else self.fit.problems
-        return (*own, *dict.fromkeys(damaged(flights)))
+        logs = (*(self.fit.data if self.fit else ()), *(self.verification.data if self.verification else ()))
+        return (*own, *dict.fromkeys(damaged(logs)))
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""

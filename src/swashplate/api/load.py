@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from swashplate import documents
 from swashplate.errors import FlightError, SwashError
 from swashplate.flights import hdf5
 from swashplate.flights.flight import Flight
@@ -14,20 +15,31 @@ from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
 from swashplate.models.vehicle import Vehicle
+from swashplate.validation import saved
+from swashplate.validation.compare import ModelComparison
+from swashplate.validation.residuals import Residuals
+from swashplate.validation.validation import Validation
+from swashplate.validation.verification import Verification
+
+_HINT = "`swash identify`, `fit-ss`, `fit-tf`, `fit-time` and `validate` write such files to --out."
 
 
 def load(
     path: str | os.PathLike[str], *, equations: Vehicle | None = None
-) -> Result[Any, Any] | FrequencyResponse | Flight | Vehicle:
-    """What a file of ours holds: a fit (.json), frequency responses or a flight (.nc), or a model (.toml).
+) -> Result[Any, Any] | FrequencyResponse | Flight | Vehicle | Validation | Verification | ModelComparison | Residuals:
+    """What a file of ours holds.
+
+    A .json holds a fit, a validation, a verification, a comparison of models or residuals; a .nc holds frequency
+    responses or a flight; a .toml holds a model.
 
     Args:
         path: the file.
-        equations: of a fit: the vehicle whose equations it is of, for equations that are no part of the package and of
-            no entry point of the group `swashplate.models`.
+        equations: of a .json: the vehicle whose equations it is of, for equations that are no part of the package and
+            of no entry point of the group `swashplate.models`.
 
     Returns:
-        A fit whole: estimates, matrices, comparisons with the data, and the model.
+        The object whole, as it was saved: a fit with its matrices, comparisons with the data and its model; a
+        validation with its scores, verdicts and predictions.
 
     Raises:
         DocumentError, FlightError: for a file that is none of them, or is damaged, naming the entry.
@@ -41,7 +53,11 @@ def load(
         return vehicle(Path(path))
     if ending == ".nc":
         return Flight.load(path) if _holds_flight(Path(path)) else FrequencyResponse.load(path)
-    return result_file.load(path, equations=equations)
+    found = documents.read_document(os.fspath(path), form="json", hint=_HINT)
+    if found.get("kind") in saved.KINDS:
+        judged: Validation = saved.from_document(found, where=os.fspath(path), equations=equations)
+        return judged
+    return result_file.from_document(found, where=os.fspath(path), equations=equations)
 
 
 def _holds_flight(path: Path) -> bool:

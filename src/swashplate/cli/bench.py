@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from swashplate.cli import options
+from swashplate.cli.usual_verb import usual
 from swashplate.errors import SwashError
 
 _EVALUATE = "evaluate"
 
-
-class RecordsFirst(TyperGroup):
-    """A group that takes `swash bench RECORDS...` as `swash bench evaluate RECORDS...`."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        known = {*self.commands, "--help", "-h"}
-        return super().parse_args(ctx, [_EVALUATE, *args] if args and args[0] not in known else args)
-
-
 app = typer.Typer(
-    cls=RecordsFirst,
+    cls=usual(_EVALUATE),
     help="From a folder of bench records to a parameter card: `swash bench DIR --out card.toml --report report.html`.",
     rich_markup_mode=None,
     no_args_is_help=True,

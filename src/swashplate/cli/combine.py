@@ -37,7 +37,7 @@ def combine(
     import swashplate as sp
     from swashplate.atomic import write_json
     from swashplate.cli.console import as_json
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, told
     from swashplate.errors import SwashError
 
     if len(responses) > 2:
@@ -53,7 +53,7 @@ def combine(
     elif not quiet:
         typer.echo(repr(found))
         if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
+            typer.echo(f"\n{told(out, FILES)}")
 
 
 def _one(text: str) -> FrequencyResponse:

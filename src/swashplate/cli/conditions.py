@@ -58,12 +58,12 @@ def checked_page(path: Path | None) -> Path | None:
     return path
 
 
-Page = Annotated[
-    Path | None,
-    typer.Option(
-        "--plot", metavar="FILE.html", help="Also a page of plots over the range of speeds.", callback=checked_page
-    ),
+_PAGE = "Also a page of plots over the range of speeds."
+Page = Annotated[Path | None, typer.Option("--plot", metavar="FILE.html", help=_PAGE, callback=checked_page)]
+OutPage = Annotated[
+    Path | None, typer.Option("--out", "-o", "--plot", metavar="FILE.html", help=_PAGE, callback=checked_page)
 ]
+"""Of verbs that write nothing else."""
 
 
 @dataclass(frozen=True)

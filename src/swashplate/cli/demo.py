@@ -30,5 +30,7 @@ def demo(
     if any(source.simulated for source in made.fit.data) and not quiet:
         typer.echo("On simulated flights; `swash data fetch coax56` gets the real ones.\n")
     identify.show(made, out=out, json=False, quiet=quiet)
+    if made.fit.beside_truth and not quiet:
+        typer.echo(f"Truth:      {made.fit.beside_truth}")
     if made.fit.failed:
         raise typer.Exit(1)  # the input was ours

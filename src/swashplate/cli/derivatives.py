@@ -43,7 +43,7 @@ def derivatives(
             "--left-out", help="Show instead what changes when each one is left out, the least important first."
         ),
     ] = False,
-    plot: given.Page = None,
+    plot: given.OutPage = None,
     json: options.Json = False,
 ) -> None:
     """Stability and control derivatives: force per mass and moment per inertia, split by what contributes to them."""

@@ -134,7 +134,7 @@ def carried_out(
     """
     from swashplate.api.linear_study import LinearStudy
     from swashplate.cli.console import as_json, progress
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, told
     from swashplate.identification.core.stopping import stoppable
 
     with (
@@ -153,7 +153,7 @@ def carried_out(
     elif not quiet:
         typer.echo(repr(made))
         if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
+            typer.echo(f"\n{told(out, LinearStudy.files)}")
     end_with(made.problems, code=stop.code or Exit.INPUT)
 
 

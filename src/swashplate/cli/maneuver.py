@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from swashplate.cli import options
+from swashplate.cli.usual_verb import usual
 from swashplate.errors import SwashError
 
 _CHECK = "check"
 
-
-class SpecFirst(TyperGroup):
-    """A group that takes `swash maneuver SPEC` as `swash maneuver check SPEC`."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        known = {*self.commands, "--help", "-h"}
-        return super().parse_args(ctx, [_CHECK, *args] if args and args[0] not in known else args)
-
-
 app = typer.Typer(
-    cls=SpecFirst,
+    cls=usual(_CHECK),
     help='Design an excitation to fly: check one that you describe (`swash maneuver "sweep:pitch,0.5-8Hz,60s"`), or '
     "let one be designed for what is unknown of a model.",
     rich_markup_mode=None,

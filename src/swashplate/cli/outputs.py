@@ -38,6 +38,11 @@ def place_of(target: Path, name: str, ours: Collection[str]) -> Path:
     return target if is_file(target, ours) else target / name
 
 
+def told(target: Path, ours: Collection[str]) -> str:
+    """What was written, for the last line of a command: the one file, or the report in its folder."""
+    return f"Written: {target}" if is_file(target, ours) else f"Report: {target / 'report.html'}"
+
+
 @contextmanager
 def folder_when_complete(target: Path | None, *, ours: Collection[str]) -> Iterator[Path | None]:
     """`atomic.folder_when_complete` where a folder was asked for; None gives None: no files.

@@ -53,7 +53,7 @@ def respond(
     import swashplate as sp
     from swashplate.atomic import write_json
     from swashplate.cli.console import as_json, progress
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, told
     from swashplate.cli.reading import asked, read_all
     from swashplate.flights.overlap import check_disjoint
 
@@ -89,5 +89,5 @@ def respond(
     elif not quiet:
         typer.echo(repr(found))
         if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
+            typer.echo(f"\n{told(out, FILES)}")
     flying.end_with(found.problems)

@@ -8,10 +8,13 @@ from typing import Annotated
 import typer
 
 from swashplate.cli import options
+from swashplate.cli.usual_verb import usual
 from swashplate.errors import SwashError
 
 app = typer.Typer(
-    help="Structures of linear models: ready ones, and parts to compose others of.", rich_markup_mode=None
+    cls=usual("show"),
+    help="Structures of linear models: ready ones, and parts to compose others of.",
+    rich_markup_mode=None,
 )
 
 

@@ -41,8 +41,11 @@ def fit_table(fit: Result[Any, Any]) -> TextTable:
         remarks += [f"{100 * e.prior_share:.0f} % from the prior"] if e.prior_share > 0.1 else []
         known = math.isfinite(e.best_sigma) and not e.tie
         bound = f"{2 * e.best_sigma:.2g}" if known else "-"
-        rows.append((e.name, f"{e.start:.4g}", f"{e.value:.4g}", bound, e.unit, ", ".join(remarks)))
-    return table(("parameter", "published", "identified", "+- 2 sigma", "unit", "remark"), rows, words=(4, 5))
+        true = [f"{fit.truth[e.name]:.4g}" if e.name in fit.truth else "-"] if fit.truth else []
+        rows.append((e.name, f"{e.start:.4g}", f"{e.value:.4g}", bound, *true, e.unit, ", ".join(remarks)))
+    n = 5 if fit.truth else 4
+    head = ("parameter", "published", "identified", "+- 2 sigma", *(["truth"] if fit.truth else []), "unit", "remark")
+    return table(head, rows, words=(n, n + 1))
 
 
 def _cells(scores: dict[str, Score], figure: str, factor: float, style: str) -> list[str]:

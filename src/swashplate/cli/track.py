@@ -77,7 +77,7 @@ def track(
     import swashplate as sp
     from swashplate.api.track import Tracking
     from swashplate.cli.console import as_json, progress
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, place_of
     from swashplate.cli.reading import asked, read
 
     names = flying.names(unknown)
@@ -117,7 +117,8 @@ def track(
         typer.echo(repr(found))
         for note in code.notes if code is not None else ():
             typer.echo(f"\n{note}")
-        files = [*map(str, written), *([str(out / name) for name in Tracking.files] if out is not None else [])]
+        made = () if out is None else dict.fromkeys(str(place_of(out, name, Tracking.files)) for name in Tracking.files)
+        files = [*map(str, written), *made]
         if files:
             typer.echo(f"\nWritten: {', '.join(files)}")
     flying.end_with(found.problems)

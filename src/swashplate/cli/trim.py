@@ -24,7 +24,7 @@ def trim(
     autorotation: Annotated[
         bool, typer.Option("--autorotation", help="Find the sink rate that needs no engine power.")
     ] = False,
-    plot: given.Page = None,
+    plot: given.OutPage = None,
     json: options.Json = False,
 ) -> None:
     """Find the steady flight of a vehicle: attitude and controls, at one speed or over a range."""

@@ -50,7 +50,7 @@ def validate(
     """
     import swashplate as sp
     from swashplate.cli.console import as_json, console, progress
-    from swashplate.cli.outputs import folder_when_complete
+    from swashplate.cli.outputs import folder_when_complete, told
     from swashplate.cli.reading import asked, conditioned, read_all
     from swashplate.cli.tables import closed_table, floors_table, validation_table
     from swashplate.flights.overlap import check_disjoint
@@ -122,4 +122,4 @@ def validate(
             typer.echo(f"\n{words}")
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))
         if out is not None:
-            typer.echo(f"\nReport: {out / 'report.html'}")
+            typer.echo(f"\n{told(out, FILES)}")

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swashplate.cli import options
+from swashplate.cli.usual_verb import usual
 from swashplate.errors import SwashError
 
 if TYPE_CHECKING:
     from swashplate.simulation.trim import Trim
 
-app = typer.Typer(help="The vehicles that come with swashplate, and cards.", rich_markup_mode=None)
+app = typer.Typer(cls=usual("show"), help="The vehicles that come with swashplate, and cards.", rich_markup_mode=None)
 
 
 class Rotation(StrEnum):

@@ -9,7 +9,7 @@ holds for any vehicle, and with the heading unknown for roll and pitch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,8 +46,6 @@ _STEEPEST = 0.5 * np.pi + 0.02  # rad: no pitch angle is larger
 _MAX_GAP = 0.25  # s
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the weight along body z says little
 
-_DOWN = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True)
 class Inconsistency:
@@ -73,10 +71,11 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
     """Every contradiction between the flight's measured channels; none where nothing can be held against anything."""
     made = {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
     found: list[Inconsistency] = []
-    attitude = _attitude(flight, found)
-    if attitude is not None:
+    if (attitude := _attitude(flight, found)) is not None:
         for names in _families(flight, RATES, made):
-            found += _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
+            told = _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
+            # Pitch without roll: on its back, q and the change of theta have opposite signs.
+            found += [replace(one, decisive=one.decisive and attitude.axes != (1,)) for one in told]
     if all(name in flight for name in POSITION):
         place = [_thinned(*_series(flight, name)) for name in POSITION]
 
@@ -92,7 +91,7 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
             measured = tuple(name if name in flight and name not in made else "" for name in names)
             if any(measured):
                 found += _compared(flight, measured, place[0][0], reference, (0, 1, 2), _SPEED)
-    return (*found, *_weight(flight, made, attitude))
+    return (*found, *_weight(flight, made, attitude if attitude and len(attitude.axes) > 1 else None))
 
 
 def refuse_inconsistent(flight: Flight) -> None:
@@ -105,9 +104,9 @@ def refuse_inconsistent(flight: Flight) -> None:
         return
     decisive = [finding for finding in consistency(flight) if finding.decisive]
     if decisive:
+        told = [f"{'' if i == 0 else one.channel + ': '}{one.text}" for i, one in enumerate(decisive)]
         raise FlightError(
-            "; ".join(f"{'' if i == 0 else finding.channel + ': '}{finding.text}" for i, finding in enumerate(decisive))
-            + ".",
+            f"{'; '.join(told)}.",
             where=flight.provenance.source or None,
             channel=decisive[0].channel,
             hint=" ".join(dict.fromkeys(finding.mend for finding in decisive))
@@ -164,7 +163,7 @@ def _thinned(time: Array, table: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class _Attitude:
-    """Stamps, quaternions, and the axes about which they tell the turn (roll and pitch only without a heading)."""
+    """Stamps, quaternions, and the axes about which they tell the turn (without heading no yaw)."""
 
     time: Array
     quaternion: Array
@@ -182,12 +181,13 @@ def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
         good = np.isfinite(table).all(axis=1) & (np.linalg.norm(table, axis=1) > 0.5)
         if good.sum() < 2:
             return None
-        # Free of sign flips, so that a mean over a block is near the attitude of its middle.
-        return _Attitude(*_thinned(flight.time(QUATERNION[0])[good], continuous(table[good])), (0, 1, 2))
+        free = continuous(table[good])  # of sign flips: a mean over a block is near the attitude of its middle
+        return _Attitude(*_thinned(flight.time(QUATERNION[0])[good], free), (0, 1, 2))
     there = tuple(name for name in ATTITUDE if name in flight)
-    if not {"phi", "theta"} <= set(there) or len({flight.stream_of(name) for name in there}) > 1:
+    tilts = [i for i in (0, 1) if ATTITUDE[i] in there]
+    if not tilts or len({flight.stream_of(name) for name in there}) > 1:
         return None
-    table = np.zeros((flight.time("phi").size, 3))
+    table = np.zeros((flight.time(there[0]).size, 3))
     for name in there:
         table[:, ATTITUDE.index(name)] = flight.values(name)
     good = np.isfinite(table).all(axis=1)
@@ -207,8 +207,9 @@ def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
     for column in (0, 2):  # a mean over the wrap of roll or yaw would be no angle
         if np.ptp(table[:, column]) > np.pi:
             table[:, column] = np.unwrap(table[:, column])
-    stamps, table = _thinned(flight.time("phi")[good], table)
-    return _Attitude(stamps, quaternion_from_euler(table), tuple(range(len(there))))
+    stamps, table = _thinned(flight.time(there[0])[good], table)
+    axes = tuple(range(len(there))) if len(tilts) == 2 else tuple(tilts)
+    return _Attitude(stamps, quaternion_from_euler(table), axes)
 
 
 def _moving(place: Sequence[tuple[Array, Array]], grid: Array) -> Array:
@@ -386,15 +387,14 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
         down = np.ones(values.size)
         if attitude is not None:
             # Third row, third column of body to local: how much of body z points down.
-            down = to_body(interpolate(attitude.time, attitude.quaternion, stamps), _DOWN)[:, 2]
+            down = to_body(interpolate(attitude.time, attitude.quaternion, stamps), np.array([0.0, 0.0, 1.0]))[:, 2]
         upright = np.abs(down) > _UPRIGHT
         felt = float(np.median(values[upright] / -down[upright])) if upright.sum() >= _SHORTEST else gravity
         for unit, weight in (("m/s^2", gravity), ("g", 1.0)):
             if abs(abs(felt) - weight) < 0.3 * weight and (unit, felt > 0.0) != ("m/s^2", True):
                 words = ["looks like g, not m/s^2"] * (unit == "g") + ["has the other sign"] * (felt < 0.0)
                 text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
-                sign, looks_like = "-" if felt < 0.0 else "", "" if unit == "m/s^2" else unit
-                mend = _unit_to_give(flight, name, sign=sign, looks_like=looks_like)
+                mend = _unit_to_give(flight, name, sign="-" * (felt < 0.0), looks_like=unit.removeprefix("m/s^2"))
                 # Without an attitude it may have lain on its back.
                 found.append(Inconsistency(name, text, mend, decisive=attitude is not None))
     return found

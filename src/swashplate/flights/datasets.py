@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from swashplate.errors import DatasetError
+from swashplate.registry import nearest
 
 
 @dataclass(frozen=True)
@@ -230,8 +231,8 @@ def _entry(name: str, file: str, registry: Mapping[str, Dataset]) -> DataFile:
 
 def _dataset(name: str, registry: Mapping[str, Dataset]) -> Dataset:
     if name not in registry:
-        known = ", ".join(registry)
-        raise DatasetError(f"there is no data set '{name}'; known are {known}.", hint="See `swash data list`.")
+        hint = f"{nearest(name, registry)} See `swash data list`.".strip()
+        raise DatasetError(f"there is no data set '{name}'; known are {', '.join(registry)}.", hint=hint)
     return registry[name]
 
 

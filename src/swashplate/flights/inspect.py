@@ -336,16 +336,25 @@ def _channel_problems(summary: ChannelSummary) -> list[str]:
         problems.append(f"{summary.name}: {summary.missing} samples are not finite")
     if summary.impossible:
         problems.append(f"{summary.name}: {summary.impossible} samples beyond {_LARGEST:g}: nothing measures that")
-    if summary.constant and not summary.name.startswith(_ORDINARY):
-        problems.append(f"{summary.name}: never moves, so nothing can be learnt from it")
     if summary.outside:
         low, high = _COMMANDS[summary.name]
         samples = "sample" if summary.outside == 1 else "samples"
         problems.append(f"{summary.name}: {summary.outside} {samples} outside {low} to {high}, which no command is")
-    if summary.outliers:
-        name = "attitude" if summary.name in QUATERNION else summary.name
-        jumps = "jump" if summary.outliers == 1 else "jumps"
-        problems.append(f"{name}: {summary.outliers} {jumps} beyond {_OUTLIER:g} robust sigmas (outliers?)")
+    return problems
+
+
+def _shared_problems(channels: tuple[ChannelSummary, ...]) -> list[str]:
+    """What several channels may have in common, one line for all of them."""
+    still = [c.name for c in channels if c.constant and not c.name.startswith(_ORDINARY)]
+    jumps = {"attitude" if c.name in QUATERNION else c.name: c.outliers for c in channels if c.outliers}
+    beyond = f"beyond {_OUTLIER:g} robust sigmas (outliers?)"
+    problems = []
+    if still:
+        move, it = ("moves", "it") if len(still) == 1 else ("move", "them")
+        problems.append(f"{', '.join(still)}: never {move}, so nothing can be learnt from {it}")
+    if len(jumps) > 1:
+        problems.append(f"jumps {beyond}: {', '.join(f'{count} in {name}' for name, count in jumps.items())}")
+    problems += [f"{n}: {count} jump{'s' * (count > 1)} {beyond}" for n, count in jumps.items() if len(jumps) == 1]
     return problems
 
 
@@ -360,9 +369,10 @@ def inspect(flight: Flight) -> Inspection:
         _summarise_channel(flight, name, flight.stream_of(name), impossible.get(name, 0)) for name in flight.channels
     )
     damage = flight.provenance.damage
-    problems = [*damage, *(text for stream in streams for text in _stream_problems(stream))]
+    problems = [*damage, *(str(finding) for finding in consistency(flight))]
+    problems += [text for stream in streams for text in _stream_problems(stream)]
     problems += [text for summary in channels for text in _channel_problems(summary)]
-    problems += [str(finding) for finding in consistency(flight)]
+    problems += _shared_problems(channels)
     return Inspection(
         source=flight.provenance.source,
         simulated=flight.provenance.simulated,
@@ -374,7 +384,7 @@ def inspect(flight: Flight) -> Inspection:
             *([note(flight.epoch)] if flight.epoch else ()),
             *(text for stream in streams for text in _stream_notes(stream)),
         ),
-        problems=tuple(dict.fromkeys(problems)),  # the attitude's jumps stand at each of its four channels
+        problems=tuple(problems),
         sweeps=sweeps(flight),
         damage=damage,
         vehicle=flight.provenance.vehicle,

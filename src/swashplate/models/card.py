@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
@@ -14,6 +14,7 @@ import tomli_w
 
 from swashplate import documents
 from swashplate.errors import CardError
+from swashplate.registry import nearest
 
 CARD_SCHEMA = 1
 _HINT = "A card is a TOML file; `swash vehicles new` writes one, and logs are --flight."
@@ -107,7 +108,8 @@ class Card:
         """
         unknown = sorted(set(values) - set(self.parameters))
         if unknown:
-            raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.where)
+            asked = nearest(unknown[0], self.parameters)
+            raise CardError(f"has no parameter {', '.join(unknown)}.", where=self.where, hint=asked or None)
         changed = {}
         for name, value in values.items():
             old = self.parameters[name]
@@ -321,6 +323,13 @@ def _correlations(entry: Any, parameters: Mapping[str, Parameter], path: str) ->
                     channel="correlations",
                 )
     return {first: {second: float(value) for second, value in row.items()} for first, row in entry.items()}
+
+
+def no_option(name: str, known: Iterable[str], *, where: str) -> CardError:
+    """The error of a card that has an option which its vehicle does not have."""
+    names = tuple(known)
+    hint = f"{nearest(name, names)} Options are {', '.join(names)}.".strip()
+    return CardError("is not an option.", where=where, channel=name, hint=hint)
 
 
 def _span(low: float | None, high: float | None, unit: str) -> str:

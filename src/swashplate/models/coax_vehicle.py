@@ -10,7 +10,7 @@ from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError
-from swashplate.models.card import Card, Parameter
+from swashplate.models.card import Card, Parameter, no_option
 from swashplate.models.coax import (
     UNITS,
     CoaxialLoads,
@@ -310,9 +310,7 @@ def _checked_options(card: Card) -> dict[str, Any]:
     """
     for name, value in card.options.items():
         if name not in _CHOICES:
-            raise CardError(
-                "is not an option.", where=card.where, channel=name, hint=f"Options are {', '.join(_CHOICES)}."
-            )
+            raise no_option(name, _CHOICES, where=card.where)
         if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
             expected = ", ".join(map(repr, _CHOICES[name])).replace("True", "true").replace("False", "false")
             raise CardError(f"is {value!r}, expected one of {expected}.", where=card.where, channel=name)

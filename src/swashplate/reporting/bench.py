@@ -93,8 +93,8 @@ def _card(bench: Bench) -> Section:
             )
         )
     note = (
-        "σ: from the scatter of the measurements about the formula and from the bounds of what a procedure holds as "
-        "known, where the card gives one. It does not hold the calibration of the sensor, nor the position of the CG. "
+        "σ: from the scatter of the measurements about the formula, and from the bounds of the numbers that a "
+        "procedure takes as known. Errors of the sensor's calibration and of the CG's position are not included. "
         "Correlations are on the card."
     )
     columns = ("parameter", "unit", "published", "measured", "σ", "change / σ", "source")

@@ -122,7 +122,7 @@ def _quantiles(shapes: Sequence[Shape], shares: Sequence[float], rows: str) -> T
         f"Quantiles over all {rows}s, each with its interval.",
         ("figure", *names),
         tuple(cells),
-        note="Intervals are by order statistics and assume no distribution; an end that is infinite says that there "
+        note="Intervals are by order statistics and assume no distribution; an infinite end means that there "
         f"were too few {rows}s for it, or that some diverged.",
     )
 
@@ -180,8 +180,8 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
         "campaign-convergence",
         {"data": traces, "layout": layout},
         int(layout["height"]),
-        f"Quantiles of the first so many {rows}s: where a line still moves, more are needed. The bar at its end is the "
-        "95 % interval of all.",
+        f"Quantiles of the first {rows}s, by their number: while a line still moves, more are needed. The bar at its "
+        "end is the 95 % interval of all.",
         f"Running quantiles over the number of {rows}s.",
         keys=(Key("quantiles of the table", MODEL), Key("95 % interval", FLIGHT)),
     )
@@ -201,7 +201,7 @@ def _worst(worst: Sequence[WorstRow], rows: str, by: str, folder: str) -> Table:
         f"The {rows}s to look at first.",
         ("number", by, "seed of its task", "to see it again"),
         cells,
-        note="A seed is that of the whole task: a row is the same only among the rows that it was computed with.",
+        note="A seed belongs to a whole task: to get a row again, compute all rows of its task.",
     )
 
 

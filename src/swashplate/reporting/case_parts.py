@@ -54,7 +54,8 @@ def bode_overlay(pairs: Mapping[tuple[str, str], Mapping[str, Curve]], *, whose:
     shown = dict(list(pairs.items())[:MOST_PAIRS])
     names = list(dict.fromkeys(name for curves in shown.values() for name in curves))
     titles = [f"{o} / {i}, {what}" for o, i in shown for what in ("magnitude [dB]", "phase [deg]")]
-    layout = grid(titles, columns=2, height=150, x_title="frequency [Hz]") | {"meta": {"frequency": "Hz"}}
+    layout = grid(titles, columns=2, height=150, x_title="frequency [Hz]")
+    layout["meta"] |= {"frequency": "Hz"}
     traces: list[dict[str, Any]] = []
     for row, curves in enumerate(shown.values()):
         numbers = ["" if 2 * row + k == 0 else str(2 * row + k + 1) for k in (0, 1)]

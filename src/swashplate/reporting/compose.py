@@ -8,7 +8,6 @@ from typing import Any
 
 from swashplate.errors import SwashError
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import sources_of
 from swashplate.reporting import sections_data, sections_fit, sections_prior, sections_sight, sections_validation
 from swashplate.reporting.figures_validation import key_picture
 from swashplate.reporting.glossary import PARAMETERS
@@ -104,7 +103,7 @@ def _picture(fit: Result[Any, Any] | None, validation: Validation | None) -> Fig
 
 
 def _title(fit: Result[Any, Any] | None, validation: Validation | None) -> str:
-    source = fit.data if fit else sources_of(validation.flights) if validation else ()
+    source = fit.data if fit else validation.data if validation else ()
     names = list(dict.fromkeys(f.name for f in source if f.name))
     verb = "identified from" if fit else "predicting"
     vehicle = sections_data.vehicles(fit, validation)["identified"]

@@ -176,7 +176,7 @@ def _rejection(check: ControlCheck) -> Section | None:
     columns = ("state", "bandwidth [rad/s]", "", "peak [dB]", "", "at [rad/s]")
     note = (
         "Bandwidth: the lowest frequency at which a disturbance added to the measured state is reduced by 3 dB. "
-        "An attitude under a held place gives way to slow disturbances: its bandwidth counts from there on."
+        "Where the place is held, the attitude follows slow disturbances: its bandwidth begins above them."
     )
     table = Table("Disturbance rejection", columns, rows, note=note)
     return Section("rejection", "Disturbance rejection", (table, figures.rejection_figure(check)))
@@ -200,8 +200,8 @@ def _handling(check: ControlCheck) -> Section | None:
         "Level 1 from [rad/s]", "", "remark",
     )  # fmt: skip
     note = (
-        "ADS-33E-PRF: an attitude response counts its bandwidth by phase, a rate response the lower of both. The type "
-        "is taken from the phase at a tenth of the bandwidth where it was not given."
+        "ADS-33E-PRF: the bandwidth of an attitude response is the one by phase, that of a rate response the lower of "
+        "the two. If the type was not given, the phase at a tenth of the bandwidth decides it."
     )
     blocks: list[Block] = [Table("Bandwidth and phase delay", columns, tuple(rows), note=note)]
     if any(a.handling and np.isfinite(a.handling.bandwidth.value) for a in check.attitudes):

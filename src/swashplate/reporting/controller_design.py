@@ -35,7 +35,9 @@ def compose_design(
     told = ", ".join(map(str, plan.sensors)) or "the states themselves"
     return Report(
         title=title or f"{'LQG' if plan.sensors else 'LQR'} controller of {card.title}",
-        banners=(("caution", "Linear algebra about the trims, not a flight: `swash control check` flies it."),),
+        banners=(
+            ("caution", "Results of linear models at the trims, not of a flight: `swash control check` flies it."),
+        ),
         summary=(
             ("Told", f"{told}, {plan.rate:g} steps a second", "plain"),
             ("Commands are late by", late, "plain"),

@@ -204,7 +204,7 @@ def steps_figure(check: ControlCheck) -> Figure:
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
         caption="Steps flown on the nonlinear vehicle, half a second after the start. Roll and pitch are a pilot's "
-        "step of a tenth of the stick, which outer loops take back where they hold speed or place.",
+        "step of a tenth of the stick, which outer loops cancel where they hold speed or place.",
         alt="Time histories of the responses to steps.",
         keys=(Key("response", MODEL), Key("wanted", PUBLISHED, "dot")),
     )
@@ -226,7 +226,7 @@ def modes_figure(check: ControlCheck) -> Figure:
         identifier="modes-plane",
         spec={"data": traces, "layout": layout},
         height=300,
-        caption="Modes of the closed loop with the controller's sampling in it.",
+        caption="Modes of the closed loop including the controller's sampling.",
         alt=f"{len(check.modes)} modes in the complex plane, {len(bad)} of them growing.",
         keys=(Key("dies out", MODEL, "x"), *((Key("grows", VERMILION, "x"),) if bad else ())),
     )

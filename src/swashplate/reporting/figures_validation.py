@@ -103,7 +103,7 @@ def key_picture(validation: Validation) -> Figure:
 
 
 def _sources(validation: Validation) -> str:
-    return listed(dict.fromkeys(flight.provenance.source or "an unnamed flight" for flight in validation.flights))
+    return listed(dict.fromkeys(one.name or "an unnamed flight" for one in validation.data))
 
 
 def fit_over_horizon(validation: Validation) -> Figure:

@@ -85,7 +85,7 @@ def _ratio_figure(
         identifier="key-picture",
         spec={"data": traces, "layout": layout},
         height=int(layout["height"]),
-        caption="Off-axis over on-axis response; 100 % is as much across as along.",
+        caption="Off-axis over on-axis response; 100 %: as much motion on the other axis as on its own.",
         alt="Off-axis over on-axis response against frequency, bare, with the matrix and with the filter.",
         keys=_keys(list(ratios)),
     )

@@ -75,8 +75,32 @@
     });
   }
 
+  // Panels in rows of as many as a narrow screen has room for; theme.grid made them for a wide one.
+  var PANEL = 150;
+  function inRows(figure, place) {
+    var told = (figure.layout.meta || {}).grid, layout = figure.layout;
+    var columns = told && Math.max(1, Math.floor(place.parentElement.clientWidth / PANEL));
+    if (!told || columns >= told.columns) { return; }
+    var n = told.panels, rows = Math.ceil(n / columns), gap = Math.max(told.gap, 0.17);
+    var wide = (1 - gap * (columns - 1)) / columns, high = (1 - 0.4 / rows * (rows - 1)) / rows;
+    var words = { x: layout["xaxis" + (n > 1 ? n : "")].title, y: layout.yaxis.title };
+    layout.height = told.height * rows + 56;
+    for (var i = 0; i < n; i += 1) {
+      var end = i ? i + 1 : "", left = (i % columns) * (wide + gap), row = Math.floor(i / columns);
+      var top = 1 - row * (high + 0.4 / rows), x = layout["xaxis" + end], y = layout["yaxis" + end];
+      x.domain = [left, Math.min(1, left + wide)];
+      y.domain = [Math.max(0, top - high), top];
+      x.title = i + columns >= n ? words.x : "";
+      y.title = i % columns ? "" : words.y;
+      layout.annotations[i].x = left;
+      layout.annotations[i].y = top;
+    }
+    Object.assign(place.style, { height: layout.height + "px", minWidth: "0" });
+  }
+
   function draw(entry) {
     var figure = structuredClone({ data: entry.data, layout: entry.layout });
+    inRows(figure, document.getElementById(entry.name));
     if (touch) { figure.layout.dragmode = false; }
     inUnit(figure);
     if (dark) { figure = { data: recoloured(figure.data), layout: Object.assign(recoloured(figure.layout), { meta: figure.layout.meta }) }; }

@@ -71,7 +71,7 @@ def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
     found = []
     if m.verification and any("NOT A HOLD-OUT" in text for text in m.verification.warnings):
         found.append(("caution", "NOT A HOLD-OUT: the fit has seen the records that are shown."))
-    if m.verification and any(f.provenance.simulated for f in m.verification.flights):
+    if m.verification and any(one.simulated for one in m.verification.data):
         found.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))
     if m.fit and m.fit.problems:
         found.append(("bad", f"PROBLEM: {' '.join(m.fit.problems)}"))

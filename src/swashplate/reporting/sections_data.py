@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import DataSource, sources_of
+from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.structure import Block, Cell, Points, Section, Table, Text
 from swashplate.reporting.versions import card_hash, date, result_hash, versions
@@ -30,7 +30,7 @@ def asked(fit: Result[Any, Any] | None, validation: Validation | None) -> Sectio
     if validation:
         blocks.append(
             Text(
-                f"Predict {listed(_sources(sources_of(validation.flights)))} with the model "
+                f"Predict {listed(_sources(validation.data))} with the model "
                 f"{', '.join(f'{h:g}' for h in sorted({s.horizon for s in validation.scores}))} s ahead from "
                 "many start points, and compare with the published card (same observer, trims from the same seconds), "
                 "with holding the last value and with constant rates."
@@ -71,12 +71,12 @@ def used_twice(fit: Result[Any, Any] | None, validation: Validation | None) -> l
     """Flights of the validation that come from a log which the fit used: predicting them proves less."""
     if fit is None or validation is None:
         return []
-    return [one for one in sources_of(validation.flights) if any(one.same_log(other) for other in fit.data)]
+    return [one for one in validation.data if any(one.same_log(other) for other in fit.data)]
 
 
 def data(fit: Result[Any, Any] | None, validation: Validation | None) -> Section:
     """The flights: where they come from, what was done to them, what their readers found."""
-    fitted, tested = fit.data if fit else (), sources_of(validation.flights) if validation else ()
+    fitted, tested = fit.data if fit else (), validation.data if validation else ()
     twice = used_twice(fit, validation)
     roles = [("used for the fit", f) for f in fitted]
     for flight in tested:
@@ -131,7 +131,7 @@ def made_with(fit: Result[Any, Any] | None, validation: Validation | None) -> Se
     rows = tuple((Cell(name), Cell(number)) for name, number in versions().items())
     hashes: list[tuple[str, str]] = []
     seen: set[str] = set()
-    for flight in (*(fit.data if fit else ()), *(sources_of(validation.flights) if validation else ())):
+    for flight in (*(fit.data if fit else ()), *(validation.data if validation else ())):
         name = flight.name or "unnamed"
         if name not in seen:
             hashes.append((f"flight {name}", flight.sha256 or "none: simulated or made in memory"))

@@ -33,6 +33,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     """Every estimated number, with where it comes from."""
     rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
+    blocks += [Text(fit.beside_truth)] if fit.beside_truth else []
     asked_for = in_words(one_step_effects(fit))
     if asked_for:
         blocks.append(Text(f"Structure: the flights say that the model {asked_for}"))
@@ -46,6 +47,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
                 "identified",
                 "σ plain",
                 "σ corrected",
+                *(["truth"] if fit.truth else []),
                 "change",
                 "change / σ",
                 "prior share",
@@ -106,6 +108,7 @@ def _row(fit: Result[Any, Any], e: Estimate) -> tuple[Cell, ...]:
         Cell(value_words(e.value, e.sigma_corrected), number=True, strong=True),
         Cell(sigma_words(e.sigma), number=True),
         Cell(sigma_words(e.sigma_corrected), number=True),
+        *([Cell(value_words(fit.truth[e.name]) if e.name in fit.truth else "–", number=True)] if fit.truth else []),
         Cell(relative, number=True),
         Cell(sigmas, number=True),
         Cell(f"{100.0 * e.prior_share:.0f} %", number=True, tone="caution" if e.prior_share > PRIOR_HEAVY else "plain"),
@@ -140,11 +143,11 @@ def comparison(fit: Result[Any, Any]) -> Section:
     intro = (
         "Each model sample was predicted one sample ahead from everything measured before it, so the lines should "
         "lie on top of each other and only the residuals below tell how good they are. How the model does seconds "
-        "ahead stands under Prediction. Velocities and rates are the filter's estimates beside the slopes of the "
-        "measured pose."
+        "ahead stands under Prediction. Velocities and rates are the filter's estimates, compared with the slopes of "
+        "the measured pose."
         if one_step
-        else "The model ran on the recorded inputs alone. Velocities and rates are its states beside the slopes of the "
-        "measured pose."
+        else "The model ran on the recorded inputs alone. Velocities and rates are its states, compared with the "
+        "slopes of the measured pose."
     )
     blocks: list[Block] = [
         Text(f"{intro} Where the cost did not count a sample (settling, outliers), no model is drawn.")

@@ -21,8 +21,8 @@ def prior(fit: Result[Any, Any]) -> Section | None:
     apart = [e for e in estimates if math.isfinite(e.disagreement) and abs(e.disagreement) > APART]
     seen = [e for e in estimates if math.isfinite(e.disagreement)]
     verdict = (
-        f"Flight and prior disagree by more than {APART:g} σ in {listed(e.name for e in apart)}. One of the two "
-        "measures something else, or is surer of itself than it should be; the joined value is true to neither."
+        f"Flight and prior disagree by more than {APART:g} σ in {listed(e.name for e in apart)}. Either "
+        "they measure different things, or one standard deviation is too small; the joined value agrees with neither."
         if apart
         else f"Flight and prior agree within {APART:g} σ in what both can see: {listed(e.name for e in seen)}."
         if seen
@@ -46,9 +46,9 @@ def prior(fit: Result[Any, Any]) -> Section | None:
                     "prior from",
                 ),
                 tuple(_row(e) for e in estimates),
-                note="Flight alone: the prior's information subtracted again, one parameter at a time. Apart: flight "
-                "alone less prior over the standard deviation of that difference, coloured residuals allowed for. "
-                "It is extrapolated along a straight line: far from the prior read it as a direction.",
+                note="Flight alone: without the prior's information, one parameter at a time. Apart: the "
+                "difference of flight alone and prior, over its standard deviation, coloured residuals allowed for. "
+                "It is a linear extrapolation: far from the prior only its direction counts.",
             )
         )
     if held:

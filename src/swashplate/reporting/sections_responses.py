@@ -336,9 +336,9 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
                 "The rate loop on the identified model",
                 ("axis", "", "suggested", "flown"),
                 judged,
-                note="Margins are the least of each where the loop crosses several times; ± is what the Cramér-Rao "
-                "bounds of the model's parameters make of them. Filters of the controller (FLTT, FLTE, FLTD; cutoff) "
-                f"count. The step of the demand is a sudden one; {firmware}'s own shaping is not in it.",
+                note="If the loop crosses several times, the smallest margin counts. ± follows from the Cramér-Rao "
+                "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. The "
+                f"demand steps at once: {firmware}'s own shaping is not included.",
             ),
             *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
             *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),

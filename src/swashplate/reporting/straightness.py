@@ -145,7 +145,7 @@ def _sources(vehicle: Vehicle, sources: Sequence[tuple[str, float]]) -> Table:
         ("number", "unit", "share of the variance [%]"),
         rows,
         note="Linear regression over the drawn models. A step flown once with the law measures it: "
-        "`swash decouple ... --drift` takes what was seen out of the law.",
+        "`swash decouple ... --drift` corrects the law by what was measured.",
     )
 
 
@@ -169,8 +169,8 @@ def _numbers(
         Table("The path", columns, tuple(rows), note="Offsets to the right of the first heading."),
         Text(
             f"The law turns the commands back by a lag of {lag:.1f}° at hover and cancels what speed does to the lower "
-            "rotor's disc. The stabilizer bar and the delays are out of its equations: with the rotor's own lag they "
-            "bend the path; a lag that was chosen by flying the model takes them in."
+            "rotor's disc. The stabilizer bar and the delays are not in its equations. With the rotor's own lag "
+            "they bend the path; a lag that was chosen in flights of the model allows for them."
         ),
     ]
     if sources:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from swashplate.identification.core.result import Result
-from swashplate.identification.core.sources import DataSource, sources_of
+from swashplate.identification.core.sources import DataSource
 from swashplate.reporting.figures_validation import middle_horizon
 from swashplate.reporting.sections_data import method_words, used_twice
 from swashplate.reporting.sections_fit import PRIOR_HEAVY
@@ -22,7 +22,7 @@ _TONES = {"good": "good", "usable": "caution", "poor": "bad"}
 def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
     """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
     found: list[tuple[str, str]] = []
-    flights = (*(fit.data if fit else ()), *(sources_of(validation.flights) if validation else ()))
+    flights = (*(fit.data if fit else ()), *(validation.data if validation else ()))
     simulated = [f for f in flights if f.simulated]
     if simulated:
         names = list(dict.fromkeys(f.name or "unnamed" for f in simulated))
@@ -50,7 +50,7 @@ def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tupl
         rows += [_prediction(validation), _verdict(validation)]
     elif fit:
         rows.append(
-            ("Prediction", "not tested: no flight was held out. Do not trust the model before it was.", "caution")
+            ("Prediction", "not tested: no flight was held out. Do not trust the model before it is tested.", "caution")
         )
         rows.append(_changes(fit))
     rows.append(_warnings(fit, validation))
@@ -69,7 +69,7 @@ def _what(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:
         words.append(f"{counted(len(fit.names), 'parameter')} of '{fit.model.card.called}' identified from {source}")
     if validation:
         words.append(
-            f"tested on {_names(sources_of(validation.flights))}"
+            f"tested on {_names(validation.data)}"
             + (", which the fit never saw" if fit and not used_twice(fit, validation) else "")
         )
     return "What", ", ".join(words) + ".", "plain"
@@ -124,7 +124,7 @@ def _changes(fit: Result[Any, Any]) -> Line:
         key=lambda e: -abs(e.value - e.start) / e.best_sigma,
     )[:3]
     words = [f"{e.name} {value_words(e.start)} → {value_words(e.value, e.best_sigma)}" for e in moved]
-    return "Change", f"Moved most for its uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
+    return "Change", f"Largest changes for their uncertainty: {'; '.join(words) or 'nothing'}.", "plain"
 
 
 def _warnings(fit: Result[Any, Any] | None, validation: Validation | None) -> Line:

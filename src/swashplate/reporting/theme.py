@@ -193,7 +193,7 @@ def over_frequency(titles: Sequence[str], *, height: int = 170, unit: str = "rad
 def grid(
     titles: Sequence[str], *, columns: int, height: int, x_title: str, y_title: str = "", gap: float = 0.12
 ) -> dict[str, Any]:
-    """A layout of small panels in rows, each under its own heading.
+    """A layout of small panels in rows, each under its own heading; on a narrow screen the page puts fewer in a row.
 
     Args:
         titles: headings, with the unit of what the panel shows. columns: in a row. height: of a panel [px].
@@ -204,7 +204,10 @@ def grid(
     layout = base_layout(height * rows + 56, left=58 if y_title else 44, top=24)
     down = bands(rows, gap=0.4 / rows)
     width = (1.0 - gap * (columns - 1)) / columns
-    layout["annotations"] = []
+    layout |= {
+        "annotations": [],
+        "meta": {"grid": {"panels": len(titles), "columns": columns, "height": height, "gap": gap}},
+    }
     for i, title in enumerate(titles):
         number = "" if i == 0 else str(i + 1)
         row, column = divmod(i, columns)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swashplate import atomic
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.shown import Shown
@@ -43,11 +42,13 @@ class ModelComparison(Shown):
     def to_document(self) -> dict[str, Any]:
         """Fits and warnings as JSON types."""
         told = {name: list(v.warnings) for name, v in self.found.items() if v.warnings}
-        return {"what": "models along a flight", "fit": self.fits(), "warnings": told}
+        return {"kind": "comparison", "fit": self.fits(), "warnings": told}
 
     def save(self, path: str | Path) -> Path:
-        """Write the document as a JSON file."""
-        return atomic.write_json(path, self.to_document())
+        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
+        from swashplate.validation import saved
+
+        return saved.save(self, self.to_document(), path)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Fit [%], one row an output and one column a model."""

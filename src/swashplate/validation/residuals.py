@@ -6,8 +6,10 @@ is the noise's and tells nothing against it (Ljung 1999, System Identification, 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,6 +98,20 @@ class Residuals(Shown):
             for c in sorted(self.unexplained, key=lambda c: -abs(c.worst[1]) / c.limit)
         ]
         return f"INCOMPLETE: inputs still explain what the model leaves: {'; '.join(told)}."
+
+    def to_document(self) -> dict[str, Any]:
+        """The verdict and the largest correlation of each pair as JSON types."""
+        pairs = [
+            {"output": c.output, "input": c.input, "largest": c.worst[1], "lag_s": c.worst[0], "limit": c.limit}
+            for c in self.cross
+        ]
+        return {"kind": "residuals", "verdict": self.headline, "white": self.white, "pairs": pairs}
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
+        from swashplate.validation import saved
+
+        return saved.save(self, self.to_document(), path)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The residuals over time [s], one column an output, inside units."""

@@ -16,6 +16,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import Result
+from swashplate.identification.core.sources import sources_of
 from swashplate.identification.time.feedback import excitation
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
@@ -197,7 +198,7 @@ def validate(
         examples=tuple(examples),
         records=tuple(pieces),
         measured=tuple(measured),
-        flights=flights,
+        data=sources_of(flights),
         settings={
             "horizons": list(horizons),
             "every": every,

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from swashplate.arrays import Array
-from swashplate.atomic import write_json
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.flights.flight import Flight
 from swashplate.identification.core.records import Record
+from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 from swashplate.validation.contact import Contact
@@ -104,7 +103,7 @@ class Validation(Shown):
         thresholds: the numbers behind the words.
         examples: predictions to draw.
         records: what was predicted; `measured`: body states (n, 12) of each.
-        flights: the conditioned flights.
+        data: the flights, as a fit's `data`.
         settings: observer, horizons.
         calibrated: of each record, what its first seconds told the model: delays, trims, lever arm and heading.
         floors: what the model's scores stand beside, per channel and horizon.
@@ -124,7 +123,7 @@ class Validation(Shown):
     examples: tuple[Example, ...]
     records: tuple[Record, ...]
     measured: tuple[Array, ...]
-    flights: tuple[Flight, ...]
+    data: tuple[DataSource, ...]
     settings: Mapping[str, Any]
     calibrated: tuple[Nuisance, ...] = ()
     floors: tuple[Floor, ...] = ()
@@ -167,7 +166,7 @@ class Validation(Shown):
             "verdict": [vars(axis) for axis in self.verdict],
             "not_logged": list(self.not_logged),
             "thresholds": dict(self.thresholds),
-            "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
+            "flights": [vars(one) | {"history": [vars(step) for step in one.history]} for one in self.data],
             "settings": dict(self.settings),
             "calibrated": [
                 {"record": record.name} | {name: float(value) for name, value in told._asdict().items()}
@@ -176,8 +175,10 @@ class Validation(Shown):
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the document as a JSON file."""
-        return write_json(path, self.as_dict())
+        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
+        from swashplate.validation import saved
+
+        return saved.save(self, self.as_dict(), path)
 
     def __repr__(self) -> str:
         fits = {(s.channel, s.horizon, s.predictor): s.fit for s in self.scores}

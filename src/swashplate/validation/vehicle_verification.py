@@ -16,6 +16,7 @@ from swashplate.flights.schema import channel
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import records
 from swashplate.identification.core.scoring import minimise
+from swashplate.identification.core.sources import sources_of
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.identification.time.vehicle_likelihood import VehicleErrors, measurable
 from swashplate.models.surroundings import environment_of
@@ -86,7 +87,8 @@ def verify_vehicle(
     names = (*vehicle.input_names, *vehicle.state_names)
     own = dict(zip(names, (*vehicle.input_units, *vehicle.state_units), strict=True))
     units = {n: channel(n).unit for n in shared} | own
-    warnings = [*damaged(flights), *([] if optimum.converged else ["the search for the start states did not end."])]
+    data = sources_of(flights)
+    warnings = [*damaged(data), *([] if optimum.converged else ["the search for the start states did not end."])]
     if not all(np.all(np.isfinite(t.model)) for t in traces):
         raise FlightError("the equations diverge along the record.", where=pieces[0].name)
     return verified(
@@ -96,6 +98,6 @@ def verify_vehicle(
         inputs=vehicle.input_names,
         units=units,
         warnings=warnings,
-        flights=flights,
+        data=data,
         settings={"shifts": shifts},
     )

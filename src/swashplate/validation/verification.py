@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.atomic import write_json
-from swashplate.flights.flight import Flight
+from swashplate.identification.core.sources import DataSource
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
@@ -58,7 +57,7 @@ class Verification(Shown):
 
     Attributes:
         model: what was flown. cost: J_rms. outputs: per output. traces: to look at.
-        warnings: what a reader must know. flights: the conditioned records.
+        warnings: what a reader must know. data: the records, as a fit's `data`.
         inside: the same within the fitted band alone, where one was asked for.
         judgement: whether the records refute the model, and why. rivals: J_rms of the naive predictors.
         constants, samples: numbers solved for, and numbers compared.
@@ -71,7 +70,7 @@ class Verification(Shown):
     outputs: tuple[OutputVerification, ...]
     traces: tuple[Trace, ...]
     warnings: tuple[str, ...]
-    flights: tuple[Flight, ...]
+    data: tuple[DataSource, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
     inside: Verification | None = None
     judgement: Judgement | None = None
@@ -137,14 +136,16 @@ class Verification(Shown):
             "floors": [vars(floor) | {"words": floor.words} for floor in self.floors],
             "records": [{"source": t.source, "biases": dict(t.biases), "shifts": dict(t.shifts)} for t in self.traces],
             "warnings": list(self.warnings),
-            "flights": [vars(f.provenance) | {"history": [vars(s) for s in f.history]} for f in self.flights],
+            "flights": [vars(one) | {"history": [vars(step) for step in one.history]} for one in self.data],
             "band_hz": self.settings.get("band_hz"),
             "inside_band": None if self.inside is None else self.inside.as_dict() | {"flights": []},
         }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the document as a JSON file."""
-        return write_json(path, self.as_dict())
+        """Write it as a JSON file, whole: `swashplate.load` reads it back."""
+        from swashplate.validation import saved
+
+        return saved.save(self, self.as_dict(), path)
 
     def __repr__(self) -> str:
         band = self.settings.get("band_hz")

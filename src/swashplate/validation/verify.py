@@ -20,6 +20,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.conditioning.filters import filtered
 from swashplate.flights.flight import Flight, as_flights
 from swashplate.identification.core.records import uniform_table
+from swashplate.identification.core.sources import DataSource, sources_of
 from swashplate.identification.responses.response_warnings import damaged
 from swashplate.identification.time.linear_simulation import answers
 from swashplate.models.linear.linear_vehicle import structure_of
@@ -94,7 +95,8 @@ def verify(
             where=flights[0].provenance.source or None,
             hint="Map the flight's columns to these names.",
         )
-    warnings = damaged(flights) if band is None else []  # said once
+    data = sources_of(flights)
+    warnings = damaged(data) if band is None else []  # said once
     stretch = PERIODS / (low or (band[0] if band else LOW))
     m = len(model.inputs)
     traces: list[Trace] = []
@@ -134,7 +136,7 @@ def verify(
         inputs=model.inputs,
         units=model.units,
         warnings=warnings,
-        flights=flights,
+        data=data,
         settings={"shifts": shifts, "band_hz": list(band) if band else None},
         judgement=judge(model, pieces, shared, band=band) if judged else None,
         rivals={name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) for name, parts in costs.items()},
@@ -150,7 +152,7 @@ def verified(
     inputs: tuple[str, ...],
     units: Mapping[str, str],
     warnings: Sequence[str],
-    flights: tuple[Flight, ...],
+    data: tuple[DataSource, ...],
     settings: Mapping[str, Any],
     judgement: Judgement | None = None,
     rivals: Mapping[str, float] | None = None,
@@ -160,7 +162,7 @@ def verified(
 
     Args:
         model: what was flown. outputs: compared. traces: the records. inputs: of the model. units: of both.
-        warnings, flights, settings, judgement, rivals, constants: see `Verification`.
+        warnings, data, settings, judgement, rivals, constants: see `Verification`.
     """
     rows, told = _judged(units, outputs, traces), list(warnings)
     lost = [f"{o.output} ({o.theil:.2f})" for o in rows if o.theil > GOOD_TIC]
@@ -180,7 +182,7 @@ def verified(
         outputs=rows,
         traces=tuple(traces),
         warnings=tuple(told),
-        flights=flights,
+        data=data,
         settings={
             "outputs": list(outputs),
             **settings,

@@ -78,6 +78,18 @@ def test_a_wrong_rate_is_named_with_its_number(heading: bool, name: str, factor:
     assert mend.format(name) in finding.mend
 
 
+@pytest.mark.parametrize(("angle", "rate"), [("phi", "p"), ("theta", "q")])
+@pytest.mark.parametrize("factor", [1.0, -1.0, DEGREE])
+def test_one_angle_alone_tells_of_its_own_rate(angle: str, rate: str, factor: float) -> None:
+    """A rig that turns about one axis; on its back theta goes the other way than q, so that q is not refused."""
+    whole = flown()
+    alone = Flight.from_arrays(whole.time(angle), {angle: whole.values(angle)}, source="rig.csv")
+    imu = stream(whole.time("p"), {name: factor * whole.values(name) for name in RATES})
+    found = consistency(Flight({**alone.streams, "imu": imu}))
+    assert [one.channel for one in found] == ([] if factor == 1.0 else [rate])
+    assert all(one.decisive == (angle == "phi") for one in found)
+
+
 @pytest.mark.parametrize(("one", "other"), [("p", "q"), ("q", "r"), ("p", "r"), ("vx", "vy")])
 def test_exchanged_axes_are_named(one: str, other: str) -> None:
     flight = flown()

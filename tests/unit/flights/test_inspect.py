@@ -214,3 +214,15 @@ def test_a_sweep_of_a_damaged_file_is_named(details: dict[str, object]) -> None:
     flight = replace(flight, provenance=Provenance("a.bin", events=(replace(event, details=broken),)))
     with pytest.raises(FlightError, match=r"a\.bin: events: the sweep at 1 s has .* expected a number"):
         inspect(flight)
+
+
+def test_what_several_channels_share_is_one_line() -> None:
+    """A log of many channels is not a wall of equal lines."""
+    rng = np.random.default_rng(3)
+    noise = {name: rng.standard_normal(N) for name in ("ax", "ay")}
+    for values in noise.values():
+        values[200] += 200.0
+    still = {name: np.full(N, 0.5) for name in ("p", "q")}
+    found = inspect(_flight(**noise, **still)).problems
+    assert "p, q: never move, so nothing can be learnt from them" in found
+    assert "jumps beyond 12 robust sigmas (outliers?): 2 in ax, 2 in ay" in found

@@ -70,6 +70,26 @@ def test_a_pd_policy_flies_each_task_and_doing_nothing_does_not(name: str, least
     assert np.max(np.r_[rewards, idle]) <= 1.0
 
 
+def test_it_is_drawn_alone_and_as_many() -> None:
+    """Without a mode nothing is drawn; with one the picture shows what has moved."""
+    env = gymnasium.make("swashplate/Hover-v0", vehicle="coax", render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    env.step(np.array([0.5, -0.5, 0.3, 0.0], np.float32))
+    second = env.render()
+    assert first.shape == second.shape == (480, 640, 3)
+    assert np.any(first != second)
+    assert len(np.unique(first.reshape(-1, 3), axis=0)) > 20, "sky, ground, body, rotors"
+    assert HelicopterEnv("coax").render() is None
+    envs = HelicopterVectorEnv(2, "coax", render_mode="rgb_array")
+    envs.reset(seed=0)
+    one, other = envs.render()
+    np.testing.assert_array_equal(one, first)
+    assert np.any(one != other)
+    with pytest.raises(SwashError, match="render_mode: is 'human', expected 'rgb_array' or None"):
+        HelicopterEnv("coax", render_mode="human")
+
+
 def test_inner_states_are_told_in_info_and_observed_where_asked_for() -> None:
     env = gymnasium.make("swashplate.links.gym:swashplate/Hover-v0", vehicle="coax", inner=True).unwrapped
     check_env(env, skip_render_check=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from report_samples import fit, flight, modes, validation
+from swashplate.cli.tables import fit_table
 from swashplate.errors import SwashError
 from swashplate.flights.provenance import ProcessingStep
-from swashplate.identification.core.sources import source_of
+from swashplate.identification.core import result_file
+from swashplate.identification.core.sources import source_of, sources_of
 from swashplate.reporting.compose import compose, hover_modes
 from swashplate.reporting.downsample import joined, kept
 from swashplate.reporting.figures_fit import autocorrelation, cost_history
 from swashplate.reporting.figures_time import Series, time_figures
+from swashplate.reporting.sections_fit import parameters
 from swashplate.reporting.sections_validation import apart
 from swashplate.reporting.structure import Cell, Report, Section, Table
 from swashplate.reporting.theme import packed, phase_ticks
@@ -144,11 +148,11 @@ def test_simulated_and_failed_come_first() -> None:
 
 def test_a_flight_that_the_fit_used_is_no_hold_out() -> None:
     one = fit()
-    again = replace(validation(), flights=(flight(),))
+    again = replace(validation(), data=sources_of((flight(),)))
     report = compose(one, again, modes=modes())
     assert report.banners == (("caution", "NOT A HOLD-OUT: sweep.mat was used for the fit too."),)
     assert "never saw" not in report.summary[0][1]
-    part = replace(again, flights=(flight().between(0.0, 5.0),))
+    part = replace(again, data=sources_of((flight().between(0.0, 5.0),)))
     assert compose(one, part, modes=modes()).banners == report.banners
     assert "never saw" in compose(one, validation(), modes=modes()).summary[0][1]
 
@@ -306,3 +310,16 @@ def test_phase_axes_have_marks_at_multiples_of_45_degrees() -> None:
         360,
     ]
     assert phase_ticks([np.nan])["dtick"] == 45
+
+
+def test_the_truth_of_a_simulated_aircraft_stands_beside_both(tmp_path: Path) -> None:
+    """Published, identified and true in one row, on the screen, in the report and after a file; else no such column."""
+    plain = fit()
+    known = replace(plain, truth={"linkage_lower": 0.111, "tau_f_upper": 1.5})
+    assert known.beside_truth == "1 of 2 parameters lie within two sigmas of the simulated aircraft's."
+    for made, there in ((known, True), (plain, False), (result_file.load(known.save(tmp_path / "fit.json")), True)):
+        table = next(block for block in parameters(made).blocks if isinstance(block, Table))
+        assert ("truth" in table.columns) is there
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+        assert ("0.111" in fit_table(made).text(100)) is there
+    assert "truth" not in result_file.to_document(plain)

@@ -159,6 +159,7 @@ class Result(Shown, Generic[Model, Details]):
         settings: what was asked.
         details: what only this method has.
         posterior: draws of what the fit does not know (`swashplate.posterior`); None: normal ones, when asked for.
+        truth: numbers of the aircraft that was simulated, where they are known; empty where one flew.
         seconds: wall time; it is no part of the document.
         fitted: the likelihood and its optimum, for a posterior; None where the method has none, or for a file's result.
     """
@@ -185,8 +186,17 @@ class Result(Shown, Generic[Model, Details]):
     data: tuple[DataSource, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     posterior: Posterior | None = None
+    truth: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
     fitted: Fitted | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def beside_truth(self) -> str:
+        """How many free parameters lie within two corrected sigmas of the truth, in words; "" where none is known."""
+        known = [e for e in map(self.__getitem__, self.names) if e.name in self.truth and e.best_sigma > 0.0]
+        near = [e for e in known if abs(e.value - self.truth[e.name]) <= 2.0 * e.best_sigma]
+        told = f"{len(near)} of {len(known)} parameters lie within two sigmas of the simulated aircraft's."
+        return told if known else ""
 
     @cached_property
     def _by_name(self) -> dict[str, Estimate]:

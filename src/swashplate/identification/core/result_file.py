@@ -29,7 +29,7 @@ from swashplate.models.vehicle import Vehicle
 KIND, SCHEMA = "result", 1
 _HINT = "`swash identify --out DIR` (or fit-ss, fit-tf, fit-time) writes DIR/fit.json."
 _SPECIAL = ("solution", "model", "start", "details", "seconds", "fitted")
-_RARE = {"comparisons", "posterior"}
+_RARE = {"comparisons", "posterior", "truth"}
 """Entries that a document may lack."""
 _TOLD = {"kind", "schema", "costs"}
 """Entries that are no field: what it is, and J of each response for readers who leave the comparisons out."""
@@ -44,12 +44,13 @@ def to_document(result: Result[Any, Any], *, comparisons: bool = True) -> dict[s
     """
     left_out = {*_SPECIAL, *(() if comparisons else ("comparisons",))}
     left_out |= {"posterior"} if result.posterior is None else set()
+    left_out |= set() if result.truth else {"truth"}
     return {
         "kind": KIND,
         "schema": SCHEMA,
         **{f.name: encode(getattr(result, f.name)) for f in fields(result) if f.name not in left_out},
-        "model": _of_model(result.solution),
-        "start": _of_model(result.start),
+        "model": model_document(result.solution),
+        "start": model_document(result.start),
         "details": encode(result.details),
         "costs": {c.name: encode(cost) for c, cost in zip(result.comparisons, result.costs, strict=False)},
     }
@@ -89,8 +90,8 @@ def from_document(
     details = document["details"]
     made: Result[Any, Any] = Result(
         **table,
-        solution=_model_of(document["model"], where=where, at="model", equations=equations),
-        start=_model_of(document["start"], where=where, at="start", equations=equations),
+        solution=model_from(document["model"], where=where, at="model", equations=equations),
+        start=model_from(document["start"], where=where, at="start", equations=equations),
         details=None if details is None else part(details, where=where, at="details"),
     )
     _check(made, where)
@@ -123,7 +124,8 @@ def load(path: str | os.PathLike[str], *, equations: Vehicle | None = None) -> R
 
 
 # ---- models ----------------------------------------------------------------------------------------------------------
-def _of_model(model: Any) -> Any:
+def model_document(model: Any) -> Any:
+    """A vehicle, a state-space model or transfer functions as JSON types."""
     if isinstance(model, Vehicle):
         return {**encode(model.card.to_document()), "path": model.card.path}
     if isinstance(model, StateSpaceModel):
@@ -131,7 +133,13 @@ def _of_model(model: Any) -> Any:
     return {"kind": "transfer-functions", "functions": [encode(one) for one in model]}
 
 
-def _model_of(found: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+def model_from(found: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+    """The model of a document.
+
+    Raises:
+        DocumentError: for another kind of document, naming the entry.
+        CardError: for a model that cannot be made again.
+    """
     kind = found.get("kind") if isinstance(found, dict) else None
     if kind == "vehicle":
         path = found.get("path", "")

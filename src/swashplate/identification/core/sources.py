@@ -27,6 +27,7 @@ class DataSource:
         history: what was done to it, in order.
         segments: unbroken pieces, from and to [s].
         rate: of its first channel [Hz].
+        damage: what is broken in the file itself.
     """
 
     name: str
@@ -39,6 +40,7 @@ class DataSource:
     history: tuple[ProcessingStep, ...] = ()
     segments: tuple[tuple[float, float], ...] = ()
     rate: float = float("nan")
+    damage: tuple[str, ...] = ()
 
     def same_log(self, other: DataSource) -> bool:
         """True for two parts of one log: equal hashes of the file, or equal signals where there is no file."""
@@ -61,6 +63,7 @@ def source_of(flight: Flight) -> DataSource:
         history=tuple(flight.history),
         segments=tuple((float(a), float(b)) for a, b in flight.segments or ((flight.start, flight.stop),)),
         rate=float(flight.rate(flight.channels[0])),
+        damage=tuple(said.damage),
     )
 
 

@@ -22,7 +22,7 @@ from swashplate.identification.core.record_facts import (
     slowest_of,
     unit_of,
 )
-from swashplate.identification.core.sources import hashes
+from swashplate.identification.core.sources import hashes, sources_of
 from swashplate.identification.responses import response_warnings
 from swashplate.identification.responses.answers import answer_words
 from swashplate.identification.responses.composite import composite
@@ -160,7 +160,7 @@ def respond(
             f"the band ends at half the rate, {highest:.4g} Hz, not at {band[1]:.4g} Hz; read the logs faster."
         )
     made = replace(made, sources=tuple(piece.name for piece in pieces))
-    warnings, problems = [*slow_words, *chosen.warnings, *notes], response_warnings.damaged(flights)
+    warnings, problems = [*slow_words, *chosen.warnings, *notes], response_warnings.damaged(sources_of(flights))
     problems += response_warnings.dead(flights, inputs, outputs)
     problems += [
         f"reference '{name}' never moves: nothing was injected, so the joint estimate has no number."

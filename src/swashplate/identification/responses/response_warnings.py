@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
+from swashplate.identification.core.sources import DataSource
 from swashplate.identification.responses.frequency_response import LEAST_COHERENCE, TWO_PI, FrequencyResponse
 from swashplate.identification.responses.multi_input import SINGULAR, condition_spectra
 from swashplate.identification.responses.spectra import Signals, SpectralMatrix, spectral_matrix
@@ -53,13 +54,9 @@ def dead(flights: Sequence[Flight], inputs: Sequence[str], outputs: Sequence[str
     ]
 
 
-def damaged(flights: Sequence[Flight]) -> list[str]:
-    """What is broken in the logs themselves (cut off, bytes lost, clock set back): responses are of what is left."""
-    return [
-        f"{flight.provenance.source or 'flight'}: {'; '.join(flight.provenance.damage)}; what was read is used."
-        for flight in flights
-        if flight.provenance.damage
-    ]
+def damaged(logs: Sequence[DataSource]) -> list[str]:
+    """What is broken in the logs themselves (cut off, bytes lost, clock set back): results are of what is left."""
+    return [f"{log.name or 'flight'}: {'; '.join(log.damage)}; what was read is used." for log in logs if log.damage]
 
 
 def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
 from swashplate.links.gym.flying import Flying, flying
 from swashplate.links.gym.tasks import Task, task_of
 from swashplate.models.vehicle import Vehicle
@@ -34,10 +35,11 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         vehicle: a vehicle, its name or a file.
         task: "hover", "trajectory", "sweep" or a `Task`.
         task_options: for the task by name, e.g. {"duration": 5.0}.
+        render_mode: "rgb_array" for pictures by `render` (needs matplotlib), or None.
         options: see `flying`: rate, substeps, authority, spread, randomize, wind, inner, ground.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (Gymnasium's own declaration)
+    metadata: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 50}  # noqa: RUF012  (Gymnasium's own)
 
     def __init__(
         self,
@@ -48,13 +50,22 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        self.render_mode = render_mode
+        self.render_mode = checked_mode(render_mode)
         self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
         seen, moved = spaces(self.flying)
         self.observation_space, self.action_space = cast(Any, seen), cast(Any, moved)
         self._k = np.zeros(1, dtype=np.int64)
         self._x = np.array(self.flying.trim.state)[None]
         self._p = self.flying.parameters[None]
+        self._action = np.zeros(len(self.flying.free))
+        self._picture: EnvironmentPicture | None = None
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (480, 640, 3) with `render_mode="rgb_array"`; None without a mode."""
+        if self.render_mode is None:
+            return None
+        self._picture = self._picture or EnvironmentPicture(self.flying)
+        return self._picture.draw(self._x[0], int(self._k[0]), self._action)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -76,11 +87,13 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         x, p = self.flying.start(self.np_random)
         self._x, self._p, self._k = x[None], p[None], np.zeros(1, dtype=np.int64)
+        self._action = np.zeros(len(self.flying.free))
         return self.flying.observe(self._x, self._k)[0], self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One action later."""
-        states, observations, rewards, lost = self.flying.advance(self._x, self._k, np.asarray(action)[None], self._p)
+        self._action = np.asarray(action)
+        states, observations, rewards, lost = self.flying.advance(self._x, self._k, self._action[None], self._p)
         self._x, self._k = states, self._k + 1
         ended = bool(self._k[0] >= self.flying.steps) and not bool(lost[0])
         return observations[0], float(rewards[0]), bool(lost[0]), ended, self._info()

@@ -10,6 +10,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from swashplate.errors import SwashError
+from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
 from swashplate.links.gym.environment import spaces
 from swashplate.links.gym.flying import flying
 from swashplate.links.gym.tasks import Task, task_of
@@ -25,7 +26,11 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
     Gymnasium's own vector environments do. Arguments as `HelicopterEnv`.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own declaration)
+        "render_modes": list(MODES),
+        "render_fps": 50,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -39,7 +44,7 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
     ) -> None:
         if num_envs < 1:
             raise SwashError(f"is {num_envs}, expected at least 1.", channel="num_envs")
-        self.num_envs, self.render_mode = num_envs, render_mode
+        self.num_envs, self.render_mode = num_envs, checked_mode(render_mode)
         self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
         self.single_observation_space, self.single_action_space = spaces(self.flying)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -49,6 +54,16 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
         self._p = np.tile(self.flying.parameters, (num_envs, 1))
         self._k = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._actions = np.zeros((num_envs, len(self.flying.free)))
+        self._picture: EnvironmentPicture | None = None
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """One picture (480, 640, 3) an environment with `render_mode="rgb_array"`; None without a mode."""
+        if self.render_mode is None:
+            return None
+        drawn = self._picture = self._picture or EnvironmentPicture(self.flying)
+        rows = zip(self._x, self._k.tolist(), self._actions, strict=True)
+        return tuple(drawn.draw(x, k, action) for x, k, action in rows)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -72,13 +87,14 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
         """New episodes for some of them."""
         for i in np.flatnonzero(which):
             self._x[i], self._p[i] = self.flying.start(self._randoms[i])
-        self._k[which], self._ended[which] = 0, False
+        self._k[which], self._ended[which], self._actions[which] = 0, False, 0.0
 
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[Observations, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """One action later; for those that had ended, the start of a new episode with a reward of 0."""
         fresh = self._ended.copy()
+        self._actions = np.array(actions)
         states, observations, rewards, lost = self.flying.advance(self._x, self._k, actions, self._p)
         self._x, self._k = states.copy(), self._k + 1
         if fresh.any():

@@ -20,9 +20,9 @@ from swashplate.atomic import make_folder, replaced_when_complete, write_bytes
 from swashplate.errors import SwashError
 from swashplate.extras import library
 from swashplate.flights.schema import channel
+from swashplate.links.live.drawn_scene import DrawnScene
 from swashplate.links.live.picture import inputs_of, picture, pose_of
 from swashplate.links.live.replay import Replay, floor, gaps
-from swashplate.links.live.wireframe import Camera, ground, helicopter
 from swashplate.models.surroundings import environment_of
 
 Tell = Callable[[int, int], None]
@@ -30,17 +30,6 @@ Tell = Callable[[int, int], None]
 SIZE = (1280, 720)
 """Pixels."""
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
-_LOOKS: dict[str, tuple[str, float]] = {
-    "grid": ("#9db09a", 0.6),
-    "body": ("#333a40", 1.8),
-    "disc": ("#009E73", 1.2),
-    "blade": ("#333a40", 1.4),
-    "bar": ("#E69F00", 2.5),
-    "thrust": ("#D55E00", 2.0),
-    "tail": ("#CC79A7", 1.2),
-    "ghost": ("#56B4E9", 1.3),
-    "trail": ("#D55E00", 1.0),
-}
 
 
 @dataclass(frozen=True)
@@ -155,15 +144,14 @@ class _Page:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        self._shown, self._picture = shown, picture(shown.vehicle)
+        self._shown = shown
         self._pose, self._around = pose_of(shown.vehicle), environment_of(shown.vehicle)
         dpi = 100
         figure = Figure(figsize=(SIZE[0] / dpi, SIZE[1] / dpi), dpi=dpi, facecolor="white")
         canvas: Any = FigureCanvasAgg(figure)
         self._canvas: Any = canvas
-        self._scene: Any = figure.add_axes((0.0, 0.0, 0.64, 1.0), facecolor="#dbe8f2")
-        aspect = 0.64 * SIZE[0] / SIZE[1]
-        self._scene.set(xlim=(-aspect, aspect), ylim=(-1.0, 1.0), xticks=[], yticks=[])
+        self._drawn = DrawnScene(figure, (0.0, 0.0, 0.64, 1.0), picture(shown.vehicle), floor=floor(shown))
+        self._scene: Any = self._drawn.axes
         self._clock = self._scene.text(0.02, 0.965, "", transform=self._scene.transAxes, va="top", animated=True)
         words = ("SIMULATED  " if shown.simulated else "") + shown.title
         self._scene.text(0.02, 0.025, words, transform=self._scene.transAxes, color="#444")
@@ -182,8 +170,7 @@ class _Page:
         self._markers = self._charts(figure)
         canvas.draw()
         self._still: Any = canvas.copy_from_bbox(figure.bbox)
-        cell = 1.0 if self._picture["size"] < 0.4 else 5.0 if self._picture["size"] < 2.0 else 50.0
-        self._cell, self._floor, self._heading = cell, floor(shown), float(shown.states[0, 8])
+        self._heading = float(shown.states[0, 8])
 
     def _charts(self, figure: Any) -> list[Any]:
         shown = self._shown
@@ -235,37 +222,20 @@ class _Page:
         x, time = shown.states[k], float(shown.time[k] - shown.time[0])
         gap = x[8] - self._heading
         self._heading += 0.1 * float(np.arctan2(np.sin(gap), np.cos(gap)))
-        size = self._picture["size"]
-        camera = Camera(x[:3], heading=self._heading, distance=9.0 * size)
         canvas = self._canvas
         canvas.restore_region(self._still)
-        for kind, points in ground(x[:3], self._cell, floor=self._floor):
-            self._line(kind, camera.project(points))
-        self._line("trail", camera.project(shown.states[max(0, k - 400) : k + 1, :3]))
-        plumb = np.array([[x[0], x[1], x[2]], [x[0], x[1], self._floor]])
-        self._line("grid", camera.project(plumb))
+        self._drawn.look(x, heading=self._heading)
+        self._drawn.track(shown.states[max(0, k - 400) : k + 1, :3])
         parts = self._pose(x, shown.inputs[k], self._around)
         if shown.predicted is not None and np.all(np.isfinite(shown.predicted[k])):
-            for _, points in helicopter(self._picture, shown.predicted[k], parts, time=time):
-                self._line("ghost", camera.project(points))
-        for kind, points in helicopter(self._picture, x, parts, time=time):
-            self._line(kind, camera.project(points))
+            self._drawn.helicopter(shown.predicted[k], parts, time=time, ghost=True)
+        self._drawn.helicopter(x, parts, time=time)
         self._clock.set_text(f"{time:6.2f} s    height {-x[2]:.2f} m    speed {np.linalg.norm(x[3:6]):.2f} m/s")
         self._scene.draw_artist(self._clock)
         for marker in self._markers:
             marker.set_xdata([time, time])
             marker.axes.draw_artist(marker)
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-    def _line(self, kind: str, points: Array) -> None:
-        from matplotlib.lines import Line2D
-
-        color, width = _LOOKS[kind]
-        line = Line2D(points[:, 0], points[:, 1], color=color, lw=width)
-        line.set_transform(self._scene.transData)
-        line.set_clip_path(self._scene.patch)
-        line.set_figure(self._scene.figure)
-        self._scene.draw_artist(line)
 
 
 def _range(curves: list[Array]) -> tuple[float, float]:

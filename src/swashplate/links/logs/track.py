@@ -14,12 +14,15 @@ from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION
 from swashplate.links.live.picture import picture
 from swashplate.links.logs import code_lines
 from swashplate.links.logs.opened import Opened
+from swashplate.models.card import packaged_cards
 from swashplate.models.catalogue import vehicle
 
 MOST = 4000
 """Moments of a page."""
 _RATE = 50.0
-_COAXIAL = ("motor_lower", "omega_lower")
+_SHAPES = {"coax": ("motor_lower", "omega_lower"), "x8": ("motor_8",), "crazyflie": ("motor_4",)}
+"""Packaged vehicles by channels of which a log of their kind has one."""
+_USUAL_SHAPE = "raptor50"
 
 
 def track(opened: Opened) -> dict[str, Any]:
@@ -59,8 +62,11 @@ def track(opened: Opened) -> dict[str, Any]:
         notes.append("The log has no place: the attitude is drawn at one point.")
     if angled is None:
         notes.append("The log has no attitude: the track is drawn level, with the nose to the north.")
+    whole = not notes
     drawn = [name for name in (*POSITION, *ATTITUDE, *QUATERNION) if name in flight]
-    kind = "coax" if any(name in flight for name in _COAXIAL) else "raptor50"
+    kind = drawn_as(flight)
+    if kind != flight.provenance.vehicle:
+        notes.append(f"The log names no vehicle of swashplate: the shape of {kind} is drawn.")
     shape = picture(vehicle(kind))
     return {
         "time": time,
@@ -72,8 +78,15 @@ def track(opened: Opened) -> dict[str, Any]:
         "rotors": len(shape["rotors"]),
         "tail": shape["tail"] is not None,
         "notes": notes,
-        "code": code_lines.tracked(opened.read, drawn, whole=not notes).as_dict(),
+        "code": code_lines.tracked(opened.read, drawn, whole=whole).as_dict(),
     }
+
+
+def drawn_as(flight: Flight) -> str:
+    """The packaged vehicle whose shape is drawn: the log's own, else one with such motors, else a helicopter."""
+    if flight.provenance.vehicle in packaged_cards():
+        return flight.provenance.vehicle
+    return next((name for name, channels in _SHAPES.items() if any(c in flight for c in channels)), _USUAL_SHAPE)
 
 
 def _finite(flight: Flight, name: str) -> tuple[Array, Array]:

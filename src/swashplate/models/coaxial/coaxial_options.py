@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from swashplate.errors import CardError
-from swashplate.models.card import Card
+from swashplate.models.card import Card, no_option
 from swashplate.models.conventional.helicopter_options import HelicopterOptions, helicopter_options
 from swashplate.physics.coaxial_wake import FORMS
 
@@ -63,8 +63,7 @@ def coaxial_options(card: Card) -> CoaxialOptions:
     """
     for name, value in card.options.items():
         if name not in _USUAL and name not in _OWN:
-            known = ", ".join((*_USUAL, *_OWN))
-            raise CardError("is not an option.", where=card.where, channel=name, hint=f"Options are {known}.")
+            raise no_option(name, (*_USUAL, *_OWN), where=card.where)
         if name in _OWN and not any(
             value is choice or (isinstance(value, str) and value == choice) for choice in _OWN[name]
         ):

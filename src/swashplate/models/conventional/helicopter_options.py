@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from swashplate.errors import CardError
-from swashplate.models.card import Card
+from swashplate.models.card import Card, no_option
 from swashplate.models.conventional.aerofoil_file import aerofoil_of
 from swashplate.physics.ground_effect import FORMS as GROUND_EFFECTS
 from swashplate.physics.tabled_blades import AerofoilTable
@@ -122,8 +122,7 @@ def helicopter_options(card: Card) -> HelicopterOptions:
     where, said = card.where, {name: value for name, value in card.options.items() if name != _AEROFOIL}
     for name, value in said.items():
         if name not in _CHOICES:
-            known = ", ".join((*_CHOICES, _AEROFOIL))
-            raise CardError("is not an option.", where=where, channel=name, hint=f"Options are {known}.")
+            raise no_option(name, (*_CHOICES, _AEROFOIL), where=where)
         if not any(value is choice or (isinstance(value, str) and value == choice) for choice in _CHOICES[name]):
             expected = ", ".join(map(repr, _CHOICES[name]))
             raise CardError(f"is {value!r}, expected one of {expected}.", where=where, channel=name)

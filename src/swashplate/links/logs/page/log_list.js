@@ -39,7 +39,7 @@ function facts(log) {
 
 function entry(log) {
   const off = make("button", { "aria-label": `close ${log.name}`, title: "close this log", onclick: () => close(log) }, "✕");
-  const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, log.name), off);
+  const line = document.createTextNode(""), told = make("small"), name = make("div", { class: "name" }, line, make("span", {}, ...log.name.split(/(?<=[_.@-])/).flatMap((part) => [part, make("wbr")])), off);
   return { item: make("li", { "data-log": log.id }, name, told), clock: clock(log), line, told };
 }
 
@@ -58,7 +58,13 @@ function show() {
   }
 }
 
+// It goes at once, so that nothing more is asked of it; the first of those that stay is on its own clock.
 const close = attempt(async (log) => {
+  logs.delete(log.id);
+  const [first] = ready(), ahead = first ? offset(first) : 0;
+  for (const other of ready()) offsets.set(other.id, offset(other) - ahead);
+  show();
+  say("logs");
   await post("/close", { log: log.id });
   await refresh();
 });

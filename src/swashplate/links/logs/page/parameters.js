@@ -31,7 +31,7 @@ function values(log) {
   if (!log.parameters.length) return [make("p", { class: "soft" }, "This log holds no parameters.")];
   const more = found.length > MOST ? make("p", { class: "soft" }, `${found.length - MOST} more: search for them.`) : "";
   return [
-    make("h3", {}, `At the begin of the log (${found.length})`),
+    make("h3", {}, `At the beginning of the log (${found.length})`),
     make("table", {}, make("thead", {}, make("tr", {}, make("th", {}, "name"), make("th", { class: "number" }, "value"))),
       make("tbody", {}, ...found.slice(0, MOST).map(([name, value]) => make("tr", {}, make("td", {}, name), make("td", { class: "number" }, digits(value)))))),
     more,

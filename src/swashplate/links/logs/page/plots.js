@@ -14,7 +14,12 @@ const fetchAll = attempt(async () => {
   const wanted = made.flatMap((chart) => chart.wanted());
   if (!wanted.length) return;
   const bins = Math.max(200, Math.min(2000, Math.round(made[0].plot.width * devicePixelRatio)));
-  const { traces } = await post("/traces", { wanted, bins });
+  let traces;
+  try {
+    ({ traces } = await post("/traces", { wanted, bins }));
+  } catch (error) {
+    if (number === asked) throw error; // else it was of a log that has been closed meanwhile
+  }
   if (number !== asked) return; // a later zoom has been asked for meanwhile
   let at = 0;
   for (const chart of made) {

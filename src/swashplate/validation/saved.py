@@ -1,0 +1,109 @@
+"""Judgements of models as files: figures and words for readers, and under `saved` all of it, which `sp.load` reads."""
+
+from __future__ import annotations
+
+import os
+import typing
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from swashplate.atomic import write_json
+from swashplate.errors import DocumentError
+from swashplate.identification.core.document_codec import decode, encode
+from swashplate.identification.core.result_file import model_document, model_from
+from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.vehicle import Vehicle
+from swashplate.registry import Registry
+
+Judged = Any
+"""A `Validation`, `Verification`, `ModelComparison` or `Residuals`."""
+
+KINDS: Registry[type] = Registry(
+    "judgements",
+    what="a judgement of a model",
+    own={
+        "validation": "swashplate.validation.validation:Validation",
+        "verification": "swashplate.validation.verification:Verification",
+        "comparison": "swashplate.validation.compare:ModelComparison",
+        "residuals": "swashplate.validation.residuals:Residuals",
+    },
+)
+"""Classes by the `kind` of their files."""
+SCHEMA = 1
+_MODELS, _VERIFICATIONS = ("model", "vehicle", "published"), ("inside", "verification")
+"""Fields that hold a model, and those that hold a `Verification`."""
+
+
+def save(judged: Judged, document: Mapping[str, Any], path: str | os.PathLike[str]) -> Path:
+    """Write a judgement as a JSON file.
+
+    Args:
+        judged: what is written whole.
+        document: what readers and other programs look at: its `kind` and figures.
+        path: the file.
+    """
+    return write_json(path, {**document, "schema": SCHEMA, "saved": _told(judged)})
+
+
+def from_document(document: Mapping[str, Any], *, where: str, equations: Vehicle | None = None) -> Judged:
+    """The judgement of a document.
+
+    Args:
+        document: of a file that `save` wrote.
+        where: its name, for messages.
+        equations: the vehicle whose equations its models have, for equations that are no part of the package.
+
+    Raises:
+        DocumentError: naming the entry that is missing, unknown or impossible.
+        CardError: for a model that cannot be made again.
+    """
+    if document.get("schema") != SCHEMA or "saved" not in document:
+        raise DocumentError(
+            f"has the schema {document.get('schema')!r}, expected {SCHEMA}, or holds figures only.",
+            where=where,
+            channel="schema",
+            hint="Make it again: this version writes all of it.",
+        )
+    return _made(KINDS[document["kind"]], document["saved"], where=where, at="saved", equations=equations)
+
+
+def _told(value: Any) -> Any:
+    if isinstance(value, Vehicle | StateSpaceModel):
+        return model_document(value)
+    if isinstance(value, Mapping) and any(isinstance(entry, KINDS["verification"]) for entry in value.values()):
+        return {name: _told(entry) for name, entry in value.items()}
+    if any(isinstance(value, KINDS[kind]) for kind in KINDS):
+        return {f.name: _told(getattr(value, f.name)) for f in fields(value)}
+    return encode(value)
+
+
+def _made(wanted: Any, table: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+    """An object of that class from its fields."""
+    if not isinstance(table, dict):
+        raise DocumentError("is no table.", where=where, channel=at)
+    hints, made = typing.get_type_hints(wanted), {}
+    for name in dict.fromkeys([f.name for f in fields(wanted)] + list(table)):
+        place = f"{at}.{name[:60]}"
+        if name not in hints:
+            raise DocumentError("is not known here.", where=where, channel=place)
+        if name not in table:
+            raise DocumentError("is missing.", where=where, channel=place)
+        entry = table[name]
+        if name in _MODELS:
+            made[name] = model_from(entry, where=where, at=place, equations=equations)
+        elif name in _VERIFICATIONS:
+            inner = KINDS["verification"]
+            whole = None if entry is None else _made(inner, entry, where=where, at=place, equations=equations)
+            made[name] = whole
+        elif name == "found":
+            if not isinstance(entry, dict):
+                raise DocumentError("is no table.", where=where, channel=place)
+            made[name] = {
+                who: _made(KINDS["verification"], one, where=where, at=f"{place}.{who[:60]}", equations=equations)
+                for who, one in entry.items()
+            }
+        else:
+            made[name] = decode(hints[name], entry, where=where, at=place)
+    return wanted(**made)
