@@ -46,7 +46,7 @@ def assemble(
     velocity = local_to_body(local, attitude, xp)
     # A steady turn about the vertical (Stevens, Lewis and Johnson 2016, sec. 3.6).
     rates = local_to_body(Vector(0.0, 0.0, course[4]), attitude, xp)
-    place = course[5] * np.eye(3)[2]
+    place = xp.arrays.concatenate([np.zeros(2), course[5:6]])
     state = xp.arrays.concatenate(
         [place, xp.arrays.stack(velocity), xp.arrays.stack(attitude), xp.arrays.stack(rates), z[2 + n_inputs :]]
     )
