@@ -149,12 +149,14 @@ def test_what_does_import_jax_would_be_noticed() -> None:
 def test_the_extras_that_messages_name_are_the_projects() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    brought = {name.replace("-", "_"): extra for extra, names in extras.items() for name in _plain(names)}
+    assert extras["cuda"] == ["swashplate[model]", "jax[cuda12]>=0.6"], "the same libraries, for a card"
+    others = {extra: names for extra, names in extras.items() if extra != "cuda"}
+    brought = {name.replace("-", "_"): extra for extra, names in others.items() for name in _plain(names)}
     assert {name: EXTRA_OF[name] for name in brought} == brought
     assert set(EXTRA_OF) - set(brought) == {"jaxlib", "equinox"}, "those come along with jax and diffrax"
     assert not set(_plain(project["dependencies"])) & set(EXTRA_OF)
     (every,) = extras["all"]
-    assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all"})
+    assert sorted(every[len("swashplate[") : -1].split(",")) == sorted(set(extras) - {"all", "cuda"})
 
 
 def _brought_by(requirements: list[str]) -> set[str]:

@@ -24,6 +24,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import kalman_gain
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend
 from swashplate.physics.frames import Euler, Vector, body_to_local, turned_about_z
 from swashplate.simulation.discretisation import held_series
 from swashplate.simulation.dynamics import (
@@ -106,16 +107,16 @@ class StochasticModel:
 
     def _push(self, gust: Any) -> Any:
         """The accelerations of a gust as rates of a whole state row."""
-        units = np.eye(len(self.vehicle.state_names))[self._disturbed]
+        units = np.eye(len(self.vehicle.state_names))[self.disturbed]
         return sum(gust[i] * unit for i, unit in enumerate(units))
 
     def _driving(self, gust: Any, u: Any, voltage: Any) -> Any:
         """Inputs, wind and voltage side by side."""
         return jnp.concatenate([u, gust[N_DISTURBANCES:], jnp.zeros(3 - 2 * self.windy), voltage[None]])
 
-    def measure(self, x: Any, nuisance: Nuisance) -> Any:
-        """The measured channels of a state row."""
-        xp = jax_backend()
+    def measure(self, x: Any, nuisance: Nuisance, xp: Backend | None = None) -> Any:
+        """The measured channels of a state, whose entries come first; JAX's operations where `xp` is None."""
+        xp = xp or jax_backend()
         here = {name: x[self.vehicle.index(name)] for name in self.output_names}
         attitude = Euler(*(x[self.vehicle.index(name)] for name in ("phi", "theta", "psi")))
         lever = body_to_local(Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z), attitude, xp)
@@ -128,10 +129,11 @@ class StochasticModel:
             "theta": tracked.theta + nuisance.level_theta,
             "psi": tracked.psi,
         }
-        return jnp.stack([seen.get(name, here[name]) for name in self.output_names])
+        return xp.arrays.stack([seen.get(name, here[name]) for name in self.output_names])
 
     @property
-    def _disturbed(self) -> list[int]:
+    def disturbed(self) -> list[int]:
+        """Places of the disturbed states."""
         return [self.vehicle.index(name) for name in DISTURBED]
 
     # ---- the filter --------------------------------------------------------------------------------------------
@@ -144,30 +146,39 @@ class StochasticModel:
         averaged over a normal distribution of the horizontal air speed by four points (statistical linearisation,
         Gelb 1974, sec. 6.2; cubature of the third degree).
         """
-        n, g, d = x.shape[0], self.n_gusts, N_DISTURBANCES
-        places = x[None]
-        if self.windy:
-            sigma = jnp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
-            along = jnp.sqrt(2.0) * sigma * np.eye(n)[self._disturbed[:2]]
-            places = jnp.concatenate([x + along, x - along])
-        still = jnp.zeros(g)
+        places, still = jnp.stack(self.places(x, noise, jnp)), jnp.zeros(self.n_gusts)
         by_x, by_gust = (
             jnp.mean(part, axis=0)
             for part in jax.vmap(lambda x: self.slopes(x, still, u=u, parameters=parameters, voltage=voltage))(places)
         )
-        by_x, held = held_series(by_x, self.dt, jnp.eye(n))  # as `step` makes it of a linear system
-        by_gust = self.dt * held @ by_gust
-        by_push = by_gust[:, :d]
-        A = jnp.block(
-            [
-                [by_x, by_gust, by_push],
-                [jnp.zeros((g, n)), jnp.diag(self.fade(noise)), jnp.zeros((g, d))],
-                [jnp.zeros((d, n + g)), jnp.eye(d)],
-            ]
-        )
         by_state = jax.jacfwd(lambda x: self.measure(x, nuisance))(x)
-        C = jnp.concatenate([by_state, jnp.zeros((self.n_outputs, g + d))], 1)
-        return A, C, self.process_noise(by_push, noise), jnp.diag(self.sensor_variances(noise))
+        return self.joined(by_x, by_gust, by_state, noise, jnp)
+
+    def places(self, x: Any, noise: Noise, xp: Any) -> list[Any]:
+        """Where slopes are taken and averaged: the equilibrium itself, four points about it with wind."""
+        if not self.windy:
+            return [x]
+        sigma = xp.sqrt(noise.speed**2 + 0.5 * noise.tau_wind * noise.wind**2)
+        along = np.sqrt(2.0) * np.eye(x.shape[-1])[self.disturbed[:2]]
+        return [x + sign * sigma[..., None] * way for sign in (1.0, -1.0) for way in along]
+
+    def joined(self, by_x: Any, by_gust: Any, by_state: Any, noise: Noise, xp: Any) -> tuple[Any, Any, Any, Any]:
+        """A, C, Q, R of the joined system.
+
+        Args:
+            by_x, by_gust: slopes of the rates by states and disturbances, with any axes in front.
+            by_state: slopes of the measured channels by the states.
+            noise: numbers, or rows of them along the axes in front.
+            xp: `numpy` or `jax.numpy`.
+        """
+        n, g, d = by_x.shape[-1], self.n_gusts, N_DISTURBANCES
+        by_x, held = held_series(by_x, self.dt, np.eye(n))  # as `step` makes it of a linear system
+        by_gust = self.dt * held @ by_gust
+        by_push = by_gust[..., :d]
+        fade = _diagonal(self.fade(noise, xp), xp)
+        A = _blocks([[by_x, by_gust, by_push], [None, fade, None], [None, None, np.eye(d)]], (n, g, d), xp)
+        C = xp.concatenate([by_state, xp.zeros((*by_state.shape[:-1], g + d))], axis=-1)
+        return A, C, self.process_noise(by_push, noise, xp), _diagonal(self.sensor_variances(noise, xp), xp)
 
     def rates(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> Any:
         """Rates of a state row under commands and disturbances."""
@@ -181,24 +192,27 @@ class StochasticModel:
             return self.rates(x, jnp.concatenate([push, wind]), u=u, parameters=parameters, voltage=voltage)
 
         by_x, by_wind = jax.jacfwd(moved, argnums=(0, 1))(x, wind)
-        pushed = np.eye(x.shape[0])[:, self._disturbed]  # an acceleration is the rate of one state
+        pushed = np.eye(x.shape[0])[:, self.disturbed]  # an acceleration is the rate of one state
         return by_x, jnp.concatenate([pushed, by_wind], axis=1)
 
-    def process_noise(self, by_push: Any, noise: Noise) -> Any:
+    def process_noise(self, by_push: Any, noise: Noise, xp: Any = jnp) -> Any:
         """Covariance of what a sample adds to states, gusts and drifts.
 
         Args:
-            by_push: how an acceleration that is held over the sample moves the states (states, accelerations).
+            by_push: how an acceleration that is held over the sample moves the states (..., states, accelerations).
             noise: intensities.
+            xp: `numpy` or `jax.numpy`.
         """
+        n, g, d = by_push.shape[-2], self.n_gusts, N_DISTURBANCES
         tilt, yaw, horizontal, vertical = noise[:4]
-        white = jnp.stack(on_axes(horizontal, vertical, tilt, yaw))
+        white = xp.stack(on_axes(horizontal, vertical, tilt, yaw), axis=-1)
         tilt, yaw, horizontal, vertical = noise[4:8]
-        gust = jnp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind])[: self.n_gusts]
-        drift = jnp.stack(on_axes(*_shared_or_own(noise, "drift")))
+        gust = xp.stack([*on_axes(horizontal, vertical, tilt, yaw), noise.wind, noise.wind][:g], axis=-1)
+        drift = xp.stack(on_axes(*_shared_or_own(noise, "drift", xp)), axis=-1)
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
-        spread = by_push @ jnp.diag(white**2 / self.dt) @ by_push.T + self._floor(by_push.shape[0])
-        return jax.scipy.linalg.block_diag(spread, jnp.diag(gust**2 * self.dt), jnp.diag(drift**2 * self.dt))
+        spread = (by_push * (white**2 / self.dt)[..., None, :]) @ xp.swapaxes(by_push, -1, -2) + self._floor(n)
+        gusts, drifts = (_diagonal(row**2 * self.dt, xp) for row in (gust, drift))
+        return _blocks([[spread, None, None], [None, gusts, None], [None, None, drifts]], (n, g, d), xp)
 
     def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
@@ -206,20 +220,20 @@ class StochasticModel:
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
         return FilterGain(K[:n], K[n : n + g], K[n + g :], S)
 
-    def fade(self, noise: Noise) -> Any:
+    def fade(self, noise: Noise, xp: Any = jnp) -> Any:
         """What is left of each gust after one sample."""
-        taus = [*on_axes(*_shared_or_own(noise, "tau_gust")), noise.tau_wind, noise.tau_wind]
-        return jnp.exp(-self.dt / jnp.stack(taus[: self.n_gusts]))
+        taus = [*on_axes(*_shared_or_own(noise, "tau_gust", xp)), noise.tau_wind, noise.tau_wind]
+        return xp.exp(-self.dt / xp.stack(taus[: self.n_gusts], axis=-1))
 
     def _floor(self, n: int) -> Any:
         """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
         speeds = [name.startswith("omega") for name in self.vehicle.state_names]
-        return jnp.diag(jnp.where(jnp.array(speeds), 1e-4, 1e-10)[:n])
+        return np.diag(np.where(np.array(speeds), 1e-4, 1e-10)[:n])
 
-    def sensor_variances(self, noise: Noise) -> Any:
+    def sensor_variances(self, noise: Noise, xp: Any = jnp) -> Any:
         """Variances of the measured channels."""
         sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
-        return jnp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names])
+        return xp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
 
     @property
     def n_outputs(self) -> int:
@@ -270,10 +284,31 @@ class StochasticModel:
         )
 
 
-def _shared_or_own(noise: Noise, kind: str) -> tuple[Any, Any, Any, Any]:
+def _diagonal(rows: Any, xp: Any) -> Any:
+    """Diagonal matrices of rows (..., n)."""
+    return rows[..., None] * xp.eye(rows.shape[-1])
+
+
+def _blocks(rows: Any, sizes: tuple[int, ...], xp: Any) -> Any:
+    """Matrices of blocks of these sizes, with any axes in front; None is zeros."""
+    front = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row if block is not None))
+    whole = [
+        xp.concatenate(
+            [
+                xp.zeros((*front, high, wide)) if block is None else xp.broadcast_to(block, (*front, high, wide))
+                for block, wide in zip(row, sizes, strict=True)
+            ],
+            axis=-1,
+        )
+        for row, high in zip(rows, sizes, strict=True)
+    ]
+    return xp.concatenate(whole, axis=-2)
+
+
+def _shared_or_own(noise: Noise, kind: str, xp: Any = jnp) -> tuple[Any, Any, Any, Any]:
     """A number of level, downward, tilting and yawing disturbances: down and yaw have their own, where there is one."""
     force, down, moment, yaw = (getattr(noise, f"{kind}_{name}") for name in ("force", "vertical", "moment", "yaw"))
-    return force, jnp.where(down > 0.0, down, force), moment, jnp.where(yaw > 0.0, yaw, moment)
+    return force, xp.where(down > 0.0, down, force), moment, xp.where(yaw > 0.0, yaw, moment)
 
 
 _GUST_NAMES = (*DISTURBED, "x", "y")

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.simulation.gathered_noise import summed
 
 Map = tuple[Any, Any, Any]
@@ -21,6 +22,8 @@ Map = tuple[Any, Any, Any]
 _DOUBLINGS = 16
 """Each doubles the horizon: 2^16 samples are eleven minutes at 100 Hz, longer than any flight of ours."""
 _MOST_DOUBLINGS, _SETTLED, _NEARLY = 40, 1e-13, 1e-6
+_NOTHING = 1e-12
+"""Of a power of the filter's loop: its square adds nothing to a sum."""
 
 
 def through(A: Any, C: Any, Q: Any, R: Any, xp: Any) -> Map:
@@ -43,17 +46,23 @@ def settled_covariance(whole: Map) -> Any:
     Raises:
         numpy.linalg.LinAlgError: where it does not settle (something that lasts is not seen).
     """
+    P, change = _doubled(whole, _MOST_DOUBLINGS)
+    if not np.all(np.isfinite(P)) or change > _NEARLY:
+        raise np.linalg.LinAlgError("the covariance does not settle")
+    return P
+
+
+def _doubled(whole: Map, most: int) -> tuple[Any, float]:
+    """The covariance after a map has doubled so many times or settled, and the share by which the last one moved it."""
     P, change = whole[2], np.inf
-    for _ in range(_MOST_DOUBLINGS):
+    for _ in range(most):
         A, G, H = followed(whole, whole, np)
         whole = A, 0.5 * (G + G.T), 0.5 * (H + H.T)
         change = float(np.max(np.abs(whole[2] - P))) / max(float(np.max(np.abs(whole[2]))), 1e-300)
         P = whole[2]
         if not np.all(np.isfinite(P)) or change < _SETTLED:
             break
-    if not np.all(np.isfinite(P)) or change > _NEARLY:
-        raise np.linalg.LinAlgError("the covariance does not settle")
-    return P
+    return P, change
 
 
 def gain_at(P: Any, C: Any, R: Any, xp: Any) -> Any:
@@ -88,15 +97,63 @@ def _covariance_moved(here: tuple[Any, Any, Any, Any], moved: tuple[Any, Any, An
     F = A (I - K C): a Lyapunov equation, solved by doubling its sum (Smith 1968, SIAM J. Appl. Math. 16, 198-201).
     Exact for a filter that has settled within 2^16 samples.
     """
+    F, W, P = _pushed(predicted_covariance(*here), here, moved, jnp)
+    return P, summed(F, W, _DOUBLINGS)[1]
+
+
+def _pushed(P: Any, here: Any, moved: Any, xp: Any) -> tuple[Any, Any, Any]:
+    """F and W of the Lyapunov equation of a change, and P; changes may come as stacks (..., n, n)."""
     A, C, _, R = here
     dA, dC, dQ, dR = moved
-    P = predicted_covariance(*here)
-    K = gain_at(P, C, R, jnp)
+    K = gain_at(P, C, R, xp)
     after = P - K @ C @ P
     AK = A @ K
     half = (dA - AK @ dC) @ after @ A.T
-    W = half + half.T + AK @ dR @ AK.T + dQ
-    return P, summed(A - AK @ C, W, _DOUBLINGS)[1]
+    return A - AK @ C, half + xp.swapaxes(half, -1, -2) + AK @ dR @ AK.T + dQ, P
+
+
+def steady_gain(A: Array, C: Array, Q: Array, R: Array) -> tuple[Array, Array, Array]:
+    """`kalman_gain` by NumPy, which compiles nothing, and the covariance P (n, n); nan where a matrix is singular."""
+    n, m = len(A), len(C)
+    try:
+        P, _ = _doubled(through(A, C, Q, R, np), _DOUBLINGS)
+        S = C @ P @ C.T + R
+        S = 0.5 * (S + S.T)
+        return np.linalg.solve(S, C @ P).T, S, P
+    except np.linalg.LinAlgError:
+        return np.full((n, m), np.nan), np.full((m, m), np.nan), np.full((n, n), np.nan)
+
+
+def steady_gain_moved(
+    here: tuple[Array, Array, Array, Array], P: Array, moved: tuple[Array, Array, Array, Array]
+) -> tuple[Array, Array]:
+    """How `steady_gain` moves with its matrices: gains (k, n, m) and covariances of the innovations (k, m, m).
+
+    Args:
+        here: A, C, Q and R. P: of `steady_gain`.
+        moved: k changes of each, stacked.
+    """
+    (_, C, _, R), (_, dC, _, dR) = here, moved
+    F, W, _ = _pushed(P, here, moved, np)
+    dP = _sums(F, W)
+    S = C @ P @ C.T + R
+    turned = np.swapaxes(dC, -1, -2)
+    dS = dC @ P @ C.T + C @ dP @ C.T + C @ P @ turned + dR
+    inverse = np.linalg.inv(0.5 * (S + S.T))
+    return (dP @ C.T + P @ turned - P @ C.T @ inverse @ dS) @ inverse, 0.5 * (dS + np.swapaxes(dS, -1, -2))
+
+
+def _sums(F: Array, W: Array) -> Array:
+    """The sums of F^i W F'^i for a stack of symmetric W (k, n, n), each power of F used for all of them."""
+    k, n, _ = W.shape
+    total = np.ascontiguousarray(W.transpose(1, 0, 2))  # (n, k, n): both products are one of large matrices
+    for _ in range(_DOUBLINGS):
+        if np.max(np.abs(F)) < _NOTHING:
+            break
+        left = (F @ total.reshape(n, -1)).reshape(-1, n)
+        total = total + (left @ F.T).reshape(n, k, n)
+        F = F @ F
+    return total.transpose(1, 0, 2)
 
 
 def kalman_gain(A: Any, C: Any, Q: Any, R: Any) -> tuple[Any, Any]:

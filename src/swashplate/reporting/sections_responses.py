@@ -337,8 +337,8 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
                 ("axis", "", "suggested", "flown"),
                 judged,
                 note="If the loop crosses several times, the smallest margin counts. ± follows from the Cramér-Rao "
-                "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. The "
-                f"demand steps at once: {firmware}'s own shaping is not included.",
+                "bounds of the model's parameters. The controller's filters (FLTT, FLTE, FLTD; cutoff) are included. "
+                f"The demand steps at once: {firmware}'s own shaping is not included.",
             ),
             *(figure for g in gains if (figure := rate_steps_figure(g)) is not None),
             *(Text(f"{g.axis}: {line}") for g in gains for line in g.trade),

@@ -18,7 +18,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import compile_small_loops_whole
+from swashplate.simulation.compilation import QUICK_TO_COMPILE, compile_small_loops_whole
 from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
@@ -145,3 +145,21 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
         return jnp.stack(vehicle.specific_force(nested, commands, parameters, environment, operations))
 
     return felt
+
+
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+def rates_and_slopes(
+    equations: Equations,
+    x: Float[jax.Array, " states"],
+    w: Float[jax.Array, " driving"],
+    p: Float[jax.Array, " parameters"],
+) -> tuple[Any, Any, Any]:
+    """The rates of a state row, and their slopes by it and by what drives it; rows as in `row_rates`."""
+    rates = row_rates(equations, padded=False)
+
+    def both(x: Any, w: Any) -> tuple[Any, Any]:
+        found = rates(x, w, p)
+        return found, found
+
+    (by_x, by_w), found = jax.jacfwd(both, argnums=(0, 1), has_aux=True)(x, w)
+    return found, by_x, by_w

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from scipy.linalg import eig, schur, solve_sylvester
 
@@ -21,14 +19,12 @@ from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
-    Equations,
     enable_double_precision,
     equations_of,
     parameter_row,
-    row_rates,
+    rates_and_slopes,
 )
 from swashplate.simulation.modes import Mode
 from swashplate.simulation.trim import Trim
@@ -204,7 +200,7 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
     about = trim if trim is not None else find_trim(vehicle)
     surroundings = [getattr(about.environment, name) for name in SURROUNDINGS]
     w = np.array([*about.inputs, *surroundings], dtype=np.float64)
-    A, W = _jacobians(equations_of(vehicle), about.state, w, parameter_row(vehicle, about.environment))
+    _, A, W = rates_and_slopes(equations_of(vehicle), about.state, w, parameter_row(vehicle, about.environment))
     n, m = len(vehicle.state_names), len(vehicle.input_names)
     return LinearModel(
         A=np.asarray(A),
@@ -222,8 +218,3 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
         ),
         limits=dict(zip(vehicle.input_names, vehicle.input_limits, strict=True)),
     )
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _jacobians(equations: Equations, x: Array, w: Array, p: Array) -> tuple[Any, Any]:
-    return jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))(x, w, p)  # type: ignore[no-any-return]

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.errors import TrimError
@@ -18,22 +15,19 @@ from swashplate.models.doubts import doubts, nominal_voltage
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.environment import Environment
-from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.ground_contact import Grip
 from swashplate.physics.rigid_body import RigidBody
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
-    Equations,
     enable_double_precision,
     equations_of,
-    jax_backend,
     parameter_row,
-    row_rates,
 )
+from swashplate.simulation.steady import ACCELERATIONS, ANGULAR_ACCELERATIONS, BODY, assemble, unrest_at
 
-_BODY = len(RigidBody._fields)
+_XP = ArrayBackend()
 
 
 class Residual(Protocol):
@@ -42,8 +36,6 @@ class Residual(Protocol):
     def __call__(self, z: Array, *, share: float = 1.0) -> tuple[Array, Array]: ...
 
 
-_ACCELERATIONS = slice(3, 6)
-_ANGULAR_ACCELERATIONS = slice(9, 12)
 _STEPS = 60
 _MOVING = np.array([True, True, True, False, True, False])
 """What of a course is motion: velocities and the rate of turn."""
@@ -147,7 +139,7 @@ def trim(
     if voltage is not None:
         surroundings = surroundings._replace(voltage=voltage)
     need_whole_body(vehicle)
-    if vehicle.state_names[:_BODY] != RigidBody._fields:
+    if vehicle.state_names[:BODY] != RigidBody._fields:
         raise TrimError(f"'{vehicle.name}' has no rigid body to bring into equilibrium.")
     equations = equations_of(vehicle)
     if height is None:
@@ -177,8 +169,7 @@ def trim(
         )
 
     def residual(z: Array, *, share: float = 1.0) -> tuple[Array, Array]:
-        value, slope = _unrest(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
-        return np.asarray(value), np.asarray(slope)
+        return unrest_at(equations, z, course * np.where(_MOVING, share, 1.0), row, p)
 
     z = _first_guess(vehicle, residual) if near is None else _unknowns(vehicle, near)
     z, value = _newton(z, residual)
@@ -186,7 +177,7 @@ def trim(
     if not _at_rest(value) and near is None:
         z, value, share = _on_the_way(vehicle, residual)
     z = np.where(np.abs(z) < _ROUNDING, 0.0, z)
-    state, inputs = (np.asarray(part) for part in assemble(equations, z, course))
+    state, inputs = assemble(equations, z, course, _XP)
     largest = float(np.max(np.abs(value))) if np.all(np.isfinite(value)) else np.inf
     where = f"{speed:g} m/s ahead, {lateral:g} m/s right, {climb:g} m/s up"
     if nominal is not None:
@@ -222,64 +213,9 @@ _CLEAR = 10.0
 """m: a height at which no skid touches."""
 
 
-def assemble(
-    equations: Equations,
-    z: Float[jax.Array | np.ndarray, " unknowns"],
-    course: Float[jax.Array | np.ndarray, " course"],
-) -> tuple[Any, Any]:
-    """State and input rows of a steady flight from the unknowns (traceable).
-
-    Args:
-        z: roll and pitch, the inputs that are solved for, inner states.
-        course: velocity ahead, right and down, heading, rate of turn, place down.
-    """
-    vehicle = equations.vehicle
-    held = dict(vehicle.trim_held)
-    n_inputs = len(vehicle.input_names) - len(held)
-    attitude = Euler(z[0], z[1], course[3])
-    c, s = jnp.cos(course[3]), jnp.sin(course[3])
-    local = Vector(c * course[0] - s * course[1], s * course[0] + c * course[1], course[2])
-    velocity = local_to_body(local, attitude, jax_backend())
-    # A steady turn about the vertical (Stevens, Lewis and Johnson 2016, sec. 3.6).
-    rates = local_to_body(Vector(0.0, 0.0, course[4]), attitude, jax_backend())
-    place = jnp.zeros(3).at[2].set(course[5])
-    state = jnp.concatenate([place, jnp.stack(velocity), jnp.stack(attitude), jnp.stack(rates), z[2 + n_inputs :]])
-    free = iter(range(2, 2 + n_inputs))
-    return state, jnp.stack(
-        [jnp.asarray(held[name]) if name in held else z[next(free)] for name in vehicle.input_names]
-    )
-
-
-def unrest(
-    equations: Equations,
-    z: Float[jax.Array, " unknowns"],
-    course: Float[jax.Array, " course"],
-    row: Float[jax.Array, " surroundings"],
-    p: Float[jax.Array, " parameters"],
-) -> tuple[Any, Any]:
-    """What should vanish in the steady flight that `assemble` makes, and its derivatives by the unknowns (traceable).
-
-    Args:
-        z, course: as in `assemble`.
-        row, p: `SURROUNDINGS`, and parameters with `CONSTANTS`.
-    """
-
-    def rest(z: Float[jax.Array, " unknowns"]) -> tuple[Any, Any]:
-        state, inputs = assemble(equations, z, course)
-        rates = row_rates(equations, padded=False)(state, jnp.concatenate([inputs, row]), p)
-        value = jnp.concatenate([rates[_ACCELERATIONS], rates[_ANGULAR_ACCELERATIONS], rates[_BODY:]])
-        return value, value
-
-    slope, value = jax.jacfwd(rest, has_aux=True)(z)
-    return value, slope
-
-
-_unrest = jax.jit(unrest, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-
-
 def _residual_names(vehicle: Vehicle) -> tuple[str, ...]:
     names = vehicle.state_names
-    return (*names[_ACCELERATIONS], *names[_ANGULAR_ACCELERATIONS], *names[_BODY:])
+    return (*names[ACCELERATIONS], *names[ANGULAR_ACCELERATIONS], *names[BODY:])
 
 
 def _first_guess(vehicle: Vehicle, residual: Residual) -> Array:
@@ -287,7 +223,7 @@ def _first_guess(vehicle: Vehicle, residual: Residual) -> Array:
     held = dict(vehicle.trim_held)
     limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
     middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
-    inside = list(leaves(vehicle.state))[_BODY:]
+    inside = list(leaves(vehicle.state))[BODY:]
     inner = len(inside)
     z = np.array([0.0, 0.0, *middle, *inside])
     for _ in range(5):
@@ -301,7 +237,7 @@ def _unknowns(vehicle: Vehicle, known: Trim) -> Array:
     held = dict(vehicle.trim_held)
     inputs = [value for name, value in known.commands().items() if name not in held]
     attitude = [known.states()["phi"], known.states()["theta"]]
-    return np.array([*attitude, *inputs, *known.state[_BODY:]])
+    return np.array([*attitude, *inputs, *known.state[BODY:]])
 
 
 def _newton(z: Array, residual: Residual) -> tuple[Array, Array]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Parameterization, trim_of_record
@@ -48,5 +46,5 @@ def calibrate(
     likelihood = PredictionError(
         table, [first_part(record, seconds)], noise=noise, estimate_noise=False, nuisance=prior
     )
-    found = likelihood.unpack(minimise(likelihood, iterations=30).row)[1]
-    return Nuisance(*(float(np.asarray(value).ravel()[0]) for value in found))
+    found = likelihood.numbers(minimise(likelihood, iterations=30).row)[0]
+    return Nuisance(*found.nuisance.tolist())

@@ -23,8 +23,9 @@ from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, StochasticModel, motors
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.time.beginning import FilterNumbers
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import RUNS, FilterNumbers, whole
+from swashplate.identification.time.record_filter import RUNS, whole
 from swashplate.validation.controller_law import Law, shares_of
 
 _REFERENCE = 0.5

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,18 +12,17 @@ from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, commands_moved, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.filtering.riccati import gain_at, predicted_covariance
+from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
-from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import (
+from swashplate.identification.time.beginning import (
     FilterNumbers,
-    ahead_of,
-    along,
     begun,
+    joined_at,
     seen_at_start,
     starting_samples,
 )
-from swashplate.identification.time.start_states import mean_velocity, steady_flight
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.identification.time.record_filter import ahead_of, along
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import lengthened
 from swashplate.validation.closed_loop import closed_ahead
@@ -128,16 +124,12 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
     model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
-    parameters = vehicle.values()
-    voltage = jnp.asarray(float(np.mean(record.voltage)))
-    x, u = steady_flight(vehicle, parameters, voltage, mean_velocity(vehicle, record))
-    A, C, Q, R = model.linear(x, u, parameters, voltage, noise, nuisance)
-    predicted = predicted_covariance(A, C, Q, R)
-    corrected = predicted - gain_at(predicted, C, R, jnp) @ C @ predicted
-    kept = jnp.array([vehicle.index(name) for name in PREDICTED])
-
-    def ahead(P: Any, _: None) -> tuple[Any, Any]:
+    rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
+    A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
+    predicted = steady_gain(A, C, Q, R)[2]
+    P = predicted - gain_at(predicted, C, R, np) @ C @ predicted
+    kept, found = [vehicle.index(name) for name in PREDICTED], []
+    for _ in range(round(horizon / record.dt)):
         P = A @ P @ A.T + Q
-        return P, jnp.sqrt(jnp.maximum(jnp.diag(P)[kept], 0.0))
-
-    return np.asarray(jax.lax.scan(ahead, corrected, None, length=round(horizon / record.dt))[1])
+        found.append(np.sqrt(np.maximum(np.diag(P)[kept], 0.0)))
+    return np.array(found)

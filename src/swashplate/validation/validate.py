@@ -212,6 +212,11 @@ def validate(
         without_contact=_scores(_without_contact(parts, scored, contacts)),
         loop_closed=closed_floors(looped),
         laws=tuple(laws),
+        not_logged=tuple(
+            name
+            for name in (*(s for s in vehicle.state_names if s.startswith("omega")), "voltage")
+            if any(name not in flight for flight in flights)
+        ),
     )
 
 

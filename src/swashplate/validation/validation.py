@@ -111,6 +111,7 @@ class Validation(Shown):
         without_contact: the model's scores from starts that no mask touches.
         loop_closed: fits with controllers in the place of recorded commands, and their lead over the model's on those;
             nothing where no loop was closed. `laws`: the controllers.
+        not_logged: rotor speeds and voltage that the model has and some flight does not.
     """
 
     vehicle: Vehicle
@@ -131,12 +132,7 @@ class Validation(Shown):
     without_contact: tuple[Score, ...] = ()
     loop_closed: tuple[Floor, ...] = ()
     laws: tuple[Law, ...] = ()
-
-    @property
-    def not_logged(self) -> tuple[str, ...]:
-        """Rotor speeds and voltage that the model has and some flight does not."""
-        speeds = [name for name in self.vehicle.state_names if name.startswith("omega")]
-        return tuple(name for name in (*speeds, "voltage") if any(name not in flight for flight in self.flights))
+    not_logged: tuple[str, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
         """The score of one predictor on one channel at one horizon."""

@@ -20,19 +20,16 @@ from swashplate.filtering.disturbed_model import FilterState, StochasticModel, c
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.core.robust import losses
-from swashplate.identification.time.record_filter import (
+from swashplate.identification.time.beginning import (
     Begun,
     FilterNumbers,
     FirstMotion,
-    along,
-    along_moved,
     begun,
     begun_moved,
-    first_state,
-    planes,
     starting_samples,
     traced_begin,
 )
+from swashplate.identification.time.record_filter import along, along_moved, first_state, planes
 
 _COMPLEX = 1e-30
 """Step of a slope by complex numbers, exact to rounding for ties, which are rational (Squire and Trapp 1998)."""
@@ -109,8 +106,8 @@ class RecordRun:
         ran = along(self.plan.model, begin, at, self.readings, reaching, self.voltage)
         return Filtered(reaching, at, begin, *ran)
 
-    def moved(self, run: Filtered, card: Array, numbers: Array) -> tuple[Array, Array]:
-        """Slopes by every entry of the row: innovations (p, n, n_outputs), covariance (p, n_outputs, n_outputs)."""
+    def moved(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
+        """Slopes by every scaled entry of the row: innovations (p, n, outputs), covariance (p, outputs, outputs)."""
         model, k, m, p = self.plan.model, len(self.plan.layout.free), len(self.plan.nuisances), len(numbers)
         by_command = self._commands_moved(run)
         own, noises = k + self.log * m, _places(Noise, self.plan.noises)
@@ -126,9 +123,10 @@ class RecordRun:
         directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
+        directions = FilterNumbers(*(scale[:, None] * part for part in directions))
         steps = planes(model, run.states, run.commands, self.voltage, run.numbers.parameters, directions.parameters[:k])
         pushed, further = np.zeros((p, *run.commands.shape)), np.eye(p, k)
-        pushed[own : own + m] = by_command
+        pushed[own : own + m] = by_command * scale[own : own + m, None, None]
         begin = begun_moved(model, run.numbers, self.seen, directions)
         found = along_moved(model, run.begin, begin, run.numbers, directions, self.readings, steps, (pushed, further))
         return found, np.asarray(begin.gain.covariance)
@@ -157,7 +155,7 @@ def unpack(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Nuisance, Noise]
     nuisance = Nuisance(**{name: jnp.zeros(len(block)) for name in Nuisance._fields})._replace(
         **{name: block[:, i] for i, name in enumerate(plan.nuisances)}
     )
-    noise = data["noise"]
+    noise = jnp.asarray(data["noise"])
     if plan.noises:
         estimated = jnp.array([Noise._fields.index(name) for name in plan.noises])
         noise = noise.at[estimated].set(jnp.exp(numbers[k + n * m :]))

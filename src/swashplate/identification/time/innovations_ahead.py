@@ -16,8 +16,8 @@ import jax.numpy as jnp
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import FilterState, commands
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.time.beginning import FirstMotion
 from swashplate.identification.time.innovations import FilterPlan, traced_run, unpack
-from swashplate.identification.time.record_filter import FirstMotion
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 
 

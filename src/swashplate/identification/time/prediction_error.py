@@ -26,9 +26,9 @@ from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record, logs
 from swashplate.identification.core.scoring import TracedCost
 from swashplate.identification.time import innovations_ahead
-from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost, unpack
+from swashplate.identification.time.beginning import FilterNumbers, seen_at_start
+from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.record_filter import seen_at_start
 from swashplate.identification.time.start_states import slopes
 
 SETTLING = 1.5
@@ -57,6 +57,9 @@ _NUISANCE = {
     "level_psi": (0.0, 0.1, 0.2),
 }
 
+
+_KEPT = 2
+"""Rows whose runs are kept: a search tries up to two, and goes on from one of them."""
 
 _LENGTHS = 256
 """Records are padded to a multiple of this many samples, so that flights of similar length share compiled code."""
@@ -157,17 +160,18 @@ class PredictionError:
         seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
         self._plan = FilterPlan(self.model, table.layout, len(self.logs), tuple(nuisances), noises)
         self._data: dict[str, Any] = {
-            **{name: jnp.asarray(stacked[name]) for name in ("outputs", "inputs", "voltage")},
-            "seen": tuple(jnp.asarray(np.stack(rows)) for rows in zip(*seen, strict=True)),
-            "card": jnp.asarray(table.card_row),
-            "log": jnp.asarray(self._log),
-            "scale": jnp.asarray(self.row.scale),
-            "noise": jnp.asarray([float(value) for value in self.noise]),
+            **{name: stacked[name] for name in ("outputs", "inputs", "voltage")},
+            "seen": tuple(np.stack(rows) for rows in zip(*seen, strict=True)),
+            "card": np.asarray(table.card_row),
+            "log": np.asarray(self._log),
+            "scale": self.row.scale,
+            "noise": np.array([float(value) for value in self.noise]),
         }
         self._runs = tuple(
             RecordRun(self._plan, int(log), piece.outputs, piece.inputs, piece.voltage, first)
             for log, piece, first in zip(self._log, pieces, seen, strict=True)
         )
+        self._kept: dict[bytes, list[Filtered]] = {}
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
 
@@ -181,14 +185,19 @@ class PredictionError:
         """The likelihood of the same row with a constant gain."""
         return self
 
-    def unpack(self, row: Any) -> tuple[Any, Nuisance, Noise]:
-        """Equations' parameters, nuisances (one array entry per record) and noise of a scaled row."""
-        return unpack(self._plan, self._data, jnp.asarray(row))
+    def numbers(self, row: Array) -> list[FilterNumbers]:
+        """What the filter of each record depends on at a scaled row."""
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+        return [run.placed(*given)[1] for run in self._runs]
 
     def runs(self, row: Array) -> list[Filtered]:
-        """The filter's run along every record."""
-        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
-        return [run.filtered(*given) for run in self._runs]
+        """The filter's run along every record; that of the last rows is kept, for what is asked of a row next."""
+        asked = np.asarray(row, dtype=np.float64).tobytes()
+        if asked not in self._kept:
+            given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+            found = [run.filtered(*given) for run in self._runs]
+            self._kept = dict([*self._kept.items(), (asked, found)][-_KEPT:])
+        return self._kept[asked]
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
         """Per record, measured less predicted from the filter's states, (starts, horizons, outputs)."""
@@ -255,24 +264,24 @@ class PredictionError:
         moved: list[tuple[Array, Array]] = []
         gradient, information = np.zeros(p), np.zeros((p, p))
         for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
-            nu, S = run.innovations[counted], np.asarray(run.begin.gain.covariance)
+            first, S = int(np.argmax(counted)), np.asarray(run.begin.gain.covariance)
+            nu = run.innovations[first:]
             if not np.isfinite(nu).all():
                 return gradient, information, runs, moved
-            scale = self.row.scale
-            by_row = mine.moved(run, self.table.card_row, row * scale)
-            d_nu, dS = by_row[0][:, counted] * scale[:, None, None], by_row[1] * scale[:, None, None]
-            moved.append((d_nu, dS))
+            d_nu, dS = mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
             Li = np.linalg.inv(np.linalg.cholesky(S))
             white = nu @ Li.T
             weight = robust.weights(white)
-            d_white = d_nu @ Li.T
+            d_white = (d_nu[:, first:].reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             dM = Li @ dS @ Li.T
+            moved.append((d_white, dM))
             flat = d_white.reshape(p, -1)
             gradient += flat @ (white * weight).ravel()
             gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
             # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
-            information += (flat * weight.ravel()) @ flat.T
+            weighted = flat * np.sqrt(weight).ravel()
+            information += weighted @ weighted.T
             information += _by_covariance(dM, nu.shape[0])
         return gradient, information, runs, moved
 
@@ -294,11 +303,11 @@ class PredictionError:
     # ---- what the accuracy analysis and the report need --------------------------------------------------------
     def noise_of(self, row: Array) -> Noise:
         """The noise at a row."""
-        return Noise(*(float(value) for value in self.unpack(row)[2]))
+        return Noise(*self.numbers(row)[0].noise.tolist())
 
     def nuisance_of(self, row: Array) -> Nuisance:
         """The records' mean nuisance at a row."""
-        return mean_nuisance(self.unpack(row)[1])
+        return mean_nuisance(Nuisance(*np.array([numbers.nuisance for numbers in self.numbers(row)]).T))
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its one-step predictions."""
@@ -321,11 +330,10 @@ class PredictionError:
         """
         _, _, runs, moved = self._accumulate(row)
         white, sensitivities, rest = [], [], np.zeros((len(self.row), len(self.row)))
-        for run, (d_nu, dS), counted in zip(runs, moved, self.counted, strict=True):
-            Li = np.linalg.inv(np.linalg.cholesky(run.begin.gain.covariance))
-            white.append(run.innovations[counted] @ Li.T)
-            sensitivities.append(d_nu @ Li.T)
-            rest += _by_covariance(Li @ dS @ Li.T, int(counted.sum()))
+        for run, (d_white, dM), counted in zip(runs, moved, self.counted, strict=True):
+            white.append(run.innovations[counted] @ np.linalg.inv(np.linalg.cholesky(run.begin.gain.covariance)).T)
+            sensitivities.append(d_white)
+            rest += _by_covariance(dM, int(counted.sum()))
         return white, sensitivities, rest
 
 

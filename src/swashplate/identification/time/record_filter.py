@@ -12,8 +12,8 @@ multiplies matrices (measured: half the time of carrying every slope through the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial, wraps
+from collections.abc import Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -26,9 +26,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.records import Record
-from swashplate.identification.time.start_states import mean_velocity, slopes, start_state, steady_flight
-from swashplate.models.vehicle import Vehicle
+from swashplate.identification.time.beginning import Begun, FilterNumbers
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 
 STRETCH = 256
@@ -44,43 +42,6 @@ RUNS = 64
 """Predictions that run side by side."""
 
 
-class FilterNumbers(NamedTuple):
-    """What a filter's run depends on, as rows; or directions in which they move, with one more axis in front.
-
-    Attributes:
-        parameters: of the equations.
-        noise, nuisance: in the order of `Noise` and of `Nuisance`.
-        inputs: mean of the commands that reach the vehicle while it starts.
-    """
-
-    parameters: Any
-    noise: Any
-    nuisance: Any
-    inputs: Any
-
-
-class FirstMotion(NamedTuple):
-    """What a record shows of its beginning.
-
-    Attributes:
-        value, rate: of every measured channel at the first sample.
-        velocity: mean ahead, right and down [m/s] that the gain is for (`start_states.mean_velocity`).
-        voltage: of the battery at the first sample, and its mean [V].
-    """
-
-    value: Any
-    rate: Any
-    velocity: Any
-    voltage: Any
-
-
-class Begun(NamedTuple):
-    """The constant gain of a run, and the state that it begins with."""
-
-    gain: FilterGain
-    x: Any
-
-
 class Planes(NamedTuple):
     """The steps of a stretch of samples.
 
@@ -92,61 +53,6 @@ class Planes(NamedTuple):
     place: Any
     following: Any
     slopes: Any
-
-
-def seen_at_start(vehicle: Vehicle, record: Record) -> FirstMotion:
-    """What a record shows of its beginning."""
-    value, rate = slopes(record, np.array([0]))
-    voltage = np.array([record.voltage[0], np.mean(record.voltage)])
-    return FirstMotion(value[0], rate[0], mean_velocity(vehicle, record), voltage)
-
-
-# ---- where it begins -----------------------------------------------------------------------------------------------
-def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
-    """The gain and the start of a run."""
-    still = FilterNumbers(*(np.zeros((_DIRECTIONS, *np.shape(row))) for row in numbers))
-    return _begun(model, numbers, seen, still)[0]  # type: ignore[no-any-return]
-
-
-def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
-    """Slopes of `begun` along directions, which come first."""
-    blocks = [_begun(model, numbers, seen, block)[1] for block in _blocks(directions)]
-    return whole(blocks, len(directions.parameters))  # type: ignore[no-any-return]
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _begun(
-    model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers
-) -> tuple[Begun, Begun]:
-    def begin(moved: FilterNumbers) -> Begun:
-        return traced_begin(model, moved, seen)
-
-    return jax.vmap(lambda d: jax.jvp(begin, (numbers,), (d,)), out_axes=(None, 0))(directions)
-
-
-def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
-    """The gain and the start of a run (traceable)."""
-    parameters = model.vehicle.parameters(*numbers.parameters)
-    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-    first, mean = seen.voltage
-    around, held = steady_flight(model.vehicle, parameters, mean, seen.velocity)
-    gain = model.gain(around, held, parameters, mean, noise, nuisance)
-    x = start_state(
-        model.vehicle,
-        model.output_names,
-        parameters,
-        nuisance,
-        value=seen.value,
-        rate=seen.rate,
-        inputs=numbers.inputs,
-        voltage=first,
-    )
-    return Begun(gain, x)
-
-
-def starting_samples(dt: float) -> int:
-    """How many of a record's first samples the commands are averaged over, for the state that it begins with."""
-    return max(1, round(0.5 / dt))
 
 
 # ---- along the record ----------------------------------------------------------------------------------------------
@@ -255,19 +161,7 @@ def planes(
     return [Planes(rows[0], *_planes(model, *rows, parameters, moves)) for rows in stretches(place, commands, voltage)]
 
 
-def _chosen(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiled for speed; a helicopter's many times as many operations, to be compiled soon."""
-    swiftly = jax.jit(function, static_argnums=0)
-    soon = jax.jit(function, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-
-    @wraps(function)
-    def chosen(model: StochasticModel, *rest: Any) -> Any:
-        return (soon if model.vehicle.traits.heavy else swiftly)(model, *rest)
-
-    return chosen
-
-
-@_chosen
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _planes(
     model: StochasticModel,
     place: Float[jax.Array, "samples place"],
@@ -313,7 +207,7 @@ def along_moved(
             each of the directions that the planes know (directions, k).
     """
     moved, to = (jax.tree.map(_filled, part) for part in (begin_moved, directions))
-    state, moving = first_state(model, begin.x), jax.vmap(lambda x: first_state(model, x))(moved.x)
+    state, moving = first_state(model, begin.x), first_state(model, moved.x)
     commands, further = pushes
     room = steps[0].slopes.shape[-1] - steps[0].place.shape[-1] - commands.shape[-1] - further.shape[-1]
     further = _filled(np.pad(further, ((0, 0), (0, room))))
@@ -327,7 +221,7 @@ def along_moved(
     return np.concatenate(parts, axis=1)[: len(directions.parameters), : len(readings)]
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
 def _along_moved(
     model: StochasticModel,
     here: tuple[FilterState, FilterGain],
@@ -369,13 +263,6 @@ def _filled(rows: Any) -> Any:
     return np.concatenate([rows, np.zeros((rest, *rows.shape[1:]))]) if rest else rows
 
 
-def _blocks(directions: Any) -> Iterator[Any]:
-    """Directions in blocks of `_DIRECTIONS`, the last one filled with zeros."""
-    whole = jax.tree.map(_filled, directions)
-    for first in range(0, len(jax.tree.leaves(whole)[0]), _DIRECTIONS):
-        yield jax.tree.map(lambda rows, at=first: rows[at : at + _DIRECTIONS], whole)
-
-
 def stretches(*rows: Array) -> Iterator[tuple[Array, ...]]:
     """Series cut into stretches of `STRETCH` samples, the last one lengthened by its last sample."""
     n = len(rows[0])
@@ -397,8 +284,9 @@ def whole(parts: Any, n: int) -> Any:
 
 
 def first_state(model: StochasticModel, x: Any) -> FilterState:
-    """A state row with nothing known of the air yet."""
-    return FilterState(x, jnp.zeros(model.n_gusts), jnp.zeros(N_DISTURBANCES))
+    """State rows with nothing known of the air yet."""
+    front = x.shape[:-1]
+    return FilterState(x, np.zeros((*front, model.n_gusts)), np.zeros((*front, N_DISTURBANCES)))
 
 
 def _acting(model: StochasticModel, states: FilterState) -> Array:

@@ -16,11 +16,13 @@ from swashplate.identification.core.records import Record
 from swashplate.models.nesting import leaves
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend
 from swashplate.physics.environment import Environment
 from swashplate.physics.frames import Euler, Vector, body_to_local, local_to_body, turned_about_z
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import CONSTANTS, equations_of, jax_backend, rates_function
-from swashplate.simulation.trim import assemble, trim, unrest
+from swashplate.simulation.steady import assemble, unrest
+from swashplate.simulation.trim import trim
 
 _SPAN = 0.15
 """Seconds of samples on either side from which a first guess of the velocities is taken."""
@@ -78,7 +80,7 @@ def _trim_by_newton(
     voltage: Float[jax.Array, ""],
     velocity: Float[jax.Array, " axes"] | Array,
 ) -> tuple[Any, Any]:
-    """Trim by a fixed count of Newton steps, none of which moves an angle by more than `_STRIDE`.
+    """Trim by a fixed count of Newton steps, none of which moves an angle by more than `STRIDE`.
 
     The steps are not differentiated: one more from where they end, with a constant slope, has the exact derivative
     (the implicit function theorem).
@@ -98,15 +100,15 @@ def _trim_by_newton(
     def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
         value, slope = unrest(equations, reached[0], course, still, frozen)
         step = jnp.linalg.solve(slope, value)
-        return reached[0] - step * jnp.minimum(1.0, _STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
+        return reached[0] - step * jnp.minimum(1.0, STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
 
-    found = jax.lax.fori_loop(0, _STEPS, newton, (start, jnp.eye(start.shape[0])))
+    found = jax.lax.fori_loop(0, STEPS, newton, (start, jnp.eye(start.shape[0])))
     z, slope = jax.lax.stop_gradient(found)
     z = z - jnp.linalg.solve(slope, unrest(equations, z, course, row, p)[0])
     return assemble(equations, z, course)
 
 
-_STEPS, _STRIDE = 40, 0.1
+STEPS, STRIDE = 40, 0.1
 """Newton steps to a trim, and how far each may go [rad]."""
 
 
@@ -134,26 +136,58 @@ def start_state(
     inputs: Float[jax.Array, " inputs"],
     voltage: Float[jax.Array, ""],
 ) -> Any:
-    """A flat state: pose and its rates from the measurement, inner states where they would rest.
-
-    Where these have a closed form it is taken (`Traits.settled`).
+    """`measured_start`, with the inner states where they would rest (traceable).
 
     Args:
-        value, rate: measured channels and their time derivatives at the start.
-        inputs: commands that reach the vehicle around the start, trims included.
+        value, rate, inputs, voltage: as `measured_start` takes them.
     """
-    xp = jax_backend()
+    row = measured_start(
+        vehicle,
+        output_names,
+        parameters,
+        nuisance,
+        value=value,
+        rate=rate,
+        inputs=inputs,
+        voltage=voltage,
+        xp=jax_backend(),
+    )
+    if vehicle.traits.settled is not None:
+        return row
+    return _at_rest_inside(vehicle, row, inputs, parameters, voltage)
+
+
+def measured_start(
+    vehicle: Vehicle,
+    output_names: tuple[str, ...],
+    parameters: Any,
+    nuisance: Nuisance,
+    *,
+    value: Any,
+    rate: Any,
+    inputs: Any,
+    voltage: Any,
+    xp: Backend,
+) -> Any:
+    """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
+
+    Args:
+        parameters, nuisance: numbers, or rows of them for as many states.
+        value, rate: measured channels and their time derivatives at the start.
+        inputs: commands that reach the vehicle around the start, trims included, (..., inputs).
+        xp: the operations.
+    """
     here = {name: value[i] for i, name in enumerate(output_names)}
     moving = {name: rate[i] for i, name in enumerate(output_names)}
     tracked = Euler(here["phi"] - nuisance.level_phi, here["theta"] - nuisance.level_theta, here["psi"])
     attitude = turned_about_z(tracked, -nuisance.level_psi, xp)
     phi, theta = tracked.phi, tracked.theta
     phi_dot, theta_dot, psi_dot = moving["phi"], moving["theta"], moving["psi"]
-    forward = phi_dot - psi_dot * jnp.sin(theta)
-    right = theta_dot * jnp.cos(phi) + psi_dot * jnp.cos(theta) * jnp.sin(phi)
-    c, s = jnp.cos(nuisance.level_psi), jnp.sin(nuisance.level_psi)
+    forward = phi_dot - psi_dot * xp.sin(theta)
+    right = theta_dot * xp.cos(phi) + psi_dot * xp.cos(theta) * xp.sin(phi)
+    c, s = xp.cos(nuisance.level_psi), xp.sin(nuisance.level_psi)
     p, q = c * forward - s * right, s * forward + c * right
-    r = -theta_dot * jnp.sin(phi) + psi_dot * jnp.cos(theta) * jnp.cos(phi)
+    r = -theta_dot * xp.sin(phi) + psi_dot * xp.cos(theta) * xp.cos(phi)
     arm = Vector(nuisance.lever_x, nuisance.lever_y, nuisance.lever_z)
     offset = body_to_local(arm, attitude, xp)
     velocity = local_to_body(Vector(moving["x"], moving["y"], moving["z"]), attitude, xp)
@@ -175,12 +209,10 @@ def start_state(
     settled = vehicle.traits.settled
     if settled is not None:
         known |= settled(
-            vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names)))), parameters, voltage, attitude
+            vehicle.inputs(*(inputs[..., i] for i in range(len(vehicle.input_names)))), parameters, voltage, attitude
         )
-    row = jnp.stack([jnp.asarray(known.get(name, 0.0)) for name in vehicle.state_names])
-    if settled is not None:
-        return row
-    return _at_rest_inside(vehicle, row, inputs, parameters, voltage)
+    entries = [xp.arrays.asarray(known.get(name, 0.0)) for name in vehicle.state_names]
+    return xp.arrays.stack(xp.arrays.broadcast_arrays(*entries), axis=-1)
 
 
 def _at_rest_inside(
@@ -210,17 +242,17 @@ def _at_rest_inside(
     def slope(inner: Float[jax.Array, " inner"]) -> Any:
         found = jax.jacfwd(unrest_inside)(inner, *still)
         # A governor at its stop does not move: without this the slope could not be inverted.
-        return found - _NUDGE * jnp.eye(inner.shape[0])
+        return found - NUDGE * jnp.eye(inner.shape[0])
 
     def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
         here = slope(reached[0])
         return reached[0] - jnp.linalg.solve(here, unrest_inside(reached[0], *still)), here
 
     template = jnp.array(list(leaves(vehicle.state))[body:])
-    found = jax.lax.fori_loop(0, _INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
+    found = jax.lax.fori_loop(0, INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
     inner, last = jax.lax.stop_gradient(found)
     inner = inner - jnp.linalg.solve(last, unrest_inside(inner, row[:body], inputs, parameters, voltage))
     return jnp.concatenate([row[:body], inner])
 
 
-_INNER_STEPS, _NUDGE = 5, 1e-9
+INNER_STEPS, NUDGE = 5, 1e-9

@@ -1,0 +1,290 @@
+"""Where a filter begins, its constant gain, and how both move with its numbers: by NumPy, from slopes of the equations.
+
+The gain takes slopes of the equations, its own slopes take second ones. XLA compiles those for longer than all the rest
+of a filter, and they are wanted at one place only. So what is compiled are the rates and their first slopes; they are
+taken a little to either side, and Riccati's equation gives what follows from them for all directions at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.riccati import steady_gain, steady_gain_moved
+from swashplate.identification.core.records import Record
+from swashplate.identification.time.start_states import (
+    INNER_STEPS,
+    NUDGE,
+    STEPS,
+    STRIDE,
+    mean_velocity,
+    measured_start,
+    slopes,
+    start_state,
+    steady_flight,
+)
+from swashplate.models.nesting import leaves
+from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import ArrayBackend
+from swashplate.physics.rigid_body import RigidBody
+from swashplate.simulation.dynamics import CONSTANTS, rates_and_slopes
+from swashplate.simulation.steady import assemble, unrest_at
+
+_XP = ArrayBackend()
+_BODY = len(RigidBody._fields)
+
+_ASIDE = 2e-3
+"""How far to either side of a row slopes are taken, in scaled units, by four points: exact to 1e-10."""
+
+_IMAGINARY = 1e-30
+"""Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
+
+_POINTS = (1.0, -1.0, 2.0, -2.0)
+_WEIGHTS = (8.0 / 12.0, -8.0 / 12.0, -1.0 / 12.0, 1.0 / 12.0)
+"""The four points of a slope and their weights (Abramowitz and Stegun 1972, 25.3.6)."""
+
+_SETTLED = 1e-14
+"""A Newton step that no longer counts."""
+
+
+class FilterNumbers(NamedTuple):
+    """What a filter's run depends on, as rows; or directions in which they move, with one more axis in front.
+
+    Attributes:
+        parameters: of the equations.
+        noise, nuisance: in the order of `Noise` and of `Nuisance`.
+        inputs: mean of the commands that reach the vehicle while it starts.
+    """
+
+    parameters: Any
+    noise: Any
+    nuisance: Any
+    inputs: Any
+
+
+class FirstMotion(NamedTuple):
+    """What a record shows of its beginning.
+
+    Attributes:
+        value, rate: of every measured channel at the first sample.
+        velocity: mean ahead, right and down [m/s] that the gain is for (`start_states.mean_velocity`).
+        voltage: of the battery at the first sample, and its mean [V].
+    """
+
+    value: Any
+    rate: Any
+    velocity: Any
+    voltage: Any
+
+
+class Begun(NamedTuple):
+    """The constant gain of a run, and the state that it begins with."""
+
+    gain: FilterGain
+    x: Any
+
+
+def seen_at_start(vehicle: Vehicle, record: Record) -> FirstMotion:
+    """What a record shows of its beginning."""
+    value, rate = slopes(record, np.array([0]))
+    voltage = np.array([record.voltage[0], np.mean(record.voltage)])
+    return FirstMotion(value[0], rate[0], mean_velocity(vehicle, record), voltage)
+
+
+def starting_samples(dt: float) -> int:
+    """How many of a record's first samples the commands are averaged over, for the state that it begins with."""
+    return max(1, round(0.5 / dt))
+
+
+def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
+    """The gain and the start of a run."""
+    rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
+    K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, seen)))
+    return Begun(_split(model, K, S), _starts(model, rows, seen)[0])
+
+
+def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
+    """Slopes of `begun` along directions, which come first."""
+    k = len(directions.parameters)
+    rows = FilterNumbers(
+        *(
+            np.concatenate([np.asarray(at)[None], *(at + _ASIDE * point * to for point in _POINTS)])
+            for at, to in zip(numbers, directions, strict=True)
+        )
+    )
+
+    def moved(found: Array) -> Array:
+        return np.tensordot(_WEIGHTS, found[1:].reshape(len(_POINTS), k, *found.shape[1:]), 1) / _ASIDE
+
+    matrices = joined_at(model, rows, seen)
+    here = A, C, Q, R = tuple(part[0] for part in matrices)
+    P = steady_gain(A, C, Q, R)[2]
+    dK, dS = steady_gain_moved(here, P, tuple(map(moved, matrices)))  # type: ignore[arg-type]
+    return Begun(_split(model, dK, dS), moved(_starts(model, rows, seen)))
+
+
+def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
+    """The gain and the start of a run (traceable)."""
+    parameters = model.vehicle.parameters(*numbers.parameters)
+    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+    first, mean = seen.voltage
+    around, held = steady_flight(model.vehicle, parameters, mean, seen.velocity)
+    gain = model.gain(around, held, parameters, mean, noise, nuisance)
+    x = start_state(
+        model.vehicle,
+        model.output_names,
+        parameters,
+        nuisance,
+        value=seen.value,
+        rate=seen.rate,
+        inputs=numbers.inputs,
+        voltage=first,
+    )
+    return Begun(gain, x)
+
+
+def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> tuple[Array, Array, Array, Array]:
+    """A, C, Q and R of the joined system in steady flight, one of each for every row of numbers."""
+    noise, nuisance = Noise(*rows.noise.T), Nuisance(*rows.nuisance.T)
+    mean = seen.voltage[1]
+    decisive = np.concatenate([rows.parameters, rows.noise], axis=1) if model.windy else rows.parameters
+    own = np.flatnonzero(np.any(decisive != decisive[0], axis=1))
+    which = np.zeros(len(decisive), dtype=np.intp)
+    which[own], own = 1 + np.arange(own.size), np.concatenate([[0], own])
+    x, u = _steady(model.vehicle, rows.parameters[own], mean, seen.velocity, model)
+    places = model.places(x, Noise(*rows.noise[own].T), np)
+    taken = [_slopes(model, place, u, rows.parameters[own], mean) for place in places]
+    by_x, by_gust = (np.mean(parts, axis=0)[which] for parts in zip(*taken, strict=True))
+    return model.joined(by_x, by_gust, _measured_slopes(model, x[which], nuisance), noise, np)
+
+
+def _split(model: StochasticModel, K: Array, S: Array) -> FilterGain:
+    n, g = len(model.vehicle.state_names), model.n_gusts
+    return FilterGain(K[..., :n, :], K[..., n : n + g, :], K[..., n + g :, :], S)
+
+
+def _numbers(vehicle: Vehicle, parameters: Array) -> Array:
+    """Parameters and constant surroundings, as the equations take them."""
+    around = environment_of(vehicle, parameters=vehicle.parameters(*parameters.tolist()))
+    return np.array([*parameters, *(getattr(around, name) for name in CONSTANTS)])
+
+
+def _driving(inputs: Array, voltage: float) -> Array:
+    """Inputs in calm air."""
+    return np.array([*inputs, 0.0, 0.0, 0.0, voltage])
+
+
+def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, voltage: float) -> tuple[Array, Array]:
+    """Slopes of the rates by states and disturbances, by row."""
+    vehicle, by_x, by_gust = model.vehicle, [], []
+    pushes = np.eye(len(vehicle.state_names))[:, model.disturbed]
+    wind = len(vehicle.input_names) + np.arange(model.n_gusts - N_DISTURBANCES)
+    for state, u, p in zip(x, inputs, parameters, strict=True):
+        _, by_state, by_driving = rates_and_slopes(model.equations, state, _driving(u, voltage), _numbers(vehicle, p))
+        by_x.append(np.asarray(by_state))
+        by_gust.append(np.concatenate([pushes, np.asarray(by_driving)[:, wind]], axis=1))
+    return np.array(by_x), np.array(by_gust)
+
+
+def _measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
+    """Slopes of the measured channels by the states, by row: by complex steps in the angles, plain in the others."""
+    names = model.vehicle.state_names
+    found = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
+    for place in (names.index(name) for name in ("phi", "theta", "psi")):
+        turned = x + 1j * _IMAGINARY * np.eye(len(names))[place]
+        found[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / _IMAGINARY
+    return found
+
+
+class _ComplexArrays(ArrayBackend):
+    """NumPy's operations, for arrays whose imaginary parts are slopes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.atan2 = self._atan2
+
+    @staticmethod
+    def _atan2(y: Any, x: Any) -> Any:
+        slope = (np.real(x) * np.imag(y) - np.real(y) * np.imag(x)) / (np.real(x) ** 2 + np.real(y) ** 2)
+        return np.arctan2(np.real(y), np.real(x)) + 1j * slope
+
+
+def _steady(
+    vehicle: Vehicle, parameters: Array, voltage: float, velocity: Array, model: StochasticModel
+) -> tuple[Array, Array]:
+    """States and inputs of steady flight by row: in closed form, or by Newton's method at the first row.
+
+    The other rows lie beside the first: one step from there with its slope is right to first order.
+    """
+    if vehicle.traits.hover is not None:
+        states, inputs = vehicle.traits.hover(vehicle.parameters(*parameters.T), voltage, _XP)
+        row = [np.broadcast_to(states.get(name, 0.0), len(parameters)) for name in vehicle.state_names]
+        return np.stack(row, axis=1), np.stack([np.broadcast_to(value, len(parameters)) for value in inputs], axis=1)
+    held, course = dict(vehicle.trim_held), np.array([*velocity, 0.0, 0.0, 0.0])
+    limits = zip(vehicle.input_names, vehicle.input_limits, strict=True)
+    middle = [0.5 * (low + high) for name, (low, high) in limits if name not in held]
+    z = np.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[_BODY:]])
+    calm = np.array([0.0, 0.0, 0.0, voltage])
+
+    def unrest(row: Array) -> tuple[Array, Array]:
+        return unrest_at(model.equations, z, course, calm, _numbers(vehicle, row))
+
+    slope = np.eye(z.size)
+    for _ in range(STEPS):
+        value, slope = unrest(parameters[0])
+        step = _solved(slope, value)
+        most = float(np.max(np.abs(step[: 2 + len(middle)])))
+        z = z - step * min(1.0, STRIDE / max(most, 1e-300))
+        if not np.max(np.abs(step)) > _SETTLED * np.max(np.abs(z)):
+            break
+    each = [z - _solved(slope, unrest(row)[0]) for row in parameters]
+    rows = [assemble(model.equations, one, course, _XP) for one in each]
+    return np.array([state for state, _ in rows]), np.array([inputs for _, inputs in rows])
+
+
+def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> Array:
+    """The states that runs begin with, by row; the inner ones of the rows beside the first as in `_steady`."""
+    vehicle, first = model.vehicle, seen.voltage[0]
+    found = measured_start(
+        vehicle,
+        model.output_names,
+        vehicle.parameters(*rows.parameters.T),
+        Nuisance(*rows.nuisance.T),
+        value=seen.value,
+        rate=seen.rate,
+        inputs=rows.inputs,
+        voltage=first,
+        xp=_XP,
+    )
+    found = np.array(np.broadcast_to(found, (len(rows.parameters), found.shape[-1])))
+    if vehicle.traits.settled is not None:
+        return found
+
+    def unrest(row: int, inner: Array) -> tuple[Array, Array]:
+        state = np.concatenate([found[row, :_BODY], inner])
+        p = _numbers(vehicle, rows.parameters[row])
+        rates, slope, _ = rates_and_slopes(model.equations, state, _driving(rows.inputs[row], first), p)
+        # A governor at its stop does not move: without this the slope could not be inverted.
+        return np.asarray(rates)[_BODY:], np.asarray(slope)[_BODY:, _BODY:] - NUDGE * np.eye(inner.size)
+
+    inner = np.array(list(leaves(vehicle.state))[_BODY:])
+    slope = np.eye(inner.size)
+    for _ in range(INNER_STEPS):
+        value, slope = unrest(0, inner)
+        inner = inner - _solved(slope, value)
+    for row in range(len(found)):
+        found[row, _BODY:] = inner - _solved(slope, unrest(row, inner)[0])
+    return found
+
+
+def _solved(slope: Array, value: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(slope, value))
+    except np.linalg.LinAlgError:  # nothing comes to rest: the run's cost is then infinite
+        return np.full_like(value, np.nan)

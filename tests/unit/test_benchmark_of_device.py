@@ -1,0 +1,49 @@
+"""The batch on whatever JAX computes on, measured: here a processor, with few vehicles; a card has not been at hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import pytest
+from benchmarks import device
+
+import swashplate as sp
+
+
+@partial(jax.jit, static_argnums=0, static_argnames=("keep", "held"))
+def _turning(equations: Any, x0: Any, rows: Any, p: Any, dt: Any, *, keep: int, held: bool) -> Any:
+    """In place of a vehicle: states that turn, compiled in no time."""
+    del equations, rows, p, held
+    end = jax.lax.fori_loop(0, keep, lambda _, x: x + dt * jnp.sin(x), x0)
+    return jnp.stack([x0, end])
+
+
+def test_a_batch_is_measured_on_the_device_that_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device, "trajectories", _turning)
+    vehicle = sp.vehicle("coax")
+    found = device.measure(vehicle, vehicles=4, repeats=1, peaks=(1e12, 1e11))
+    assert (found.device, found.vehicles, found.steps) == (jax.devices()[0].device_kind, 4, 100)
+    assert found.rate > 0.0
+    assert found.close
+    assert found.away > 1e-9, "float32 is not float64"
+    assert not replace(found, away=2e-4).close
+    states = len(vehicle.state_names)
+    assert 2 * states <= found.flops < 4 * states, "a product and a sum of each, XLA counts sines apart"
+    assert 2 * 4 * states <= found.bytes < 16 * 4 * states, "each state is read and written at least once"
+    assert found.flops_share == pytest.approx(found.rate * found.flops / 1e12)
+    assert found.bytes_share == pytest.approx(found.rate * found.bytes / 1e11)
+
+
+@pytest.mark.proof
+def test_a_coax_in_float32_stays_with_float64_for_a_second() -> None:
+    found = device.measure(sp.vehicle("coax"), vehicles=64, repeats=1)
+    assert found.close
+    assert found.flops > 1e3
+
+
+def test_what_is_not_installed_is_said() -> None:
+    assert device.crazyflow(vehicles=2, steps=1) == "crazyflow is not installed: not compared"
