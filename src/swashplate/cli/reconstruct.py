@@ -24,7 +24,7 @@ def reconstruct(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Compare measured rates and accelerations with attitude and position: biases, scale factors, delays, lever arm.
+    """Compare rates and accelerations with attitude and position: biases, scale factors, delays, lever arm, wind.
 
     Each estimate has its bound. Significant errors (three standard errors) are removed from the flight in --out.
     """

@@ -20,6 +20,7 @@ from swashplate.flights.conditioning.attitude import attitude_of, euler_from_qua
 from swashplate.flights.conditioning.derive import GRAVITY
 from swashplate.flights.conditioning.filters import uniform_rate
 from swashplate.flights.conditioning.lever_arm import LeverArm, lever_arm
+from swashplate.flights.conditioning.mean_wind import AIR_SPEED, VELOCITY, mean_wind
 from swashplate.flights.conditioning.regression import regress
 from swashplate.flights.conditioning.time_shift import TimeShift, time_shift
 from swashplate.flights.flight import Flight
@@ -62,6 +63,7 @@ class Reconstruction(Shown):
         scales: per measured channel, dimensionless (0 is perfect).
         time_shifts: of the inputs.
         lever: from the centre of gravity to the tracked point, None where it cannot be told.
+        wind: mean, `wind_north` and `wind_east` [m/s], and in `scales` that of `airspeed`; empty where not told.
         notes: in words what could not be told and why.
     """
 
@@ -70,6 +72,7 @@ class Reconstruction(Shown):
     time_shifts: tuple[TimeShift, ...] = ()
     lever: LeverArm | None = None
     notes: tuple[str, ...] = ()
+    wind: Mapping[str, SensorErrorEstimate] = field(default_factory=dict)
 
     def corrected(self, flight: Flight) -> Flight:
         """The flight with every channel's significant bias and scale factor taken out; its history says so.
@@ -90,17 +93,21 @@ class Reconstruction(Shown):
             "scales": {name: [e.value, e.sigma] for name, e in self.scales.items()},
             "time_shifts": [str(shift) for shift in self.time_shifts],
             "lever": None if self.lever is None else str(self.lever),
+            "wind": {name: [e.value, e.sigma] for name, e in self.wind.items()},
             "notes": list(self.notes),
         }
 
     def __str__(self) -> str:
         rows = []
-        for name, b in self.biases.items():
-            s = self.scales[name]
-            told = [word for word, e in (("bias", b), ("scale", s)) if e.significant]
-            numbers = [f"{b.value:+.4g}", f"{b.sigma:.2g}", f"{s.value:+.4g}", f"{s.sigma:.2g}"]
-            rows.append([name, channel(name).unit, *numbers, " and ".join(told)])
+        for name, s in self.scales.items():
+            b = self.biases.get(name)
+            told = [word for word, e in (("bias", b), ("scale", s)) if e is not None and e.significant]
+            both = [(f"{e.value:+.4g}", f"{e.sigma:.2g}") if e is not None else ("-", "-") for e in (b, s)]
+            rows.append([name, channel(name).unit, *both[0], *both[1], " and ".join(told)])
         lines = [text_table(_HEAD, rows, left=(0, 1, 6)), _LEFT_OUT] if rows else []
+        if self.wind:
+            told = [f"{n.removeprefix('wind_')} {e.value:+.3g} +- {e.sigma:.2g} m/s" for n, e in self.wind.items()]
+            lines.append(f"mean wind, towards {', '.join(told)}; gusts are in the bounds")
         lines += [str(shift) for shift in self.time_shifts]
         if self.lever is not None:
             lines.append(str(self.lever))
@@ -254,6 +261,17 @@ def reconstruct(flight: Flight, *, band: tuple[float, float] = (0.3, 6.0), percu
             b, s = estimate(flight)
             biases.update(b)
             scales.update(s)
+    wind: dict[str, SensorErrorEstimate] = {}
+    if all(name in flight and name not in made for name in (AIR_SPEED, *VELOCITY)):
+        try:
+            values, covariance = mean_wind(flight)
+        except FlightError as error:
+            notes.append(f"wind: {error}")
+        else:
+            sigma = np.sqrt(np.diag(covariance))
+            north, east, scale = (SensorErrorEstimate(float(v), float(s)) for v, s in zip(values, sigma, strict=True))
+            wind = {"wind_north": north, "wind_east": east}
+            scales[AIR_SPEED] = SensorErrorEstimate(scale.value - 1.0, scale.sigma)
     shifts: list[TimeShift] = []
     for source, response in _DRIVES:
         if source in flight and response in flight:
@@ -266,4 +284,4 @@ def reconstruct(flight: Flight, *, band: tuple[float, float] = (0.3, 6.0), percu
         lever = lever_arm(flight, band=band, percussion=percussion)
     except FlightError as error:
         notes.append(f"lever arm: {error}")
-    return Reconstruction(biases, scales, tuple(shifts), lever, tuple(notes))
+    return Reconstruction(biases, scales, tuple(shifts), lever, tuple(notes), wind)
