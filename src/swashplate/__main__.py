@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from typing import NoReturn
+
+from swashplate.threads import ONE_THREAD
 
 
 def main() -> NoReturn:
     """The console script."""
+    os.environ.update(ONE_THREAD)
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
     try:
         from swashplate.cli.app import main as run

@@ -31,6 +31,7 @@ _HINTS = {
     **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "Choose a folder that you may write to."),
     **dict.fromkeys((errno.ENOENT, errno.ENOTDIR), "Check that the folder exists."),
     errno.EISDIR: "It is a folder: choose another name.",
+    errno.ENXIO: "Nobody reads from this pipe: begin the reader first, or name a file.",
 }
 _swept: set[str] = set()
 
@@ -216,8 +217,12 @@ def write_bytes(path: str | os.PathLike[str], content: bytes | memoryview) -> Pa
     """
     target = Path(path)
     if target.exists() and not target.is_file() and not target.is_dir():  # a pipe or a device is never replaced
-        with _named(path), target.open("wb") as stream:
-            stream.write(content)
+        with _named(path):
+            # A pipe that nobody reads from is an error at once: opened to wait, it would wait for ever.
+            descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            os.set_blocking(descriptor, True)
+            with os.fdopen(descriptor, "wb") as stream:
+                stream.write(content)
         return target
     with replaced_when_complete(path) as temporary, _named(path), temporary.open("wb") as stream:
         stream.write(content)
