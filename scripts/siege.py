@@ -49,7 +49,8 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
 
     def besiege_writers(seconds: float) -> list[dict[str, object]]:
         every = {**kills.QUICK, **kills.SLOW}
-        found = kills.besiege(every, kills=chosen.kills, failures=chosen.failures, seconds=seconds, seed=chosen.seed)
+        counts = {"kills": chosen.kills, "failures": chosen.failures}
+        found = kills.besiege(every, **counts, seconds=seconds, seed=chosen.seed, kept=FOLDER / "kills.kept")
         return [one.as_dict() for one in found]
 
     def besiege_disks(seconds: float) -> list[dict[str, object]]:

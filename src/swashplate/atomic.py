@@ -14,6 +14,7 @@ import os
 import secrets
 import shutil
 import stat
+import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -76,7 +77,7 @@ def _new_file(target: Path) -> tuple[Path, int]:
 def _new_folder(place: Path) -> tuple[Path, int]:
     while True:
         path = place / f"{_MARK}{secrets.token_hex(6)}"
-        path.mkdir()
+        path.mkdir(mode=0o700)
         with suppress(FileNotFoundError):
             held = _held(path)
             if held is not None:
@@ -284,6 +285,27 @@ def folder_when_complete(target: str | os.PathLike[str], *, ours: Collection[str
             shutil.rmtree(temporary, ignore_errors=True)
         os.close(held)
         _without_empty(missing)
+
+
+@contextmanager
+def scratch_folder(place: str | os.PathLike[str] | None = None) -> Iterator[Path]:
+    """A folder for what no user asked for, removed after the block; where a process is killed before, by the next one.
+
+    Args:
+        place: the folder it lies in; by default the system's place for temporary files.
+
+    Raises:
+        WriteError: where it cannot be made.
+    """
+    around = Path(tempfile.gettempdir() if place is None else place)
+    with _named(around):
+        sweep(around)
+        folder, held = _new_folder(around)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(held)
 
 
 def _without_empty(folders: list[Path]) -> None:

@@ -274,6 +274,7 @@ def besiege(
     seconds: float,
     seed: int = 0,
     loaded: Sequence[str] = (),
+    kept: Path | None = None,
 ) -> list[Found]:
     """Kills and failing calls, spread evenly over commands and their calls.
 
@@ -283,11 +284,17 @@ def besiege(
         seconds: after which no more is begun.
         seed: of which calls are struck.
         loaded: modules that the program has loaded before it forks; all of them where none is named.
+        kept: where the counts are kept after each round, so that a stopped campaign goes on.
     """
-    chance = random.Random(seed)
+    first = 0
     killed, failed = Counter[str](), Counter[str]()
     bad_kills: list[str] = []
     bad_failures: list[str] = []
+    if kept is not None and kept.exists():
+        before = json.loads(kept.read_text(encoding="utf-8"))
+        first, bad_kills, bad_failures = before["round"], before["bad_kills"], before["bad_failures"]
+        killed.update(before["killed"])
+        failed.update(before["failed"])
     with tempfile.TemporaryDirectory(prefix="siege-") as name:
         folder = Path(name)
         inputs = folder / "inputs"
@@ -301,7 +308,8 @@ def besiege(
             for name, command in commands.items():
                 cases.append(Case(siege, name, command, inputs))
                 progress(f"{name}: {cases[-1].calls} calls")
-            for k in range(max(kills, failures)):
+            for k in range(first, max(kills, failures)):
+                chance = random.Random(f"{seed} {k}")
                 for case in cases:
                     if time.monotonic() - begin > seconds:
                         break
@@ -319,6 +327,13 @@ def besiege(
                     progress(
                         f"{killed.total()} kills, {failed.total()} failures, {len(bad_kills) + len(bad_failures)} bad"
                     )
+                else:
+                    if kept is not None:
+                        now = {"round": k + 1, "killed": killed, "failed": failed}
+                        now |= {"bad_kills": bad_kills, "bad_failures": bad_failures}
+                        kept.write_text(json.dumps(now), encoding="utf-8")
+                    continue
+                break
         finally:
             siege.close()
     return [

@@ -145,7 +145,11 @@ def test_an_odd_path_is_refused_or_counted(code: int, said: str, seconds: float,
 
 
 def test_packets_in_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    some = {name: make for name, make in packets.LINKS.items() if name not in ("ArduPilot, strangers", "PX4")}
+    some = {
+        name: make
+        for name, make in packets.LINKS.items()
+        if name not in ("ArduPilot, strangers", "ArduPilot, a second autopilot", "PX4")
+    }
     monkeypatch.setattr(packets, "LINKS", some)
     found = packets.besiege(packets=packets._EVERY, seconds=60.0)
     assert found.bad == []

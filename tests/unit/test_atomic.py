@@ -256,3 +256,15 @@ def test_an_interrupt_while_swapping_finishes_the_swap(tmp_path: Path, monkeypat
         write()
     assert _results(tmp_path) == dict.fromkeys("abc", "new")
     assert _litter(tmp_path) == []
+
+
+def test_a_scratch_folder_goes_and_takes_those_of_dead_processes_along(tmp_path: Path) -> None:
+    left = tmp_path / ".swash-0123"
+    left.mkdir()
+    (left / "a.c").touch()
+    with atomic.scratch_folder(tmp_path) as folder:
+        (folder / "b.c").touch()
+        atomic.sweep(tmp_path)  # another process's: this one is held
+        assert [entry.name for entry in tmp_path.iterdir()] == [folder.name]
+        assert folder.stat().st_mode & 0o777 == 0o700
+    assert not any(tmp_path.iterdir())
