@@ -14,6 +14,7 @@ import os
 import secrets
 import shutil
 import stat
+import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,6 +32,7 @@ _HINTS = {
     **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "Choose a folder that you may write to."),
     **dict.fromkeys((errno.ENOENT, errno.ENOTDIR), "Check that the folder exists."),
     errno.EISDIR: "It is a folder: choose another name.",
+    errno.ENXIO: "Nobody reads from this pipe: begin the reader first, or name a file.",
 }
 _swept: set[str] = set()
 
@@ -75,7 +77,7 @@ def _new_file(target: Path) -> tuple[Path, int]:
 def _new_folder(place: Path) -> tuple[Path, int]:
     while True:
         path = place / f"{_MARK}{secrets.token_hex(6)}"
-        path.mkdir()
+        path.mkdir(mode=0o700)
         with suppress(FileNotFoundError):
             held = _held(path)
             if held is not None:
@@ -216,8 +218,12 @@ def write_bytes(path: str | os.PathLike[str], content: bytes | memoryview) -> Pa
     """
     target = Path(path)
     if target.exists() and not target.is_file() and not target.is_dir():  # a pipe or a device is never replaced
-        with _named(path), target.open("wb") as stream:
-            stream.write(content)
+        with _named(path):
+            # A pipe that nobody reads from is an error at once: opened to wait, it would wait for ever.
+            descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            os.set_blocking(descriptor, True)
+            with os.fdopen(descriptor, "wb") as stream:
+                stream.write(content)
         return target
     with replaced_when_complete(path) as temporary, _named(path), temporary.open("wb") as stream:
         stream.write(content)
@@ -279,6 +285,27 @@ def folder_when_complete(target: str | os.PathLike[str], *, ours: Collection[str
             shutil.rmtree(temporary, ignore_errors=True)
         os.close(held)
         _without_empty(missing)
+
+
+@contextmanager
+def scratch_folder(place: str | os.PathLike[str] | None = None) -> Iterator[Path]:
+    """A folder for what no user asked for, removed after the block; where a process is killed before, by the next one.
+
+    Args:
+        place: the folder it lies in; by default the system's place for temporary files.
+
+    Raises:
+        WriteError: where it cannot be made.
+    """
+    around = Path(tempfile.gettempdir() if place is None else place)
+    with _named(around):
+        sweep(around)
+        folder, held = _new_folder(around)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(held)
 
 
 def _without_empty(folders: list[Path]) -> None:

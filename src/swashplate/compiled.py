@@ -6,15 +6,17 @@ import ctypes
 import hashlib
 import os
 import subprocess
-import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
 import platformdirs
 
+from swashplate.atomic import scratch_folder
 from swashplate.compiler import compiler, shared_library
+from swashplate.errors import WriteError
 
 NATIVE = "-march=native"
 
@@ -40,16 +42,16 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
             return ctypes.CDLL(str(found))
         except OSError:  # damaged: made anew
             found.unlink(missing_ok=True)
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        keeping = tempfile.TemporaryDirectory(dir=folder)
-    except OSError:  # nothing can be kept
-        keeping = tempfile.TemporaryDirectory()
-    with keeping as made:
-        text, place = Path(made) / "body.c", Path(made) / "body.so"
+    with ExitStack() as keeping:
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            made = keeping.enter_context(scratch_folder(folder))
+        except (OSError, WriteError):  # nothing can be kept
+            made = keeping.enter_context(scratch_folder())
+        text, place = made / "body.c", made / "body.so"
         text.write_text(source, encoding="utf-8")
         shared_library([text], place, options=options)
-        if Path(made).parent == folder:
+        if made.parent == folder:
             os.replace(place, found)
             place = found
         return ctypes.CDLL(str(place))  # what is loaded stays when its file goes

@@ -34,3 +34,11 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
 def read_text(path: str | os.PathLike[str], *, most: int = 32 << 20) -> str:
     """A text file (UTF-8, with or without a byte order mark). Raises as `read_bytes`, and UnicodeDecodeError."""
     return read_bytes(Path(path), most=most).decode("utf-8-sig")
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether there is such a file; False where the system will not even look (a name too long, no permission)."""
+    try:
+        return Path(path).is_file()
+    except OSError:
+        return False

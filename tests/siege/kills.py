@@ -121,13 +121,22 @@ class Siege:
         )
 
     def run(
-        self, arguments: list[str], *, mode: int = COUNT, stop: int = 0, error: int = 0, stopped: bool = False
+        self,
+        arguments: list[str],
+        *,
+        mode: int = COUNT,
+        stop: int = 0,
+        error: int = 0,
+        stopped: bool = False,
+        unprivileged: bool = False,
+        seconds: float = _SECONDS,
     ) -> tuple[dict[str, Any], str]:
-        """How a command ended, and what it said; `stopped`: from where it first wants to write, in a fork."""
+        """How a command ended, and what it said; `stopped`: from where it first wants to write, in a fork.
+        `unprivileged`: without the superuser's rights. `seconds`: of processor time, after which it is ended."""
         log = self.folder / "said.txt"
         asked = {"arguments": arguments, "folder": str(self.folder / "cases"), "mode": mode, "stop": stop}
-        asked |= {"error": error, "log": str(log), "seconds": _SECONDS, "cwd": str(self.folder)}
-        asked |= {"stopped": stopped}
+        asked |= {"error": error, "log": str(log), "seconds": seconds, "cwd": str(self.folder)}
+        asked |= {"stopped": stopped, "unprivileged": unprivileged}
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps(asked) + "\n")
@@ -173,22 +182,22 @@ class Case:
         self._siege, self.name = siege, name
         self.out = siege.folder / "cases" / "area" / "OUT"
         _put({"mine.txt": b"mine"}, self.out)
-        self._new = command.asked(command.new, inputs=inputs, out=self.out)
+        self.asked = command.asked(command.new, inputs=inputs, out=self.out)
         self._well(command.asked(command.old, inputs=inputs, out=self.out))
         self.old = _files(self.out)
-        told = self._well(self._new)
+        told = self._well(self.asked)
         self.new, self.calls = _files(self.out), told["calls"]
-        self._well(self._new)
+        self._well(self.asked)
         again = _files(self.out)
         # Reports say how many seconds a fit took: two runs may agree by chance.
         self.varies = {name for name in self.new if again.get(name) != self.new[name] or name.endswith(".html")}
         # What a command computes is the same whatever is struck: where it can, it is computed once.
-        self._stopped = self._can_stop()
+        self.stopped = self._can_stop()
         assert self.old != self.new, name
 
     def _can_stop(self) -> bool:
         _put(self.old, self.out)
-        told, _ = self._siege.run(self._new, stopped=True)
+        told, _ = self._siege.run(self.asked, stopped=True)
         if told["code"] != 0 or _files(self.out).keys() != self.new.keys() or told["calls"] < 1:
             return False
         self.calls = told["calls"]
@@ -203,7 +212,7 @@ class Case:
     def struck(self, *, mode: int, stop: int, error: int = 0) -> list[str]:
         """What is wrong after a kill or a failing call, and after the next run."""
         _put(self.old, self.out)
-        told, said = self._siege.run(self._new, mode=mode, stop=stop, error=error, stopped=self._stopped)
+        told, said = self._siege.run(self.asked, mode=mode, stop=stop, error=error, stopped=self.stopped)
         killed = told["code"] == -signal.SIGKILL
         wrong = []
         if told["hang"]:
@@ -214,13 +223,13 @@ class Case:
             wrong.append(f"says {said.strip()[-200:]!r}")
         elif mode != FAIL and not killed and told["code"] != 0:
             wrong.append(f"ends with {told['code']}: {said.strip()[-200:]!r}")
-        wrong += self._judged(_files(self.out), complete=told["code"] == 0)
+        wrong += self.judged(_files(self.out), complete=told["code"] == 0)
         if mode == FAIL and told["code"] == 2 and error not in (errno.EROFS, errno.EACCES, errno.EIO):
             wrong += [f"leaves {name}" for name in _litter(self.out, self._siege.temporary)]
-        after, said = self._siege.run(self._new, stopped=self._stopped)
+        after, said = self._siege.run(self.asked, stopped=self.stopped)
         if after["code"] != 0:
             wrong.append(f"the next run ends with {after['code']}: {said.strip()[-200:]!r}")
-        elif problems := self._judged(_files(self.out), complete=True):
+        elif problems := self.judged(_files(self.out), complete=True):
             wrong += [f"after the next run: {problem}" for problem in problems]
         wrong += [f"after the next run {name} is left" for name in _litter(self.out, self._siege.temporary)]
         self._emptied()
@@ -236,7 +245,7 @@ class Case:
             else:
                 path.unlink()
 
-    def _judged(self, found: Files, *, complete: bool) -> list[str]:
+    def judged(self, found: Files, *, complete: bool) -> list[str]:
         """What of the files is neither the old result nor the new one."""
         wrong, sides = [], set()
         if found.pop("mine.txt", None) != b"mine":
@@ -265,6 +274,7 @@ def besiege(
     seconds: float,
     seed: int = 0,
     loaded: Sequence[str] = (),
+    kept: Path | None = None,
 ) -> list[Found]:
     """Kills and failing calls, spread evenly over commands and their calls.
 
@@ -274,11 +284,17 @@ def besiege(
         seconds: after which no more is begun.
         seed: of which calls are struck.
         loaded: modules that the program has loaded before it forks; all of them where none is named.
+        kept: where the counts are kept after each round, so that a stopped campaign goes on.
     """
-    chance = random.Random(seed)
+    first = 0
     killed, failed = Counter[str](), Counter[str]()
     bad_kills: list[str] = []
     bad_failures: list[str] = []
+    if kept is not None and kept.exists():
+        before = json.loads(kept.read_text(encoding="utf-8"))
+        first, bad_kills, bad_failures = before["round"], before["bad_kills"], before["bad_failures"]
+        killed.update(before["killed"])
+        failed.update(before["failed"])
     with tempfile.TemporaryDirectory(prefix="siege-") as name:
         folder = Path(name)
         inputs = folder / "inputs"
@@ -292,7 +308,8 @@ def besiege(
             for name, command in commands.items():
                 cases.append(Case(siege, name, command, inputs))
                 progress(f"{name}: {cases[-1].calls} calls")
-            for k in range(max(kills, failures)):
+            for k in range(first, max(kills, failures)):
+                chance = random.Random(f"{seed} {k}")
                 for case in cases:
                     if time.monotonic() - begin > seconds:
                         break
@@ -310,6 +327,13 @@ def besiege(
                     progress(
                         f"{killed.total()} kills, {failed.total()} failures, {len(bad_kills) + len(bad_failures)} bad"
                     )
+                else:
+                    if kept is not None:
+                        now = {"round": k + 1, "killed": killed, "failed": failed}
+                        now |= {"bad_kills": bad_kills, "bad_failures": bad_failures}
+                        kept.write_text(json.dumps(now), encoding="utf-8")
+                    continue
+                break
         finally:
             siege.close()
     return [

@@ -75,6 +75,35 @@ def _ardupilot() -> _Link:
     return _Link(take, whole, look)
 
 
+def _second_autopilot() -> _Link:
+    """Whole packets of other autopilots between the owner's: on another port and another machine, with its own counts,
+    the ones before and behind, and those of a start. The owner pauses for up to 1.3 s and starts anew now and then."""
+    besieged, calm = (bench("raptor50", engine=QUICK) for _ in range(2))
+    count, others, wrong = [-1], (("127.0.0.1", besieged.sender[1] + 1), ("10.0.0.9", besieged.sender[1])), [""]
+
+    def own(chance: random.Random) -> None:
+        count[0] = 0 if chance.random() < 0.002 else count[0] + 1
+        pulses = [pulse and pulse + chance.randrange(-5, 6) for pulse in _RUNNING]
+        packet = servo_packet(400, count[0], pulses)
+        answers = [at.session.handle(packet, at.sender, besieged.now) for at in (besieged, calm)]
+        if answers[0] != answers[1] or answers[0] is None:
+            wrong[0] = "the flight is not the one that nobody disturbed"
+
+    def take(data: bytes, chance: random.Random) -> None:
+        besieged.now += 1.3 if chance.random() < 0.001 else chance.choice((1e-4, 1e-3, 2.5e-3, 0.02))
+        if count[0] < 0 or chance.random() < 0.5:
+            own(chance)
+            return
+        number = chance.choice((count[0], count[0] + 1, max(count[0] - 1, 0), 0, 1, 100, 2**32 - 1))
+        packet = servo_packet(400, number, _RUNNING, outputs=chance.choice((16, 32)))
+        if besieged.session.handle(packet, chance.choice(others), besieged.now) is not None:
+            wrong[0] = "another autopilot was answered"
+        if chance.random() < 0.001:
+            own(chance)
+
+    return _Link(take, (servo_packet(400, 0, _RUNNING),), lambda: wrong[0])
+
+
 def _own_ardupilot() -> _Link:
     """Damaged packets of the autopilot itself: what is accepted may fly, and the numbers stay numbers."""
     at = bench("raptor50", engine=QUICK)
@@ -174,6 +203,7 @@ def _page() -> _Link:
 
 LINKS: dict[str, Callable[[], _Link]] = {
     "ArduPilot, strangers": _ardupilot,
+    "ArduPilot, a second autopilot": _second_autopilot,
     "ArduPilot, the owner": _own_ardupilot,
     "PX4": _px4,
     "parameters over MAVLink": _parameters,
@@ -208,6 +238,7 @@ def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
     text = (
         f"{total:,} packets: cut, doubled, bits turned, counts, rates, lengths and numbers odd ({len(ODD_NUMBERS)} of "
         f"them), pieces of other packets, and noise. Every {_EVERY} packets the link has to fly on: under strangers to "
-        "the bit as a link that nobody disturbs, otherwise from a restart, in finite numbers."
+        "the bit as a link that nobody disturbs (so also beside other autopilots whose packets are whole), otherwise "
+        "from a restart, in finite numbers."
     )
     return Found("Siege: packets and messages", text, ["link", "packets", "a second", "wrong"], rows, bad)

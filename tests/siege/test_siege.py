@@ -13,7 +13,7 @@ import pytest
 
 from swashplate.errors import FlightError
 
-from . import files, kills, packets, pages, worker
+from . import files, kills, packets, pages, places, worker
 from .files import Files
 from .kills import Case
 from .targets import TARGETS, Target
@@ -102,9 +102,9 @@ def _case(old: dict[str, bytes], new: dict[str, bytes]) -> Case:
 )
 def test_old_or_new_and_nothing_between(found: dict[str, bytes], complete: bool, problem: str) -> None:
     case = _case({"a": b"old", "b": b"old"}, {"a": b"new", "b": b"new"})
-    wrong = case._judged({**found, "mine.txt": b"mine"}, complete=complete)
+    wrong = case.judged({**found, "mine.txt": b"mine"}, complete=complete)
     assert [problem in words for words in wrong] == ([True] if problem else [])
-    assert "own file is gone" in case._judged(found, complete=complete)[0]
+    assert "own file is gone" in case.judged(found, complete=complete)[0]
 
 
 def test_kills_and_full_disks_in_short() -> None:
@@ -117,8 +117,39 @@ def test_kills_and_full_disks_in_short() -> None:
     assert [one.rows[0][2] for one in found] == [2, 2]
 
 
+def test_odd_paths_in_short() -> None:
+    loaded = ("swashplate.cli.app", "swashplate.flights.maneuvers.planned")
+    chosen = ("nothing", "pipe that nobody writes into", "folder", "no permission")
+    found = places.besiege(commands=("maneuver",), places=chosen, loaded=loaded)
+    assert found.bad == []
+    assert found.rows[-1][1] == len(chosen)
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "seconds", "problem"),
+    [
+        (2, "Error: no such file.", 1.0, ""),
+        (1, "Error: KeyError", 1.0, "ends with 1"),
+        (0, "", 1.0, "ends with 0"),
+        (2, "Traceback", 1.0, "says"),
+        (2, "Error: no.", 11.0, "takes 11.0 s"),
+    ],
+)
+def test_an_odd_path_is_refused_or_counted(code: int, said: str, seconds: float, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_bytes(b"mine")
+    told = {"code": code, "seconds": seconds, "hang": False}
+    wrong = places._wrong(told, said, "nothing", tmp_path, reads=True)
+    assert [words.startswith(problem) for words in wrong] == ([True] if problem else [])
+    (tmp_path / ".swash-abc").touch()
+    assert "leaves .swash-abc" in places._wrong(told, said, "nothing", tmp_path, reads=True)
+
+
 def test_packets_in_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    some = {name: make for name, make in packets.LINKS.items() if name not in ("ArduPilot, strangers", "PX4")}
+    some = {
+        name: make
+        for name, make in packets.LINKS.items()
+        if name not in ("ArduPilot, strangers", "ArduPilot, a second autopilot", "PX4")
+    }
     monkeypatch.setattr(packets, "LINKS", some)
     found = packets.besiege(packets=packets._EVERY, seconds=60.0)
     assert found.bad == []

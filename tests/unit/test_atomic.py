@@ -79,6 +79,16 @@ def test_a_device_is_written_to_and_not_replaced() -> None:
     assert os.path.samestat(before, os.stat("/dev/full"))
 
 
+def test_a_pipe_that_nobody_reads_from_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(WriteError, match="Nobody reads from this pipe"):
+        atomic.write_bytes(tmp_path / "pipe", b"text")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    atomic.write_bytes(tmp_path / "pipe", b"text")
+    assert os.read(reader, 10) == b"text"
+    os.close(reader)
+
+
 @pytest.mark.parametrize(("number", "advice"), [(errno.ENOSPC, "space"), (errno.EDQUOT, "space"), (errno.EROFS, "may")])
 @pytest.mark.parametrize("call", ["open", "fsync", "replace"])
 def test_trouble_at_every_call_is_named_and_leaves_the_old_file(
@@ -246,3 +256,15 @@ def test_an_interrupt_while_swapping_finishes_the_swap(tmp_path: Path, monkeypat
         write()
     assert _results(tmp_path) == dict.fromkeys("abc", "new")
     assert _litter(tmp_path) == []
+
+
+def test_a_scratch_folder_goes_and_takes_those_of_dead_processes_along(tmp_path: Path) -> None:
+    left = tmp_path / ".swash-0123"
+    left.mkdir()
+    (left / "a.c").touch()
+    with atomic.scratch_folder(tmp_path) as folder:
+        (folder / "b.c").touch()
+        atomic.sweep(tmp_path)  # another process's: this one is held
+        assert [entry.name for entry in tmp_path.iterdir()] == [folder.name]
+        assert folder.stat().st_mode & 0o777 == 0o700
+    assert not any(tmp_path.iterdir())

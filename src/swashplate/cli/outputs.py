@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,11 +53,11 @@ def folder_when_complete(target: Path | None, *, ours: Collection[str]) -> Itera
         return
     if ours and is_file(target, ours):
         atomic.make_folder(target.parent)
-        with tempfile.TemporaryDirectory() as made:
-            yield Path(made)
+        with atomic.scratch_folder() as made:
+            yield made
             chosen = next(name for name in ours if Path(name).suffix == target.suffix)
-            if (Path(made) / chosen).is_file():
-                atomic.write_bytes(target, (Path(made) / chosen).read_bytes())
+            if (made / chosen).is_file():
+                atomic.write_bytes(target, (made / chosen).read_bytes())
         return
     with atomic.folder_when_complete(target, ours=ours) as folder:
         yield folder

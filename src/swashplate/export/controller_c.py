@@ -7,13 +7,12 @@ sin, cos, sqrt and atan2 are called. Needs the extra `export`.
 from __future__ import annotations
 
 import re
-import tempfile
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from swashplate.atomic import write_text
+from swashplate.atomic import scratch_folder, write_text
 from swashplate.control.kinds import TracedStep, kind_of
 from swashplate.extras import library
 from swashplate.simulation.closed_loop import REFERENCES, Controller
@@ -80,10 +79,10 @@ def printed_function(function: Any, precision: Precision) -> tuple[str, dict[str
     """A CasADi function as C without its heading, and calls of the C library by name, as they stand in it."""
     import casadi
 
-    with tempfile.TemporaryDirectory() as folder:
+    with scratch_folder() as folder:
         made = casadi.CodeGenerator("traced.c", {"casadi_real": precision, "casadi_int": "int"})
         made.add(function)
-        printed = Path(made.generate(folder + "/")).read_text(encoding="utf-8")
+        printed = Path(made.generate(f"{folder}/")).read_text(encoding="utf-8")
     calls = {name: len(re.findall(rf"(?<![\w]){name}\(", printed)) for name in ("sin", "cos", "sqrt", "atan2")}
     for name, own in _OWN.items():
         printed = printed.replace(f"return {name};", f"return {own};")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import io
 import platform
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 
+from swashplate.atomic import scratch_folder
 from swashplate.compiler import compiler, shared_library
 from swashplate.export.fmu_description import description
 from swashplate.export.model_c import model_code
@@ -111,8 +110,7 @@ def _delays(model: Traced) -> list[str]:
 
 
 def _binary(texts: Mapping[str, str], sources: tuple[str, ...]) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        here = Path(folder)
+    with scratch_folder() as here:
         for name, text in texts.items():
             (here / name).write_text(text, encoding="utf-8")
         # Hidden: two FMUs of one name in one process must not see each other's functions.

@@ -31,7 +31,9 @@ _KNOWN: dict[str, tuple[float, dict[str, int]]] = {
     "%": (1e-2, {}),
     "1": (1.0, {}),
 }
-_TOKEN = re.compile(r"\s*([A-Za-z]+|%|1|\^-?\d+|/|\(|\)|\*)\s*")
+_TOKEN = re.compile(r"\s*([A-Za-z]+|%|1|\^-?\d|/|\(|\)|\*)\s*")
+
+_LONGEST = 100  # characters of a unit
 
 
 def base_units(unit: str) -> tuple[float, dict[str, int]] | None:
@@ -39,7 +41,7 @@ def base_units(unit: str) -> tuple[float, dict[str, int]] | None:
 
     A slash divides by what comes next, a single unit or a pair of brackets.
     """
-    tokens = _TOKEN.findall(unit)
+    tokens = _TOKEN.findall(unit) if len(unit) <= _LONGEST else []
     if not tokens or "".join(tokens) != re.sub(r"\s", "", unit):
         return None
     rest = iter([*tokens, ")"])
@@ -47,7 +49,7 @@ def base_units(unit: str) -> tuple[float, dict[str, int]] | None:
         factor, powers = _product(rest)
     except (KeyError, StopIteration):
         return None
-    if next(rest, None) is not None:  # a bracket that closes nothing
+    if next(rest, None) is not None or not math.isfinite(factor):  # a bracket that closes nothing
         return None
     return factor, {name: power for name, power in powers.items() if power}
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FlightError
+from swashplate.threads import ONE_THREAD
 
 _LAST = {"foreign", "failed", "refused"}
 
@@ -115,7 +116,7 @@ class _Process:
         if self._running is None or self._running.poll() is not None:
             self._close()
             code = f"import sys; sys.path[:] = {sys.path!r}; from swashplate.flights.hdf5_process import main; main()"
-            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+            environment = {**os.environ, **ONE_THREAD}
             try:
                 self._running = subprocess.Popen(
                     [sys.executable, "-c", code],

@@ -11,6 +11,7 @@ import numpy as np
 
 from swashplate import documents
 from swashplate.errors import LinkError
+from swashplate.files import is_file
 from swashplate.links import swashplates
 from swashplate.links.mapping_table import MappingTable
 from swashplate.links.servo import CENTRE, HALF
@@ -170,7 +171,7 @@ def _read(name_or_file: str | Path) -> tuple[str, str]:
         found = resources.files("swashplate.links") / "mappings" / f"{name_or_file}.toml"
         return found.read_text(encoding="utf-8"), str(name_or_file)
     path = Path(name_or_file)
-    if not path.is_file():
+    if not is_file(path):
         raise LinkError(
             "is neither the name of a servo mapping nor a file.",
             where=path,

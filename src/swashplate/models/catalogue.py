@@ -9,6 +9,7 @@ from pathlib import Path
 
 from swashplate import documents
 from swashplate.errors import CardError, SwashError
+from swashplate.files import is_file
 from swashplate.models.card import Card, packaged_cards, read_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.composition import is_composed
@@ -70,7 +71,7 @@ def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:
     packaged = packaged_cards()
     if text in packaged:
         card = packaged[text]
-    elif Path(text).is_file():
+    elif is_file(text):
         card = _card_of(Path(text))
     elif text in EQUATIONS:
         card = _card_beside(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -191,3 +192,8 @@ def test_targets_of_the_tasks() -> None:
 def test_what_is_refused(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(SwashError, match=said):
         HelicopterEnv(**arguments)
+
+
+def test_an_episode_ends_before_roll_pitch_and_yaw_lose_the_attitude() -> None:
+    with pytest.raises(SwashError, match=r"hover: lean_limit: is 85 degrees, expected at most 80"):
+        dataclasses.replace(hover(), lean_limit=np.radians(85.0))

@@ -20,6 +20,7 @@ from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask, Portion, made_tasks
 from swashplate.api.campaigns.worker import work
 from swashplate.errors import CampaignError
+from swashplate.files import is_file
 
 _HINT = "See `swash campaign run --help` and docs/howto/campaigns.md."
 _LARGEST = 64 << 20
@@ -177,7 +178,7 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
     files = {}
     for entry, name, or_name in kind.files(settings):
         path = place / name
-        if path.is_file():
+        if is_file(path):
             files[name] = path.read_bytes()
         elif not or_name:
             raise CampaignError(

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from swashplate.errors import CampaignError
 from swashplate.extras import version_of
+from swashplate.threads import ONE_THREAD
 
 _LIBRARIES = ("swashplate", "jax", "jaxlib", "numpy", "scipy")
 _OURS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1000000"
@@ -31,10 +32,9 @@ def worker_environment() -> dict[str, str]:
     One thread for every library, and XLA's flags as the client has them: they may change the last bits of a result.
     """
     flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     cache_folder = os.environ.get("JAX_COMPILATION_CACHE_DIR")
     shared = {} if cache_folder is None else {"JAX_COMPILATION_CACHE_DIR": cache_folder}
-    return {**threads, "XLA_FLAGS": " ".join([*flags, _ONE_THREAD]), "TF_CPP_MIN_LOG_LEVEL": "3", **shared}
+    return {**ONE_THREAD, "XLA_FLAGS": " ".join([*flags, _ONE_THREAD]), "TF_CPP_MIN_LOG_LEVEL": "3", **shared}
 
 
 def program() -> dict[str, str]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
-import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from swashplate import documents
 from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignKind, CampaignSettings
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
+from swashplate.atomic import scratch_folder
 from swashplate.errors import CampaignError
 
 ALWAYS = ("number", "seed")
@@ -75,13 +77,15 @@ def chosen(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 
 @lru_cache(maxsize=1)
-def _home() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="swashplate-campaign-")
+def _home() -> Path:
+    kept = ExitStack()
+    atexit.register(kept.close)
+    return kept.enter_context(scratch_folder())
 
 
 def _put(name: str, content: bytes) -> Path:
     """A file of a task on this machine, under its own last name; written once."""
-    path = Path(_home().name) / hashlib.sha256(name.encode() + b"\0" + content).hexdigest()[:16] / Path(name).name
+    path = _home() / hashlib.sha256(name.encode() + b"\0" + content).hexdigest()[:16] / Path(name).name
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)

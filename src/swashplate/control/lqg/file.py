@@ -26,6 +26,8 @@ from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.trim import Trim
 
 SCHEMA = 1
+_LATEST = 1000
+"""Steps by which a reading or an input may be late: each is a state of the observer."""
 
 
 class SensorEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -122,6 +124,14 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
             raise ControllerError(f"'{sensor.kind}' is no sensor with these sigmas.", where=path, channel="sensors")
     if not rate > 0.0 or not all(np.all(np.isfinite(part)) for part in parts.values()):
         raise ControllerError("holds numbers that are not finite, or no positive rate.", where=path)
+    if not all(s.rate > 1e-6 * rate and 0.0 <= s.delay * rate <= _LATEST for s in sensors):
+        raise ControllerError(
+            f"a rate is not above zero, or a delay is not within 0 to {_LATEST} steps of the controller.",
+            where=path,
+            channel="sensors",
+        )
+    if not all(0.0 <= wait * rate <= _LATEST for wait in waits):
+        raise ControllerError(f"is not within 0 to {_LATEST} steps of the controller.", where=path, channel="delays")
     plan = ObserverPlan(equations_of(vehicle), sensors, rate, tuple(round(wait * rate) for wait in waits)).checked()
     if steady is not None:
         expected = (len(plan.names), len(plan.channels))

@@ -47,12 +47,11 @@ def load_mapping(mapping: str | os.PathLike[str] | Mapping[str, Any] | None) -> 
         return {}
     if isinstance(mapping, Mapping):
         return mapping
-    return documents.read_document(
-        Path(mapping),
-        form="toml",
-        error=FlightError,
-        hint="Correct the mapping file; `docs/howto/your-own-csv.md` has one to copy.",
-    )
+    hint = "Correct the mapping file; `docs/howto/your-own-csv.md` has one to copy."
+    found = documents.read_document(Path(mapping), form="toml", error=FlightError, hint=hint)
+    if not found:
+        raise FlightError("says nothing.", where=Path(mapping), hint=hint)
+    return found
 
 
 def with_mocap_table(options: Options) -> Options:

@@ -135,7 +135,9 @@ def read(source: Source, options: Options) -> Flight:
         )
     commands = {name: np.asarray(d[name].values) for d in streams.values() for name in _MIXER if name in d}
     notes += checks.constant_notes(commands)
-    counts = {f"{d.name}/{d.multi_id}" if d.multi_id else d.name: len(d.data["timestamp"]) for d in log.data_list}
+    counts = {
+        f"{d.name}/{d.multi_id}" if d.multi_id else d.name: len(d.data.get("timestamp", ())) for d in log.data_list
+    }
     notes += clocked.unread(counts, [topic.name for topic in _TOPICS])
     info = log.msg_info_dict
     provenance = source.provenance(

@@ -17,6 +17,9 @@ TARGET = ("north", "east", "down", "v_north", "v_east", "v_down", "heading", "ro
 ERRORS = ("level", "height", "velocity", "attitude", "heading")
 """What the reward counts, in the order of `Task.scales`."""
 
+STEEPEST = float(np.radians(80.0))
+"""Largest angle that ends an episode [rad]."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -38,6 +41,15 @@ class Task:
     level_limit: float = 10.0
     height_limit: float = 5.0
     lean_limit: float = np.radians(60.0)
+
+    def __post_init__(self) -> None:
+        if not self.lean_limit <= STEEPEST:
+            raise SwashError(
+                f"is {np.degrees(self.lean_limit):.0f} degrees, expected at most {np.degrees(STEEPEST):.0f}: episodes "
+                "fly with roll, pitch and yaw, which lose the attitude near the vertical.",
+                where=self.name,
+                channel="lean_limit",
+            )
 
 
 def hover(*, duration: float = 10.0) -> Task:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import logging
-import shutil
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from swashplate.atomic import scratch_folder
 from swashplate.errors import SwashError
 from swashplate.links.logs.identify_sweep import Identified, Make, Tell
 
@@ -26,7 +26,8 @@ class PageJob:
     """The work of a page: one job at a time, the last one's result kept."""
 
     def __init__(self) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="swash-identify-"))
+        self._kept = ExitStack()
+        self._folder = self._kept.enter_context(scratch_folder())
         self._lock = threading.Lock()
         self._number = 0
         self._stop = threading.Event()
@@ -38,7 +39,7 @@ class PageJob:
     def close(self) -> None:
         """Stop what runs and remove the files."""
         self.cancel()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._kept.close()
 
     def start(self, work: Work) -> int:
         """Begin; returns the job's number.

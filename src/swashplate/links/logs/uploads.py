@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import secrets
-import tempfile
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from swashplate.atomic import scratch_folder
 from swashplate.errors import SwashError
 
 LARGEST = 1_000_000_000
@@ -37,13 +38,14 @@ class Uploads:
     """Pieces of files, put together."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="swash-open-")
+        self._kept = ExitStack()
+        self._folder = self._kept.enter_context(scratch_folder())
         self._coming: dict[str, _Coming] = {}
         self._total = 0
 
     def close(self) -> None:
         """Remove every file that was dropped."""
-        self._folder.cleanup()
+        self._kept.close()
 
     def begin(self, name: str, size: int) -> str:
         """A token under which the pieces of a file come.
@@ -63,7 +65,7 @@ class Uploads:
         if len(self._coming) >= MOST:
             self._coming.pop(next(iter(self._coming))).path.unlink(missing_ok=True)
         token = secrets.token_urlsafe(12)
-        place = Path(self._folder.name) / token
+        place = self._folder / token
         place.mkdir()
         self._coming[token] = _Coming(place / clean, size)
         self._total += size

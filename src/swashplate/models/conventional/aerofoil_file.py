@@ -25,7 +25,7 @@ from scipy.interpolate import PchipInterpolator
 
 from swashplate.arrays import Array
 from swashplate.errors import CardError
-from swashplate.files import read_text
+from swashplate.files import is_file, read_text
 from swashplate.models.card import Card
 from swashplate.physics.tabled_blades import AerofoilTable
 from swashplate.registry import nearest
@@ -75,7 +75,7 @@ def aerofoil_of(name_or_file: str, card: Card) -> tuple[AerofoilTable, str]:
         return parse_aerofoil(file.read_text(encoding="utf-8"), name_or_file), name_or_file
     beside = Path(card.path).parent / name_or_file
     for path in (beside, Path(name_or_file)):
-        if path.is_file():
+        if is_file(path):
             return parse_aerofoil(_text(path), str(path)), str(path.resolve())
     raise CardError(
         f"is '{name_or_file}', neither a packaged table ({', '.join(packaged_aerofoils())}) nor a file beside the card "

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -127,6 +130,26 @@ def test_a_changed_file_is_refused_with_what_changed(
     (place / "roll.toml").write_text(rolling.SAME)
 
 
+@pytest.mark.parametrize(
+    ("entry", "value", "said"),
+    [
+        ("portions", [[0, 1]], "portions"),
+        ("files", {"a": 3}, "files"),
+        ("schema", 9, "schema 9"),
+        ("program", None, "program"),
+    ],
+)
+def test_a_damaged_plan_is_refused(entry: str, value: object, said: str, tmp_path: Path) -> None:
+    store = CampaignStore(tmp_path)
+    plan = {"of": "recovery", "place": "", "document": {}, "files": {}, "program": {}, "portions": [[0, 1, 2, "", ""]]}
+    store.begin("", plan, {})
+    assert store.plan()["portions"] == [[0, 1, 2, "", ""]]
+    found = json.loads((tmp_path / "plan.json").read_text())
+    (tmp_path / "plan.json").write_text(json.dumps({**found, entry: value}))
+    with pytest.raises(CampaignError, match=rf"plan\.json.*{said}"):
+        store.plan()
+
+
 def test_a_store_has_one_client(place: Path, tmp_path: Path, engines: list[InProcess]) -> None:
     store = CampaignStore(tmp_path)
     with store.held():
@@ -143,6 +166,14 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
     (tmp_path / "results" / "x.npz").write_bytes(b"half of")
     with pytest.raises(CampaignError, match=r"x\.npz: is no result of a task: .*resume"):
         store.columns("x")
+    whole = io.BytesIO()
+    np.savez(whole, a=np.arange(4))
+    for at in range(0, len(whole.getvalue()), 7):  # libraries raise all kinds of errors for a bit in a header
+        content = bytearray(whole.getvalue())
+        content[at] ^= 0xFF
+        (tmp_path / "results" / "x.npz").write_bytes(content)
+        with contextlib.suppress(CampaignError):
+            assert set(store.columns("x"))
     kept = next((tmp_path / "inputs").iterdir())
     assert store.input(kept.name) == b"content"
     kept.write_bytes(b"other")

@@ -66,6 +66,9 @@ def test_seeds_of_tasks_are_their_own() -> None:
     assert np.diff(starts).min() > 10_000_000, "seeds are counted up within a task, and by millions between sources"
     assert not {p.seed for p in parts} & {p.seed for p in portions(count=1000, batch=7, seed=1)}
 
+    with pytest.raises(CampaignError, match=r"count: 9,007,199,254,740,992 rows in tasks of 2 are more than 100,000"):
+        portions(count=2**53, batch=2, seed=0)
+
 
 # ---- flights ---------------------------------------------------------------------------------------------------------
 FLIGHTS: dict[str, Any] = {"vehicle": "coax", "controller": "c.toml"}

@@ -14,6 +14,7 @@ from swashplate.control.controller_file import read_controller, save_controller
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.design import design
+from swashplate.control.lqg.file import lqg_document, lqg_from
 from swashplate.control.lqg.observability import in_words, observability
 from swashplate.control.lqg.optimal import regulator, steady_filter, unreached, unseen
 from swashplate.control.lqg.steady_loop import Watched, crossovers
@@ -194,3 +195,13 @@ def test_a_place_that_nothing_sees_cannot_be_held() -> None:
 def test_suites_that_are_none(text: str) -> None:
     with pytest.raises(ControllerError, match="sensors: "):
         suite(text)
+
+
+@pytest.mark.parametrize("change", [{"rate": 1e-90}, {"rate": 0.0}, {"delay": 1e9}, {"delay": -1.0}])
+def test_a_file_whose_clocks_no_observer_has_is_refused(change: dict[str, float], made: Lqg) -> None:
+    document = lqg_document(made)
+    with pytest.raises(ControllerError, match=r"a\.toml: delays: is not within 0 to 1000 steps"):
+        lqg_from(document | {"delays": dict.fromkeys(document["delays"], 1e9)}, "a.toml")
+    document["sensors"][0] |= change
+    with pytest.raises(ControllerError, match=r"a\.toml: sensors: a rate is not above zero, or a delay"):
+        lqg_from(document, "a.toml")

@@ -237,6 +237,8 @@ def test_a_mapping_file_that_is_no_toml(tmp_path: Path) -> None:
         read(path, mapping=_file(tmp_path, "[channels", "mapping.toml"))
     with pytest.raises(FlightError, match="no such file"):
         read(path, mapping=tmp_path / "none.toml")
+    with pytest.raises(FlightError, match=r"blank\.toml: says nothing.*Correct the mapping file"):
+        read(path, mapping=_file(tmp_path, " ", "blank.toml"))
 
 
 def test_binary_rubbish_is_no_flight(tmp_path: Path) -> None:
