@@ -35,4 +35,9 @@ def test_the_page_is_drawn_says_nothing_and_fetches_nothing(
     assert len(marks) >= (9 if verb == "derivatives" else 3)
     assert all(count > 0 for count in marks)
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    boxes = seen.page.evaluate("Array.from(document.querySelectorAll('.wide'), b => b.scrollWidth - b.clientWidth)")
+    assert max(boxes) <= 1 or size[0] > 400, "on a telephone no panel lies beyond the edge"
+    panels = seen.page.evaluate("document.querySelector('.canvas').layout.meta.grid")
+    rows = seen.page.evaluate("new Set(document.querySelector('.canvas').layout.annotations.map(a => a.y)).size")
+    assert rows == -(-panels["panels"] // min(panels["columns"], 2 if size[0] < 400 else 6))
     seen.page.close()

@@ -100,6 +100,15 @@ def test_navigation_is_the_pages_own_lists() -> None:
     assert site_pages.navigation(page) == "```{toctree}\n:hidden:\n:caption: Fly\n\none\n```"
 
 
+def test_the_navigation_above_is_by_door(site: Path) -> None:
+    """What stands first on every page: the three doors, then learning, explanations, reference, developers."""
+    above = re.search(r'<ul class="bd-navbar-elements.*?</ul>', (site / "index.html").read_text(), re.DOTALL)
+    assert above is not None
+    found = [" ".join(text.split()) for text in re.findall(r"<a[^>]*>([^<]+)</a>", above[0])]
+    doors = ["Tune an autopilot", "Identify from flights", "Get a model"]
+    assert found == [*doors, "Learn", "Explanations", "Reference", "For developers"]
+
+
 def test_verdicts_that_have_another_form_are_refused() -> None:
     page = real_results.PAGE.read_text(encoding="utf-8")
     assert len(real_results.directions(page)) == 2
