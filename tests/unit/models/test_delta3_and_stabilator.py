@@ -180,3 +180,16 @@ def test_what_is_missing_or_has_no_build_up_is_refused() -> None:
     for flown in (bent(-0.3), with_numbers(SCHEDULE, stabilator=True)):
         with pytest.raises(SwashError, match="delta3 or stabilator have no closed-form build-up"):
             build_up(flown, np.array(STATE), np.array(CONTROLS), environment_of(flown))
+
+
+def test_the_wake_reaches_a_tail_rotor_below_the_hub_where_flight_sweeps_it_there() -> None:
+    """None in hover and at a tail as high as the hub; at speed a canted tail rotor feels air that comes down."""
+    off, on = (with_numbers({"tail_cant": (0.3, "rad")}, tail_in_wake=chosen) for chosen in (False, True))
+    hub = on.values().hub_height
+    for speed, height, differs in ((0.0, 0.0, False), (12.0, 0.0, True), (12.0, hub, False)):
+        state = [*STATE[:3], speed, *STATE[4:]]
+        placed = [v.with_values({"tail_height": height}) for v in (off, on)]
+        alone, swept = (np.array(v.rates(state, CONTROLS, v.values())) for v in placed)
+        assert bool(np.max(np.abs(alone - swept)) > 1e-3) is differs
+    with pytest.raises(SwashError, match="tail rotors in the main rotor's wake have no closed-form build-up"):
+        build_up(on, np.array(STATE), np.array(CONTROLS), environment_of(on))

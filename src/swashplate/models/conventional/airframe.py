@@ -32,6 +32,8 @@ def airframe(
     xp: Backend,
     sense: float,
     collective: Scalar | None = None,
+    *,
+    tail_in_wake: bool = False,
 ) -> Airframe:
     """Tail rotor, horizontal tail, fin and fuselage in the wakes of the two rotors.
 
@@ -45,11 +47,25 @@ def airframe(
         par, density: the card's numbers, the air.
         sense: +1 for a counter-clockwise main rotor.
         collective: of the main rotor [rad], which an all-moving tail follows; None where the tail stands still.
+        tail_in_wake: the main rotor's wake reaches the tail rotor too, as far below the hub as that stands.
     """
     blowing, fading = awake
     p, q, r = rates
     arm, height = par.tail_arm, par.tail_height
     there = Vector(air.x - height * q, air.y - arm * r + height * p, air.z + arm * q)
+    rim = par.tail_arm - par.rotor_radius
+    if tail_in_wake:
+        swept = tail_surfaces.wake_on_tailplane(
+            air.x,
+            air.z,
+            wake,
+            near=rim - par.tail_radius,
+            far=rim + par.tail_radius,
+            drop=par.hub_height - height,
+            most=par.tailplane_wake,
+            xp=xp,
+        )
+        there = Vector(there.x, there.y, there.z - swept)
     cc, sc = xp.cos(par.tail_cant), xp.sin(par.tail_cant)
     against, up = sense * there.y * cc - there.z * sc, there.z * cc + sense * there.y * sc
     tail = tail_rotor.tail_rotor_loads(
@@ -71,7 +87,6 @@ def airframe(
     )
     thrust = tail_rotor.fin_blockage(par.fin_area, par.tail_radius, par.fin_blockage) * fading * tail.thrust
 
-    rim = par.tail_arm - par.rotor_radius
     downwash = tail_surfaces.wake_on_tailplane(
         air.x,
         air.z,

@@ -188,6 +188,7 @@ def loads(
         xp,
         sense,
         sticks.theta0 if options.stabilator else None,
+        tail_in_wake=options.tail_in_wake,
     )
 
     # Rotor speed, and the shaft's reaction on the fuselage beyond the rotors' own drag.

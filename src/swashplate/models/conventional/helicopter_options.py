@@ -41,6 +41,8 @@ class HelicopterOptions(NamedTuple):
         delta3: flapping changes the main blades' pitch by `rotor_delta3` times the flapping angle.
         stiff_blades: the disc moves at the frequency of the regressing flap mode (`flapping.regressing_pace`), which
             first order alone makes too fast: 2 % at a flapping frequency of 1.04 per turn, 45 % at 1.9.
+        tail_in_wake: the main rotor's wake reaches the tail rotor where flight sweeps it there, as it does the
+            tailplane.
         stabilator: the horizontal tail's incidence follows air speed, collective and pitch rate (`stabilator_*`), in
             place of `tailplane_incidence`.
         aerofoil: the main blades' table of lift, drag and moment (`aerofoil_file`), in place of `rotor_lift_slope`,
@@ -69,6 +71,7 @@ class HelicopterOptions(NamedTuple):
     delta3: bool = False
     stabilator: bool = False
     stiff_blades: bool = False
+    tail_in_wake: bool = False
     ground_effect: str = "none"
     aerofoil: AerofoilTable | None = None
 
@@ -107,6 +110,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
             "delta3",
             "stabilator",
             "stiff_blades",
+            "tail_in_wake",
         ),
         (True, False),
     ),

@@ -96,7 +96,7 @@ def test_the_design_takes_the_identified_delays_and_holds_the_model(flying: Vehi
     again = read_controller(tmp_path / "c.toml")
     assert isinstance(again, Lqg)
     np.testing.assert_array_equal(again.gains, made.gains)
-    fed = design(flying)
+    fed = design(flying, allowed={"x": 0.3, "y": 0.3})  # as tightly as delays let it the step costs 22 mm of height
     flight = simulate_closed_loop(flying, fed, duration=8.0, reference={"x": 0.5}, rate=100.0)
     assert flight.values("x")[-1] == pytest.approx(0.5, abs=0.05)
     assert np.max(np.abs(flight.values("z"))) < 0.02
