@@ -204,7 +204,7 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
     about = trim if trim is not None else find_trim(vehicle)
     surroundings = [getattr(about.environment, name) for name in SURROUNDINGS]
     w = np.array([*about.inputs, *surroundings], dtype=np.float64)
-    A, W = _jacobians(equations_of(vehicle), about.state, w, parameter_row(vehicle, about.environment))
+    A, W = jacobians(equations_of(vehicle), about.state, w, parameter_row(vehicle, about.environment))
     n, m = len(vehicle.state_names), len(vehicle.input_names)
     return LinearModel(
         A=np.asarray(A),
@@ -225,5 +225,6 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
 
 
 @partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _jacobians(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+def jacobians(equations: Equations, x: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    """Slopes of the rates by the states (n, n) and by inputs and surroundings, at rows of numbers."""
     return jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))(x, w, p)  # type: ignore[no-any-return]
