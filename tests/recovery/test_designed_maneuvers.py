@@ -17,6 +17,8 @@ from swashplate.models.vehicle import Vehicle
 SEEDS = int(os.environ.get("SWASHPLATE_DESIGN_SEEDS", "100"))
 UNKNOWN = {
     "coax": ("tau_f_upper", "linkage_lower", "hub_stiffness_upper"),
+    "crazyflie": ("inertia_xx", "tau_drive", "flap_back"),
+    "raptor50": ("hub_stiffness", "inertia_xx", "tail_lift_slope"),
 }
 LIMITS = {"attitude": 20.0, "rate": 120.0, "place": 3.0}
 SECONDS = 30.0
@@ -48,7 +50,8 @@ def flown(vehicle: Vehicle, pieces: tuple[Maneuver, ...], seed: int) -> list[sp.
         steps = GUST * np.sqrt(1.0 - keep**2) * random.standard_normal((2, samples))
         north, east = (lfilter([1.0], [1.0, -keep], row) for row in steps)
         wind = {"wind_north": north, "wind_east": east}
-        flight = sp.simulate_maneuver(vehicle, piece, controller=sp.hover_hold, wind=wind)
+        hold = sp.hover_hold if vehicle.traits.coaxial else sp.state_hold
+        flight = sp.simulate_maneuver(vehicle, piece, controller=hold, wind=wind)
         quiet = sp.observe(flight, vehicle, seed=100 * seed + k, sensors=sp.QUIET)
         logged.append(quiet.condition(rate=100.0, cutoff=0.0))
     return logged

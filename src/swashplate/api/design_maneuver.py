@@ -3,46 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swashplate.api.designed_maneuver import LEAD, DesignedManeuver, Offer, sample_times
+from swashplate.api.designed_maneuver import LEAD, DesignedManeuver
+from swashplate.api.maneuver_aims import aim_of
 from swashplate.api.saying import Say, silent
-from swashplate.arrays import Array, Complex
+from swashplate.api.told_by_maneuvers import Told, offer_of
+from swashplate.arrays import Array
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
-from swashplate.errors import ManeuverError, SwashError
+from swashplate.errors import ManeuverError
 from swashplate.filtering.disturbances import Noise
-from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
+from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.multisine import dealt
 from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, Maneuver, parse
 from swashplate.identification.design.information import (
-    DELAY_SIGMA,
-    Sensed,
-    bounds_from,
-    line_information,
     sensed,
 )
 from swashplate.identification.design.powers import best_powers
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
-from swashplate.simulation.closed_loop import Controller, simulate_maneuver
+from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim
 
 LIMITS = ("amplitude", "attitude", "rate", "place", "battery", "seconds")
 """What may be limited: deflection [1], attitude from trim [deg], body rates [deg/s], distance [m], a battery's flight
 and the maneuver [s]."""
 _USUAL: Mapping[str, float] = {"attitude": 20.0, "rate": 120.0, "place": 3.0, "seconds": 30.0}
-_PROBE = 0.2
-"""Share of the largest deflection at which the closed loop is probed: where it is still linear."""
 _PEAK = 1.7
 """Peak over root mean square that phases of least peak are counted on to reach; what they reach is flown."""
 _VAGUE = 50.0
 """Percent of a value that a bound may have where a maneuver is called feasible."""
-_TRIES = 6
-_SMALLEST = 0.02
+_NOTHING = 0.9
+"""Share of what was not known before, above which a maneuver tells nothing of its aim."""
 _STEPS = (0.25, 0.5, 1.0, 2.0)
 
 
@@ -53,7 +47,8 @@ def design_maneuver(
     limits: Mapping[str, float] | None = None,
     band: tuple[float, float] = (0.3, 8.0),
     axes: Sequence[str] | None = None,
-    criterion: str = "D",
+    aim: str | None = None,
+    criterion: str | None = None,
     robust: str = "average",
     spread: float = 0.3,
     draws: int = 5,
@@ -75,7 +70,11 @@ def design_maneuver(
         limits: some of `LIMITS`; by default 20 deg, 120 deg/s, 3 m, 30 s, and the usual deflections of each axis.
         band: lowest and highest frequency [Hz].
         axes: that may be moved; all that the vehicle has where None.
-        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors).
+        aim: what the flight is to make certain instead of the unknowns themselves: "q/pitch@0.5-3" (how a state
+            answers an axis or an input at a frequency or in a band [Hz]) or "margin" (the disc margin of all loops of
+            `controller`); see `maneuver_aims`.
+        criterion: "D" (least volume of the error ellipsoid) or "A" (least sum of squared relative errors); "D" where
+            None, and with an aim "A" of its numbers.
         robust: "average" over draws of the prior, or for the "worst" of them.
         spread: the unknowns are drawn within this share about the model's; 0 trusts the model.
         draws: how many, the model itself among them.
@@ -86,12 +85,15 @@ def design_maneuver(
         say: told what is being done.
 
     Raises:
-        ManeuverError: where nothing feasible tells all that is unknown, with what stands in the way.
+        ManeuverError: where nothing feasible tells all that is unknown, or the aim, with what stands in the way.
         IdentificationError: an unknown parameter, or a vehicle whose pose is not tracked.
     """
     unknown = tuple(dict.fromkeys(unknown))
     kept = _checked_limits(limits or {})
-    _checked(criterion, robust, spread, draws, band, rate)
+    chosen = criterion or ("D" if aim is None else "A")
+    _checked(chosen, robust, spread, draws, band, rate)
+    if aim is not None and (chosen != "A" or not spread > 0.0):
+        raise ManeuverError("is for the criterion A, and for unknowns with a spread above zero.", channel="aim")
     moved = _axes_of(vehicle, axes)
     seconds, noise = kept["seconds"], noise or Noise()
     if "battery" in kept and seconds + 2.0 * LEAD > kept["battery"]:
@@ -111,21 +113,23 @@ def design_maneuver(
     peak = {axis: kept.get("amplitude", DEFAULT_AMPLITUDE.get(axis, 0.1)) for axis in moved}
     say("linearising the draws of the prior")
     models = _draws(vehicle, unknown, spread, draws, seed)
-    told = _Told(models, [sensed(one, unknown) for one in models], unknown, noise, rate, controller or _hold)
+    values = np.array([abs(vehicle.card.parameters[n].value) or 1.0 for n in unknown])
+    known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
+    wanted = None if aim is None else aim_of(aim, models, unknown, controller or _hold)
+    seen = [sensed(one, unknown) for one in models]
+    told = Told(models, seen, unknown, noise, rate, controller or _hold, wanted, values, known)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
     responses = told.probe(moved, lines, seconds, peak)
-    values = np.array([abs(vehicle.card.parameters[n].value) or 1.0 for n in unknown])
-    scale = np.outer(*[np.append(values, DELAY_SIGMA)] * 2)
     frequency = numbers / seconds
     per_power = np.stack(
-        [2.0 * seconds * scale * told.lines(d, frequency, response) for d, response in enumerate(responses)]
+        [2.0 * seconds * told.scale * told.lines(d, frequency, response) for d, response in enumerate(responses)]
     )
-    known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
     allowed = np.array([(peak[axis] / _PEAK) ** 2 for axis in moved])
     say("choosing powers")
-    power = best_powers(per_power, owner, allowed, known, criterion=criterion, worst=robust == "worst")
+    weights = None if wanted is None else np.einsum("dkp,dkq->dpq", wanted.slopes, wanted.slopes)
+    power = best_powers(per_power, owner, allowed, known, criterion=chosen, worst=robust == "worst", wanted=weights)
     powers = {a: dict(zip(lines[i].tolist(), power[owner == i], strict=True)) for i, a in enumerate(moved)}
     design = composed(powers, duration=seconds, peak=peak)
     table = {axis: (lines[i] / seconds, [r[owner == i] for r in responses]) for i, axis in enumerate(moved)}
@@ -140,7 +144,7 @@ def design_maneuver(
     for kind, pieces in rivals:
         say(f"flying the {kind} in simulation")
         try:
-            offers.append(_offer(kind, pieces, told, table, kept))
+            offers.append(offer_of(kind, pieces, told, table, kept))
         except ManeuverError as trouble:
             why.append(f"{kind}: {trouble.args[0] if trouble.args else trouble}")
     if not offers:
@@ -149,15 +153,38 @@ def design_maneuver(
     buys = []
     for share in _STEPS:
         total = [share * told.information(d, first.pieces, table) for d in range(len(models))]
-        buys.append((share * first.seconds, _worst(total, unknown)))
+        buys.append((share * first.seconds, told.bounds(total)))
+    before = {} if wanted is None else told.aimed([np.zeros_like(known)] * len(models))
+    units = {} if wanted is None else dict(zip(wanted.names, map(float, wanted.units), strict=True))
     made = DesignedManeuver(
-        vehicle, unknown, tuple(offers), tuple(buys), kept, criterion, robust, len(models), spread, rate
+        vehicle,
+        unknown,
+        tuple(offers),
+        tuple(buys),
+        kept,
+        chosen,
+        robust,
+        len(models),
+        spread,
+        rate,
+        aim=aim or "",
+        units=units,
+        before=before,
     )
     _refuse_vague(made, values)
     return made
 
 
 def _refuse_vague(made: DesignedManeuver, values: Array) -> None:
+    if made.aim:
+        if all(made.best.bounds[name] > _NOTHING * made.before[name] for name in made.before):
+            raise ManeuverError(
+                f"no maneuver within the limits tells more of it than a spread of {made.spread:g} does.",
+                where=made.vehicle.name,
+                channel=f"aim {made.aim}",
+                hint="Fly longer, within wider limits, or move other axes.",
+            )
+        return
     percent = {n: 100.0 * made.best.bounds[n] / v for n, v in zip(made.unknown, values, strict=True)}
     vague = {n: p for n, p in percent.items() if not p <= _VAGUE}
     if not vague:
@@ -228,142 +255,3 @@ def _draws(vehicle: Vehicle, unknown: Sequence[str], spread: float, draws: int, 
 
 def _hold(vehicle: Vehicle, about: Trim) -> Controller:
     return hover_hold(vehicle, about) if vehicle.traits.coaxial else state_hold(vehicle, about)
-
-
-# ---- what is told ----------------------------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class _Told:
-    """The draws of the prior, and what lines of a maneuver tell in each."""
-
-    models: Sequence[Vehicle]
-    sensed: Sequence[Sensed]
-    unknown: tuple[str, ...]
-    noise: Noise
-    rate: float
-    controller: Callable[[Vehicle, Trim], Controller]
-
-    def lines(self, draw: int, frequency: Array, inputs: Complex) -> Array:
-        return line_information(self.sensed[draw], frequency, inputs, self.noise, rate=self.rate)
-
-    def fly(self, draw: int, maneuver: Maneuver) -> tuple[Array, Array, Array]:
-        """Time from the maneuver's start, states and inputs; a flight that is lost is none."""
-        vehicle = self.models[draw]
-        flown = simulate_maneuver(vehicle, maneuver, controller=self.controller, lead=LEAD, tail=LEAD, rate=self.rate)
-        time = flown.time(vehicle.state_names[0]) - LEAD
-        return time, flown.array(vehicle.state_names), flown.array(vehicle.input_names)
-
-    def probe(
-        self, axes: Sequence[str], lines: Sequence[NDArray[np.int64]], seconds: float, peak: Mapping[str, float]
-    ) -> list[Complex]:
-        """What every input does in the closed loop at each line per unit of its axis' own, (lines, m), of each draw.
-
-        Two periods are flown and the second is taken: what begins the first has died away.
-        """
-        small = {axis: _PROBE * peak[axis] for axis in axes}
-        twice = {a: {2 * int(n): 1.0 for n in own} for a, own in zip(axes, lines, strict=True)}
-        maneuver = composed(twice, duration=2.0 * seconds, peak=small)
-        found: list[Complex] = []
-        for draw in range(len(self.models)):
-            time, _, inputs = self.fly(draw, maneuver)
-            inside = (time >= seconds - 1e-9) & (time < 2.0 * seconds - 0.5 / self.rate)
-            rows = []
-            for axis, own in zip(axes, lines, strict=True):
-                asked = maneuver.signals(time[inside])[axis]
-                turning = np.exp(-2j * np.pi * np.multiply.outer(own / seconds, time[inside]))
-                rows.append((turning @ inputs[inside]) / (turning @ asked)[:, None])
-            found.append(np.asarray(np.concatenate(rows), dtype=np.complex128))
-        return found
-
-    def information(
-        self, draw: int, pieces: Sequence[Maneuver], table: Mapping[str, tuple[Array, list[Complex]]]
-    ) -> Array:
-        """Information (p + 1, p + 1) of maneuvers that are flown one after the other."""
-        total = np.zeros((len(self.unknown) + 1,) * 2)
-        for piece in pieces:
-            time = sample_times(piece, self.rate)
-            length = time.size / self.rate
-            for axis, signal in piece.signals(time).items():
-                amplitude = 2.0 * np.abs(np.fft.rfft(signal)) / time.size
-                frequency = np.fft.rfftfreq(time.size, 1.0 / self.rate)
-                known, responses = table[axis]
-                # Beyond the probed band nothing is counted.
-                seen = (frequency >= known[0] - 1e-9) & (frequency <= known[-1] + 1e-9) & (amplitude > 1e-9)
-                if not seen.any():
-                    continue
-                response = _between(frequency[seen], known, responses[draw])
-                own = self.lines(draw, frequency[seen], response)
-                total += length * np.einsum("f,fpq->pq", amplitude[seen] ** 2, own)
-        return total
-
-
-def _between(frequency: Array, known: Array, response: Complex) -> Complex:
-    """Responses (f, m) at other frequencies, straight between the known ones."""
-    columns = [np.interp(frequency, known, c.real) + 1j * np.interp(frequency, known, c.imag) for c in response.T]
-    return np.stack(columns, axis=1)
-
-
-def _worst(information: Sequence[Array], unknown: Sequence[str]) -> dict[str, float]:
-    worst = np.max([bounds_from(one) for one in information], axis=0)
-    return dict(zip(unknown, map(float, worst), strict=True))
-
-
-def _offer(
-    kind: str,
-    pieces: Sequence[Maneuver],
-    told: _Told,
-    table: Mapping[str, tuple[Array, list[Complex]]],
-    limits: Mapping[str, float],
-) -> Offer:
-    """A way to fly, made smaller until it keeps the limits in every draw."""
-    fitted, peaks = [], dict.fromkeys(("attitude", "rate", "place"), 0.0)
-    for piece in pieces:
-        small, reached = _fitted(piece, told, limits)
-        fitted.append(small)
-        peaks = {name: max(peaks[name], reached[name]) for name in peaks}
-    total = [told.information(draw, fitted, table) for draw in range(len(told.models))]
-    return Offer(kind, tuple(fitted), sum(p.duration for p in fitted), _worst(total, told.unknown), peaks)
-
-
-def _fitted(piece: Maneuver, told: _Told, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
-    share, lost = 1.0, ""
-    for _ in range(_TRIES):
-        tried = _smaller(piece, share)
-        try:
-            every = [_peaks(told, draw, tried) for draw in range(len(told.models))]
-        except SwashError as trouble:  # lost in flight
-            share, lost = 0.4 * share, f" The last flight that was lost: {trouble.problem}"
-            continue
-        reached = {name: max(one[name] for one in every) for name in every[0]}
-        over = max(reached[name] / limits[name] for name in reached)
-        if over <= 1.0:
-            return tried, reached
-        share *= 0.95 / over
-        if share < _SMALLEST:
-            break
-    raise ManeuverError(
-        f"not even {100.0 * share:.2g} % of the usual deflection keeps "
-        f"{limits['attitude']:g} deg, {limits['rate']:g} deg/s and {limits['place']:g} m.{lost}",
-        hint="Widen the limits, or fly a controller that holds better.",
-    )
-
-
-def _smaller(piece: Maneuver, share: float) -> Maneuver:
-    if isinstance(piece, ComposedMultisine):
-        return piece.scaled(share)
-    return replace(piece, amplitude=share * piece.amplitude)
-
-
-def _peaks(told: _Told, draw: int, piece: Maneuver) -> dict[str, float]:
-    """Largest attitude from trim [deg], rate [deg/s] and distance from the start [m]."""
-    vehicle = told.models[draw]
-    time, states, _ = told.fly(draw, piece)
-    start = states[np.searchsorted(time, -1e-9)]
-
-    def away(*names: str) -> Array:
-        return np.array([states[:, vehicle.index(name)] - start[vehicle.index(name)] for name in names])
-
-    return {
-        "attitude": float(np.degrees(np.max(np.abs(away("phi", "theta"))))),
-        "rate": float(np.degrees(np.max(np.abs(away("p", "q", "r"))))),
-        "place": float(np.max(np.linalg.norm(away("x", "y", "z"), axis=0))),
-    }

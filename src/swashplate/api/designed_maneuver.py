@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ class Offer:
         kind: "multisine" (designed), "sweep" or "3211".
         pieces: maneuvers, flown one after the other.
         seconds: of excitation.
-        bounds: standard deviation of each unknown, in its unit, the worst of the prior's draws.
+        bounds: standard deviation of each unknown and of each number of the aim, in its unit, the worst of the draws.
         peaks: largest attitude [deg], rate [deg/s] and distance [m] in the draws.
     """
 
@@ -61,6 +61,8 @@ class DesignedManeuver(Shown):
         buys: seconds of the designed one, and the bounds then.
         limits: that were kept. criterion, robust, draws, spread: see `design_maneuver`.
         rate: of the series [Hz].
+        aim: what it is for instead of the unknowns; "" for none.
+        units: of each number of the aim, what a relative error of one is. before: what is not known without a flight.
     """
 
     vehicle: Vehicle
@@ -73,6 +75,9 @@ class DesignedManeuver(Shown):
     draws: int
     spread: float
     rate: float
+    aim: str = ""
+    units: Mapping[str, float] = field(default_factory=dict)
+    before: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Offer:
@@ -80,42 +85,52 @@ class DesignedManeuver(Shown):
         values = [abs(self.vehicle.card.parameters[n].value) or 1.0 for n in self.unknown]
 
         def size(offer: Offer) -> float:
+            if self.units:
+                return float(sum((offer.bounds[name] / unit) ** 2 for name, unit in self.units.items()))
             relative = np.array([offer.bounds[n] for n in self.unknown]) / values
             return float(np.sum(np.log(relative)) if self.criterion == "D" else np.sum(relative**2))
 
         return min(self.offers, key=size)
 
-    def percent(self, bounds: Mapping[str, float]) -> list[str]:
-        """Bounds in percent of the values."""
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """What bounds are told of, with units: the unknowns in percent, or the aim's numbers."""
+        return tuple(self.units) or tuple(f"{name} %" for name in self.unknown)
+
+    def cells(self, bounds: Mapping[str, float]) -> list[str]:
+        """Bounds by `columns`."""
+        if self.units:
+            return [f"{bounds[name]:.3g}" for name in self.units]
         return [
             f"{100.0 * bounds[n] / (abs(self.vehicle.card.parameters[n].value) or np.nan):.3g}" for n in self.unknown
         ]
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells: what each way to fly would tell, bounds in percent."""
-        head = ("fly", "seconds", *(f"{n} %" for n in self.unknown), "attitude deg", "rate deg/s", "place m")
+        head = ("fly", "seconds", *self.columns, "attitude deg", "rate deg/s", "place m")
         rows = [
             (
                 o.kind,
                 f"{o.seconds:g}",
-                *self.percent(o.bounds),
+                *self.cells(o.bounds),
                 *(f"{o.peaks[k]:.3g}" for k in ("attitude", "rate", "place")),
             )
             for o in self.offers
         ]
-        return head, rows
+        none = [("nothing", "0", *self.cells(self.before), "", "", "")] if self.before else []
+        return head, [*none, *rows]
 
     def seconds_rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Heading and cells: what each length of the designed maneuver buys."""
-        head = ("seconds", *(f"{n} %" for n in self.unknown))
-        return head, [(f"{t:g}", *self.percent(bounds)) for t, bounds in self.buys]
+        head = ("seconds", *self.columns)
+        return head, [(f"{t:g}", *self.cells(bounds)) for t, bounds in self.buys]
 
     def card(self) -> str:
         """The flight card, to print: what to fly, in which order, when to stop."""
         best, limits = self.best, self.limits
-        bounds = [f"{n} {p} %" for n, p in zip(self.unknown, self.percent(best.bounds), strict=True)]
+        bounds = [f"{name} {cell}" for name, cell in zip(self.columns, self.cells(best.bounds), strict=True)]
         lines = [
-            f"FLIGHT CARD   {self.vehicle.name}: {', '.join(self.unknown)}",
+            f"FLIGHT CARD   {self.vehicle.name}: {self.aim or ', '.join(self.unknown)}",
             "",
             "Before",
             f"  [ ] log at {self.rate:g} Hz or faster: commands, pose, battery voltage"
@@ -184,6 +199,8 @@ class DesignedManeuver(Shown):
             ],
             "buys": [{"seconds": t, "bounds": dict(bounds)} for t, bounds in self.buys],
             "limits": dict(self.limits),
+            "aim": self.aim,
+            "before": dict(self.before),
             "criterion": self.criterion,
             "robust": self.robust,
             "draws": self.draws,
@@ -208,7 +225,7 @@ class DesignedManeuver(Shown):
         )
         return "\n".join(
             [
-                f"For {', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
+                f"For {self.aim or ', '.join(self.unknown)} of {self.vehicle.name}: {self.best.kind} ({told}).",
                 text_table(*self.rows()),
                 "",
                 "What each second buys: the same maneuver shorter or longer, bounds with the root of the seconds",

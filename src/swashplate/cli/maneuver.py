@@ -109,9 +109,23 @@ def design(
     axes: Annotated[
         str | None, typer.Option("--axes", help="Of roll, pitch, yaw, heave, by commas; all that the vehicle has.")
     ] = None,
+    aim: Annotated[
+        str | None,
+        typer.Option(
+            "--aim",
+            metavar="TEXT",
+            help="Determine this instead of the parameters themselves: q/pitch@0.5-3 (response of a state to an axis, "
+            "in Hz), or margin (disc margin of --controller).",
+        ),
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option("--controller", metavar="FILE", help="Controller that flies (.toml); else a hold of hover."),
+    ] = None,
     criterion: Annotated[
-        str, typer.Option("--criterion", help="D (minimum volume of the errors) or A (minimum sum of squares).")
-    ] = "D",
+        str | None,
+        typer.Option("--criterion", help="D (minimum volume of the errors, default) or A (minimum sum of squares)."),
+    ] = None,
     robust: Annotated[
         str,
         typer.Option("--robust", help="Optimise for the average over draws of the prior, or for the worst of them."),
@@ -135,6 +149,7 @@ def design(
     the limits determines all parameters, the exit code is 2, and the reason is printed.
     """
     import swashplate as sp
+    from swashplate.api.controllers import from_file
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.tables import table
 
@@ -148,6 +163,8 @@ def design(
             limits=asked,
             band=_band(band),
             axes=None if axes is None else [axis.strip() for axis in axes.split(",") if axis.strip()],
+            aim=aim,
+            controller=None if controller is None else from_file(controller),
             criterion=criterion,
             robust=robust,
             spread=spread,

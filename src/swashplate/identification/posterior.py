@@ -18,8 +18,8 @@ from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT
 from swashplate.identification.core.result import Fitted, Result, bounds_of
 
 METHODS = ("laplace", "nuts")
-WARMUP = 150
-"""Draws of each chain in which its step is found."""
+WARMUP = 80
+"""Draws of one chain in which the step of all is found."""
 BLOCK = 50
 """Draws of each chain between two looks at whether they are enough."""
 _LEAST = 100
@@ -49,7 +49,7 @@ def posterior(
         method: "laplace" or "nuts".
         draws: of each chain at most.
         chains: how many.
-        warmup: draws of each chain in which its step is found.
+        warmup: draws of one chain in which the step of all is found.
         seed: of all that is random.
         progress: told draws of a chain so far, and at most.
 

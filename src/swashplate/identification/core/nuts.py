@@ -35,6 +35,8 @@ _INSIDE = 0.5
 _ACCEPTED = 0.8
 """Mean acceptance that the step is chosen for (Stan's)."""
 _FIRST_STEP = 0.4
+_SETTLING = 20
+"""Draws that a chain drops which takes the step that another has found."""
 _DOUBLINGS = 8
 _STATS = ("lp", "diverging", "energy", "tree_depth", "n_steps", "acceptance_rate")
 
@@ -81,7 +83,7 @@ def sample(
         traced: the cost. row: its entries, with bounds and priors.
         optimum: scaled row to start from (p,). covariance: inverse of information and priors there (p, p).
         chains: how many, each from a point of its own as far from the optimum as the metric says.
-        warmup: draws in which the step is found, dropped.
+        warmup: draws of the first chain in which the step of all is found, dropped.
         block: draws between two looks at `enough`, which ends it; most: draws of a chain at most.
         seed: of all that is random.
         progress: told draws of a chain so far and at most.
@@ -95,10 +97,12 @@ def sample(
     states = [_alive(target, start) for start in starts]
     np.asarray(_step(*target, keys[0], states[0], _FIRST_STEP)[1])  # compiled once, before there are threads
     found: list[list[tuple[Array, Array]]] = [[] for _ in range(chains)]
-    steps = np.zeros(chains)
     with ThreadPoolExecutor(max_workers=min(chains, os.cpu_count() or 1)) as pool:
-        for c, (state, step) in enumerate(pool.map(partial(_warmed, target, warmup), keys, states)):
-            states[c], steps[c] = state, step
+        states[0], step = _warmed(target, warmup, keys[0], states[0])
+        settle, steps = min(warmup, _SETTLING), np.full(chains, step)
+        # The metric is one, and so is the step: the other chains only leave where they began.
+        settled = [pool.submit(_drawn, target, keys[c], states[c], step, -settle, settle) for c in range(1, chains)]
+        states[1:] = [job.result()[0] for job in settled]
         done, chain = 0, None
         while done < most:
             size = min(block, most - done)
@@ -146,12 +150,13 @@ def _warmed(target: Target, warmup: int, key: jax.Array, state: HMCState) -> tup
 def _drawn(
     target: Target, key: jax.Array, state: HMCState, step: float, first: int, count: int
 ) -> tuple[Any, Array, Array]:
-    rows, stats = [], []
+    rows: list[Array] = []
+    stats: list[Array] = []
     for k in range(first, first + count):
         state, row, told = _step(*target, jax.random.fold_in(key, (1 << 20) + k), state, step)
         rows.append(np.asarray(row))
         stats.append(np.asarray(told))
-    return state, np.stack(rows), np.stack(stats)
+    return state, np.array(rows), np.array(stats)
 
 
 # ---- the density in whitened numbers ---------------------------------------------------------------------------------

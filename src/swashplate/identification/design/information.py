@@ -1,8 +1,8 @@
 """What a maneuver would tell of some parameters before it is flown: Fisher information line by line.
 
 About steady flight the motion at a frequency is `X = (jw - A)^-1 B U`, and a parameter moves it by
-`(jw - A)^-1 (A' X + B' U)`, with exact slopes A', B'. The innovations of a filter see that through the inverse of what
-disturbed air and sensors add to the outputs, so a line of amplitude c flown for T seconds adds
+`(jw - A)^-1 (A' X + B' U)`, with A' and B' by differences of exact slopes. The innovations of a filter see that through
+the inverse of what disturbed air and sensors add to the outputs, so a line of amplitude c flown for T seconds adds
 `T / 2 c^2 Re(S^H Phi^-1 S)` (Goodwin and Payne 1977, ch. 6; Ljung 1999, sec. 13.4). U is what the inputs do in the
 closed loop. A delay of all inputs together is taken for unknown, as the fits take it. What gusts add to the inputs is
 left out, which widens the bounds; trims, lever arms and the noise's own numbers are taken for known, which narrows
@@ -13,10 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
-import jax
 import numpy as np
 
 from swashplate.arrays import Array, Complex
@@ -24,14 +21,12 @@ from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.identification.core.records import POSE
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
-    Equations,
     enable_double_precision,
     equations_of,
     parameter_row,
-    row_rates,
+    rates_and_slopes,
 )
 from swashplate.simulation.trim import Trim, trim
 
@@ -39,6 +34,8 @@ DELAY_SIGMA = 0.05
 """Prior standard deviation [s] of the delay that is unknown, as in the fits."""
 
 
+_STEP = 1e-4
+"""Share of a parameter, for differences of exact slopes: a helicopter's slopes of slopes compile for minutes."""
 _TOLD, _PART = 1e-12, 1e-18
 """Share of the information below which a direction is not told, and the part in one from which a parameter is not."""
 
@@ -64,7 +61,7 @@ class Sensed:
 
 
 def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
-    """The linear model of a vehicle in hover with exact slopes by some parameters.
+    """The linear model of a vehicle in hover with its slopes by some parameters.
 
     Raises:
         IdentificationError: an unknown parameter, or a vehicle without tracked pose or body rates.
@@ -88,25 +85,27 @@ def sensed(vehicle: Vehicle, unknown: Sequence[str]) -> Sensed:
     w = np.array([*about.inputs, *around], dtype=np.float64)
     p = parameter_row(vehicle, about.environment)
     places = np.array([vehicle.parameter_names.index(name) for name in unknown])
-    (A, W), (dA, dW) = _with_slopes(equations_of(vehicle), about.state, w, p, np.eye(p.size)[places])
-    m = len(vehicle.input_names)
+    m, equations = len(vehicle.input_names), equations_of(vehicle)
+
+    def slopes(row: Array) -> Array:
+        return np.concatenate(
+            [np.asarray(part) for part in rates_and_slopes(equations, about.state, w, row)[1:]], axis=1
+        )
+
+    steps = _STEP * np.maximum(np.abs(p[places]), 1e-6)
+    ways = np.eye(p.size)[places] * steps[:, None]
+    moved = [(slopes(p + way) - slopes(p - way)) / (2.0 * step) for way, step in zip(ways, steps, strict=True)]
+    here, by = slopes(p), np.stack(moved, axis=-1)
+    n = len(vehicle.state_names)
     return Sensed(
-        np.asarray(A),
-        np.asarray(W)[:, :m],
-        np.moveaxis(np.asarray(dA), 0, -1),
-        np.moveaxis(np.asarray(dW)[:, :, :m], 0, -1),
+        here[:, :n],
+        here[:, n : n + m],
+        by[:, :n],
+        by[:, n : n + m],
         np.array([vehicle.index(name) for name in POSE]),
         np.array([vehicle.index(name) for name in DISTURBED]),
         about,
     )
-
-
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
-def _with_slopes(equations: Equations, x: Array, w: Array, p: Array, directions: Array) -> Any:
-    """Slopes of the rates by states and inputs, and their slopes along directions of the parameters."""
-    slopes = jax.jacfwd(row_rates(equations, padded=False), argnums=(0, 1))
-    moved = jax.vmap(lambda d: jax.jvp(lambda row: slopes(x, w, row), (p,), (d,))[1])(directions)
-    return slopes(x, w, p), moved
 
 
 def output_noise(model: Sensed, frequency: Array, noise: Noise, *, rate: float) -> Complex:

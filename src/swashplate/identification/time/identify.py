@@ -23,6 +23,7 @@ from swashplate.identification.core.sources import sources_of
 from swashplate.identification.estimators import Data, Question
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.identification.time import feedback, nelder_mead
+from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
 from swashplate.identification.time.following_error import FollowingError
@@ -104,6 +105,9 @@ def identify_flight(
     found, row = _found(table, likelihood, optimum, horizon, most, question.progress)
     optimum, parameters, problems = found.optimum, *estimates_of(found, vehicle)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(row), flights)]
+    if isinstance(likelihood, PredictionError):  # output error weighs residuals by their own size: nothing to compare
+        apart = unrelated(lambda others: _quick(likelihood_of(table, others, question)).cost(row), pieces)
+        problems += [apart] if apart else []
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters
