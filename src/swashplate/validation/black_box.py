@@ -6,7 +6,8 @@ given, the motion up to the start and the inputs up to the target, and nothing e
 * the regressors are made again from a record whose motion after a start and whose inputs after the target are spoilt;
   they must be the same to the last bit;
 * the inputs after the target are added. What an aircraft did cannot come from them, so if they help, they tell the
-  motion backwards, as a controller's answers do, and the inputs before the target do so too. Such a ceiling is refused.
+  motion backwards, as a controller's answers do, and the inputs before the target do so too. Such a ceiling is refused,
+  and that of the place or angle which integrates it.
 
 The same regression without any input after the start cannot leak: it is what the past alone predicts.
 
@@ -37,6 +38,10 @@ NO_INPUTS = -1.0
 
 LEAK = 10.0
 """Percent of the error that they may seem to take away by chance."""
+
+_PLACES, _SPEEDS = [0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]
+"""Places and angles among the states, and what they are the integrals of: inputs that tell a speed backwards tell its
+integral too, and those after the target, where the integral is over, do not show it."""
 
 _ROWS = 0.05  # seconds between rows that are learnt from
 _SETTLED = 0.5  # seconds beside a block that are kept out of its regression, beyond the horizon
@@ -150,7 +155,9 @@ def ceiling(
     if plain is None or more is None or past is None:
         return Ceiling(how, refused="the flights are too short for it")
     before, after = (np.sqrt(np.mean(np.concatenate(each), axis=0)) for each in (plain, more))
-    return Ceiling(how, tuple(plain), tuple(past), np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300))))
+    leak = np.asarray(100.0 * (1.0 - after / np.maximum(before, 1e-300)))
+    leak[_PLACES] = np.maximum(leak[_PLACES], leak[_SPEEDS])
+    return Ceiling(how, tuple(plain), tuple(past), leak)
 
 
 def _known(record: FilteredMotion, seconds: float) -> tuple[Array, Array]:
