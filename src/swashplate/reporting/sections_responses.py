@@ -329,9 +329,9 @@ def gains_section(gains: Sequence[Suggestion]) -> Section:
     firmware = "Rotorflight" if any(g.axis in ROTORFLIGHT for g in gains) else "ArduPilot"
     return Section(
         "gains",
-        f"Suggested rate-loop gains ({firmware})",
+        "Suggested rate-loop gains",
         (
-            Table("Gains", ("parameter", "suggested", "flown"), rows),
+            Table(f"Gains ({firmware})", ("parameter", "suggested", "flown"), rows),
             Table(
                 "The rate loop on the identified model",
                 ("axis", "", "suggested", "flown"),

@@ -25,6 +25,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
 from swashplate.simulation.standing import at_rest, standing
+from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 
 DT = 0.01
@@ -135,17 +136,17 @@ def _signals(made: Vehicle, inputs: np.ndarray) -> np.ndarray:
 
 
 def live_loop(made: Vehicle, inputs: np.ndarray, folder: Path) -> np.ndarray:
-    """What the page's clock calls: a law, here one that gives the row, and five steps of 2 ms."""
+    """What the page's clock calls where there is ground: a law, here one that gives the row, and steps of 0.5 ms."""
     around = environment_of(made)
     row, limits = np.array([getattr(around, name) for name in SURROUNDINGS]), np.array(made.input_limits).T
-    n, per_step = len(made.input_names), round(world.PHYSICS_RATE * DT)
+    n, per_step = len(made.input_names), round(DT / LONGEST_STEP)
     x, past, memory = at_rest(made, around), np.zeros((1, n)), np.zeros(1)
     equations, numbers = equations_of(tumbling(made)), parameter_row(made, around)
     back, rows = np.zeros((per_step, n), dtype=int), []
     for given in inputs:
         y, past, memory, _ = world.advance(
             equations, _given, per_step, x, from_euler(x), past, back,
-            memory, np.zeros(4), row, np.zeros(n), given, numbers, limits, 1.0 / world.PHYSICS_RATE,
+            memory, np.zeros(4), row, np.zeros(n), given, numbers, limits, LONGEST_STEP,
         )  # fmt: skip
         x = to_euler(np.asarray(y), x)
         rows.append(x)

@@ -35,13 +35,14 @@ from swashplate.simulation.dynamics import (
 )
 from swashplate.simulation.record import check_divergence
 from swashplate.simulation.runge_kutta import rk4_steps
+from swashplate.simulation.stepping import LONGEST_STEP
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.trim import trim as find_trim
 from swashplate.simulation.tumbling import from_euler, to_euler, tumbling
 from swashplate.simulation.wind import Gusts, Turbulence
 
 PHYSICS_RATE = 500.0
-"""Runge-Kutta steps per second [Hz]."""
+"""Runge-Kutta steps per second [Hz], in the air."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
 _LEAN = np.radians(60.0)
 _HELD_WITHIN = 3.0
@@ -167,9 +168,11 @@ class World:
         self._equations = equations_of(vehicle if self._linear else tumbling(vehicle))
         self._p = parameter_row(vehicle, around)
         self._limits = np.array(vehicle.input_limits).T
-        self._substeps = round(PHYSICS_RATE / self.pilot.rate)
-        self.period = self._substeps / PHYSICS_RATE
-        self._back = _steps_back(vehicle, self._substeps, self.pilot.delays)
+        # Skids and stopped rotors need the step that links and gym take.
+        self._rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
+        self._substeps = round(self._rate / self.pilot.rate)
+        self.period = self._substeps / self._rate
+        self._back = _steps_back(vehicle, self._substeps, self.pilot.delays, self._rate)
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
 
@@ -261,7 +264,7 @@ class World:
                 self.pilot.gains[self.setting.mode, decoupled],
                 self._p,
                 self._limits,
-                1.0 / PHYSICS_RATE,
+                1.0 / self._rate,
             )
             row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in found)
             craft.x = row if self._linear else to_euler(row, craft.x)
@@ -380,12 +383,12 @@ class World:
         self.reset()
 
 
-def _steps_back(vehicle: Vehicle, substeps: int, delays: Array | None) -> NDArray[np.int_]:
+def _steps_back(vehicle: Vehicle, substeps: int, delays: Array | None, rate: float) -> NDArray[np.int_]:
     """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
     if delays is None:  # the page's own pilots are tuned without
         late = input_delays(vehicle) if vehicle.traits.linear else {}
         delays = np.array([late.get(name, 0.0) for name in vehicle.input_names])
-    waits = np.round(delays * PHYSICS_RATE).astype(np.int_)
+    waits = np.round(delays * rate).astype(np.int_)
     return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
 
 
