@@ -20,8 +20,8 @@ import time
 from heli_autopilot import servo_packet
 
 RATE = 400
-PACE = 5.0
-"""Times real time, at most: a soak is to see many kills and not to fill the disk."""
+PACE = float(os.environ.get("SWASHPLATE_SOAK_PACE", "5"))
+"""Times real time, at most: a soak is to see many kills and not to fill the disk. 1 runs beside other work."""
 
 
 def drain(wire: socket.socket) -> None:

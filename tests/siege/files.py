@@ -23,7 +23,7 @@ _START = 120.0
 """s that a worker may take for its first file of a kind: it imports, and makes the whole files."""
 _LOT = 4.0
 """s of work that is handed out at once."""
-_MOST = 0.1
+_MOST = 0.15
 """Part of all files that one kind may have: lines of text are read a thousand times quicker than logs."""
 
 
