@@ -198,10 +198,10 @@ def test_a_helicopter_lives_two_minutes_on_the_ground(name: str, which: str, tmp
 
 
 @pytest.mark.proof
+@pytest.mark.parametrize("which", PATHS)
 @pytest.mark.parametrize("name", ["crazyflie", "x8", "coaxial15", "ingenuity", "lynx", "r50", "rmax"])
-def test_every_other_vehicle_lives_on_the_ground(name: str, tmp_path: Path) -> None:
-    """The equations are the same on all paths; here they are the exported C's."""
-    lives(name, exported_c, tmp_path, parked=60.0)
+def test_every_other_vehicle_lives_two_minutes_on_the_ground(name: str, which: str, tmp_path: Path) -> None:
+    lives(name, PATHS[which], tmp_path, parked=120.0)
 
 
 def test_the_gym_starts_on_the_ground() -> None:
