@@ -14,8 +14,6 @@ def main() -> NoReturn:
     """The console script."""
     os.environ.update(ONE_THREAD)
     gc.set_threshold(50_000, 20, 20)  # cells of a large table are no cycles: looking for some took a fifth of reading
-    # Matrices of 20 to 40 rows: BLAS threads that wait for each other cost three times what they compute.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from swashplate.cli.app import main as run
     except KeyboardInterrupt:

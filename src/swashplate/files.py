@@ -7,6 +7,9 @@ import os
 import stat
 from pathlib import Path
 
+_AT_LEAST = 1 << 16
+"""Bytes that are read of a file whose size the system does not say."""
+
 
 def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
     """A file's bytes.
@@ -25,7 +28,7 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode):
             raise OSError(errno.EINVAL, "it is a pipe or a device, expected a file", os.fspath(path))
-        content = file.read(most + 1)
+        content = file.read(min(most, max(found.st_size, _AT_LEAST)) + 1)  # what is asked for is set aside
     if len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most:,} bytes", os.fspath(path))
     return content

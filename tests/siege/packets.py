@@ -211,6 +211,14 @@ LINKS: dict[str, Callable[[], _Link]] = {
 }
 
 
+def _problem(call: Callable[[], str | None]) -> str:
+    """What is wrong after a call, or which exception ended it."""
+    try:
+        return call() or ""
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"[:200]
+
+
 def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
     """So many mutated packets for each link; where the time is too short, each link gets its part of what is left."""
     rows, bad, until = [], [], time.monotonic() + seconds
@@ -218,18 +226,11 @@ def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
         share = (until - time.monotonic()) / (len(LINKS) - k)
         link, chance, begin, wrong, sent = make(), random.Random(f"{name} {seed}"), time.monotonic(), 0, 0
         while sent < packets and time.monotonic() - begin < share:
-            data, problem = _mutant(link, chance), ""
-            began = time.monotonic()
-            try:
-                link.take(data, chance)
-                sent += 1
-                if sent % _EVERY == 0:
-                    problem = link.look()
-            except Exception as error:
-                problem, sent = f"{type(error).__name__}: {error}"[:200], sent + 1
-            if time.monotonic() - began > 10.0:
-                problem = problem or "took more than 10 s"
-            if problem:
+            data, began, sent = _mutant(link, chance), time.monotonic(), sent + 1
+            problems = [_problem(lambda data=data: link.take(data, chance))]  # type: ignore[misc]
+            problems += [_problem(link.look)] if sent % _EVERY == 0 else []
+            problems += ["took more than 10 s"] if time.monotonic() - began > 10.0 else []
+            for problem in filter(None, problems):
                 wrong += 1
                 bad.append(f"{name}, packet {sent} {data[:40].hex()}: {problem}")
             progress(f"{name}: {sent} packets, {wrong} bad")

@@ -9,7 +9,7 @@ import numpy as np
 from swashplate.api.designed_maneuver import LEAD, DesignedManeuver
 from swashplate.api.maneuver_aims import aim_of
 from swashplate.api.saying import Say, silent
-from swashplate.api.told_by_maneuvers import Told, offer_of
+from swashplate.api.told_by_maneuvers import DesignDraws, offer_of
 from swashplate.arrays import Array
 from swashplate.control.laws.hold import hover_hold
 from swashplate.control.laws.state_hold import state_hold
@@ -117,7 +117,7 @@ def design_maneuver(
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
     wanted = None if aim is None else aim_of(aim, models, unknown, controller or _hold)
     seen = [sensed(one, unknown) for one in models]
-    told = Told(models, seen, unknown, noise, rate, controller or _hold, wanted, values, known)
+    told = DesignDraws(models, seen, unknown, noise, rate, controller or _hold, wanted, values, known)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])

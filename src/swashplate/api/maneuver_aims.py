@@ -32,7 +32,7 @@ Made = Callable[[Vehicle, Trim], Controller]
 
 
 @dataclass(frozen=True)
-class Aim:
+class ManeuverAim:
     """Numbers of a model that a flight is to make certain.
 
     Attributes:
@@ -46,7 +46,7 @@ class Aim:
     slopes: Array
 
 
-def aim_of(text: str, models: Sequence[Vehicle], unknown: Sequence[str], controller: Made) -> Aim:
+def aim_of(text: str, models: Sequence[Vehicle], unknown: Sequence[str], controller: Made) -> ManeuverAim:
     """What an aim is of the draws of a prior.
 
     Args:
@@ -77,10 +77,10 @@ def aim_of(text: str, models: Sequence[Vehicle], unknown: Sequence[str], control
     if not np.max(np.abs(slopes)) > 1e-6:
         raise ManeuverError(f"does not depend on {', '.join(unknown)}.", channel=f"aim {text}")
     if of_loop:
-        return Aim(("disc margin",), np.ones(1), slopes)
+        return ManeuverAim(("disc margin",), np.ones(1), slopes)
     at = [f"{text.partition('@')[0].strip()} {f:.3g} Hz" for f in _frequencies(text)]
     names = (*(f"{one} dB" for one in at), *(f"{one} deg" for one in at))
-    return Aim(names, np.repeat([_DECIBEL, _DEGREES], len(at)), slopes)
+    return ManeuverAim(names, np.repeat([_DECIBEL, _DEGREES], len(at)), slopes)
 
 
 def _response(vehicle: Vehicle, text: str) -> Callable[[Vehicle], Complex]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.api.designed_maneuver import LEAD, Offer, sample_times
-from swashplate.api.maneuver_aims import Aim
+from swashplate.api.maneuver_aims import ManeuverAim
 from swashplate.arrays import Array, Complex
 from swashplate.errors import ManeuverError, SwashError
 from swashplate.filtering.disturbances import Noise
@@ -27,7 +27,7 @@ _SMALLEST = 0.02
 
 
 @dataclass(frozen=True)
-class Told:
+class DesignDraws:
     """The draws of the prior, and what lines of a maneuver tell in each."""
 
     models: Sequence[Vehicle]
@@ -36,7 +36,7 @@ class Told:
     noise: Noise
     rate: float
     controller: Callable[[Vehicle, Trim], Controller]
-    wanted: Aim | None
+    wanted: ManeuverAim | None
     values: Array
     known: Array
 
@@ -123,7 +123,7 @@ def _between(frequency: Array, known: Array, response: Complex) -> Complex:
 def offer_of(
     kind: str,
     pieces: Sequence[Maneuver],
-    told: Told,
+    told: DesignDraws,
     table: Mapping[str, tuple[Array, list[Complex]]],
     limits: Mapping[str, float],
 ) -> Offer:
@@ -137,7 +137,7 @@ def offer_of(
     return Offer(kind, tuple(fitted), sum(p.duration for p in fitted), told.bounds(total), peaks)
 
 
-def _fitted(piece: Maneuver, told: Told, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
+def _fitted(piece: Maneuver, told: DesignDraws, limits: Mapping[str, float]) -> tuple[Maneuver, dict[str, float]]:
     share, lost = 1.0, ""
     for _ in range(_TRIES):
         tried = _smaller(piece, share)
@@ -166,7 +166,7 @@ def _smaller(piece: Maneuver, share: float) -> Maneuver:
     return replace(piece, amplitude=share * piece.amplitude)
 
 
-def _peaks(told: Told, draw: int, piece: Maneuver) -> dict[str, float]:
+def _peaks(told: DesignDraws, draw: int, piece: Maneuver) -> dict[str, float]:
     """Largest attitude from trim [deg], rate [deg/s] and distance from the start [m]."""
     vehicle = told.models[draw]
     time, states, _ = told.fly(draw, piece)

@@ -25,7 +25,7 @@ _LAST = {"foreign", "failed", "refused"}
 
 
 @dataclass(frozen=True)
-class Variable:
+class StoredVariable:
     """A data set.
 
     Attributes:
@@ -42,7 +42,7 @@ class Group:
     """A group's attributes and data sets; the groups in it are told by their own names."""
 
     attributes: Mapping[str, Any]
-    variables: dict[str, Variable] = field(default_factory=dict)
+    variables: dict[str, StoredVariable] = field(default_factory=dict)
 
 
 def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
@@ -74,7 +74,7 @@ def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
         elif told:
             kind = np.dtype(object) if "texts" in told else np.dtype(told["dtype"])
             flat = np.array(told["texts"], kind) if "texts" in told else np.frombuffer(content, kind)
-            at.variables[told["variable"]] = Variable(flat.reshape(told["shape"]), told["attributes"])
+            at.variables[told["variable"]] = StoredVariable(flat.reshape(told["shape"]), told["attributes"])
     return found
 
 

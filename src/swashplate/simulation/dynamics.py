@@ -157,7 +157,7 @@ def rates_and_slopes(
     """The rates of a state row, and their slopes by it and by what drives it; rows as in `row_rates`."""
     rates = row_rates(equations, padded=False)
 
-    def both(x: Any, w: Any) -> tuple[Any, Any]:
+    def both(x: Float[jax.Array, " states"], w: Float[jax.Array, " driving"]) -> tuple[Any, Any]:
         found = rates(x, w, p)
         return found, found
 

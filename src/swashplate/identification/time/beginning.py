@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Complex
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
@@ -210,7 +210,7 @@ class _ComplexArrays(ArrayBackend):
         self.atan2 = self._atan2
 
     @staticmethod
-    def _atan2(y: Any, x: Any) -> Any:
+    def _atan2(y: Complex, x: Complex) -> Any:
         slope = (np.real(x) * np.imag(y) - np.real(y) * np.imag(x)) / (np.real(x) ** 2 + np.real(y) ** 2)
         return np.arctan2(np.real(y), np.real(x)) + 1j * slope
 

@@ -163,10 +163,10 @@ def measured_start(
     parameters: Any,
     nuisance: Nuisance,
     *,
-    value: Any,
-    rate: Any,
-    inputs: Any,
-    voltage: Any,
+    value: Float[jax.Array | np.ndarray, "outputs ..."],
+    rate: Float[jax.Array | np.ndarray, "outputs ..."],
+    inputs: Float[jax.Array | np.ndarray, "... inputs"],
+    voltage: Float[jax.Array | np.ndarray, ...],
     xp: Backend,
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.

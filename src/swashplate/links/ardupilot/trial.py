@@ -180,15 +180,16 @@ class Trial:
 
     def wait_for_ekf(self) -> None:
         """Until its EKF has a place, without which LOITER is refused, and its own checks let it be armed."""
-        health = self.autopilot.health
+        health, last = self.autopilot.health, list[str]()
 
         def ask() -> None:
+            last[:] = health.refusals or last
             health.refusals.clear()
             self.autopilot.ask_readiness(interval=0.5)
 
         found = self._asked(ask, lambda: health.ready is True and health.placed is True, longest=self.plan.ekf)
         if not found:
-            why = "; ".join(health.refusals) or ", ".join(health.sick) or "it does not say why"
+            why = "; ".join(health.refusals or last) or ", ".join(health.sick) or "it does not say why"
             why = "its EKF has no place" if health.ready else why
             self._end("ready to be armed", f"not within {self.plan.ekf:g} s: {why}", f"within {self.plan.ekf:g} s")
         self._tell("ready to be armed", f"after {self.time:.0f} s", f"within {self.plan.ekf:g} s", True)

@@ -101,10 +101,10 @@ def test_input_delays_are_flown(session: LiveSession) -> None:
 
 def test_delays_that_are_no_whole_controller_steps() -> None:
     late = linear_vehicle(parse(to_toml(structure("thirteen_state")).replace("value = 0.02", "value = 0.034")))
-    back = _steps_back(late, 5, None)
+    back = _steps_back(late, 5, None, 500.0)
     ago = np.arange(5)[:, None] * 2 + 10 * back  # ms from when the input was given to the substep
     assert np.all((ago >= 34) & (ago < 44))
-    assert not _steps_back(sp.vehicle("coax"), 5, None).any()
+    assert not _steps_back(sp.vehicle("coax"), 5, None, 500.0).any()
 
 
 @pytest.fixture(scope="module")
