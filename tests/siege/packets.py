@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pymavlink.dialects.v20 import common
@@ -227,7 +228,7 @@ def besiege(*, packets: int, seconds: float, seed: int = 0) -> Found:
         link, chance, begin, wrong, sent = make(), random.Random(f"{name} {seed}"), time.monotonic(), 0, 0
         while sent < packets and time.monotonic() - begin < share:
             data, began, sent = _mutant(link, chance), time.monotonic(), sent + 1
-            problems = [_problem(lambda data=data: link.take(data, chance))]  # type: ignore[misc]
+            problems = [_problem(partial(link.take, data, chance))]
             problems += [_problem(link.look)] if sent % _EVERY == 0 else []
             problems += ["took more than 10 s"] if time.monotonic() - began > 10.0 else []
             for problem in filter(None, problems):
