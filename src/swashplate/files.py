@@ -24,7 +24,8 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
     with os.fdopen(descriptor, "rb") as file:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode):
-            raise OSError(errno.EINVAL, "it is a pipe or a device, expected a file", os.fspath(path))
+            problem = "it is a pipe or a device; write what it gives into a file first"
+            raise OSError(errno.EINVAL, problem, os.fspath(path))
         content = file.read(most + 1)
     if len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most:,} bytes", os.fspath(path))
