@@ -18,6 +18,7 @@ import datetime
 import json
 import os
 import platform
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -78,12 +79,21 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
     }
 
 
+def stamp(*, resumed: bool) -> str:
+    """When and on what code a campaign begins, for its text on the page."""
+    words = ("git", "describe", "--always", "--abbrev=10", "--dirty= with changes that are not committed")
+    told = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    version = proof.metadata.version("swashplate")
+    code = f"commit {told.stdout.strip()}" if told.returncode == 0 else f"version {version}"
+    now = datetime.datetime.now(tz=datetime.UTC)
+    return f"{'Gone on with' if resumed else 'Begun'} on {now:%Y-%m-%d} at {now:%H:%M} UTC, {code}."
+
+
 def siege_section(folder: Path) -> str:
     """All that was found, as one part of the page."""
-    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     parts = [
-        f"# Siege\n\nWritten by `make siege`; do not edit. {today}, {platform.machine()}, {os.cpu_count()} cores. "
-        "Other programs on the machine make the numbers smaller, and nothing else."
+        f"# Siege\n\nWritten by `make siege`; do not edit. {platform.machine()}, {os.cpu_count()} cores. Each campaign "
+        "says when and on what code it ran. Other programs on the machine make the numbers smaller, and nothing else."
     ]
     for file in sorted(folder.glob("*.json")):
         parts.append(proof.section(json.loads(file.read_text(encoding="utf-8"))))
@@ -114,7 +124,9 @@ def main() -> int:
         for old in FOLDER.glob(f"{name}-*.json"):
             old.unlink()
         share = SHARES[name] / sum(SHARES[n] for n in (chosen.only or SHARES))
+        began = stamp(resumed=chosen.resume)
         for k, found in enumerate(run(60.0 * chosen.minutes * share)):
+            found["text"] = f"{found['text']} {began}"
             (FOLDER / f"{name}-{k}.json").write_text(json.dumps(found), encoding="utf-8")
             fell = fell or not found["passed"]
             print(proof.section(found), flush=True)

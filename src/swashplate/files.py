@@ -27,8 +27,12 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
     with os.fdopen(descriptor, "rb") as file:
         found = os.fstat(descriptor)
         if not stat.S_ISREG(found.st_mode):
-            raise OSError(errno.EINVAL, "it is a pipe or a device, expected a file", os.fspath(path))
-        content = file.read(min(most, max(found.st_size, _AT_LEAST)) + 1)  # what is asked for is set aside
+            problem = "it is a pipe or a device; write what it gives into a file first"
+            raise OSError(errno.EINVAL, problem, os.fspath(path))
+        likely = max(found.st_size, _AT_LEAST)
+        content = file.read(min(most, likely) + 1)  # memory is set aside for what is asked for
+        if likely < len(content) <= most:  # it grew
+            content += file.read(most + 1 - len(content))
     if len(content) > most:
         raise OSError(errno.EFBIG, f"it has more than {most:,} bytes", os.fspath(path))
     return content
