@@ -163,7 +163,15 @@ def test_a_closed_pipe_is_quiet(simulated: Path) -> None:
         assert b"Traceback" not in process.stderr.read()
 
 
-def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path) -> None:
+def test_closed_streams_are_no_bug_and_no_file_takes_their_place(tmp_path: Path) -> None:
+    words = "import sys; from swashplate.__main__ import main; sys.argv[1:] = ['structures']; main()"
+    asked = 'exec "$0" -c "$1" <&- >&- 2>"$2"'
+    ended = subprocess.run(["sh", "-c", asked, sys.executable, words, str(tmp_path / "said")], check=False)
+    assert (ended.returncode, (tmp_path / "said").read_text()) == (0, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path, number: signal.Signals) -> None:
     code = (
         "import time\nfrom swashplate.cli import identify\nfrom swashplate.cli.app import main\n"
         "from swashplate.api import identification\n"
@@ -175,6 +183,6 @@ def test_a_polite_kill_leaves_nothing_behind(simulated: Path, tmp_path: Path) ->
         assert process.stdout is not None
         assert process.stdout.readline() == b"fitting\n"
         assert os.listdir(tmp_path) != []  # the temporary folder, until then
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(20) == 128 + signal.SIGTERM
+        process.send_signal(number)
+        assert process.wait(20) == 128 + number
     assert os.listdir(tmp_path) == []

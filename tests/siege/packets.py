@@ -78,20 +78,25 @@ def _ardupilot() -> _Link:
 
 def _second_autopilot() -> _Link:
     """Whole packets of other autopilots between the owner's: on another port and another machine, with its own counts,
-    the ones before and behind, and those of a start. The owner pauses for up to 1.3 s and starts anew now and then."""
+    the ones before and behind, and those of a start. The owner pauses and starts anew now and then; it is never silent
+    for longer than 1.4 s: from `QUIET` (1.5 s) on, another one that keeps asking is to have the link."""
     besieged, calm = (bench("raptor50", engine=QUICK) for _ in range(2))
-    count, others, wrong = [-1], (("127.0.0.1", besieged.sender[1] + 1), ("10.0.0.9", besieged.sender[1])), [""]
+    others = (("127.0.0.1", besieged.sender[1] + 1), ("10.0.0.9", besieged.sender[1]))
+    count, heard, wrong = [-1], [0.0], [""]
 
     def own(chance: random.Random) -> None:
         count[0] = 0 if chance.random() < 0.002 else count[0] + 1
         pulses = [pulse and pulse + chance.randrange(-5, 6) for pulse in _RUNNING]
-        packet = servo_packet(400, count[0], pulses)
+        packet, heard[0] = servo_packet(400, count[0], pulses), besieged.now
         answers = [at.session.handle(packet, at.sender, besieged.now) for at in (besieged, calm)]
         if answers[0] != answers[1] or answers[0] is None:
             wrong[0] = "the flight is not the one that nobody disturbed"
 
     def take(data: bytes, chance: random.Random) -> None:
-        besieged.now += 1.3 if chance.random() < 0.001 else chance.choice((1e-4, 1e-3, 2.5e-3, 0.02))
+        later = 1.3 if chance.random() < 0.001 else chance.choice((1e-4, 1e-3, 2.5e-3, 0.02))
+        if count[0] >= 0 and besieged.now + later - heard[0] > 1.4:
+            own(chance)
+        besieged.now += later
         if count[0] < 0 or chance.random() < 0.5:
             own(chance)
             return

@@ -163,9 +163,9 @@ def test_a_link_that_is_moved_by_strangers_is_told(monkeypatch: pytest.MonkeyPat
 
     link = packets._Link(take, (b"a" * 2000,), lambda: "it moved")
     monkeypatch.setattr(packets, "LINKS", {"made up": lambda: link})
-    found = packets.besiege(packets=packets._EVERY, seconds=20.0)
+    found = packets.besiege(packets=3 * packets._EVERY, seconds=20.0)  # a packet that fails is not looked behind
     assert any("IndexError" in words for words in found.bad)
-    assert "it moved" in found.bad[-1]
+    assert any("it moved" in words for words in found.bad)
 
 
 def test_hostile_pages_in_short() -> None:
