@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, cast
 
 import gymnasium
@@ -36,7 +37,7 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         task: "hover", "trajectory", "sweep" or a `Task`.
         task_options: for the task by name, e.g. {"duration": 5.0}.
         render_mode: "rgb_array" for pictures by `render` (needs matplotlib), or None.
-        options: see `flying`: rate, substeps, authority, spread, randomize, wind, inner, ground.
+        rate, substeps, authority, spread, randomize, wind, inner, ground: as `flying` takes them.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 50}  # noqa: RUF012  (Gymnasium's own)
@@ -48,10 +49,28 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         *,
         task_options: dict[str, Any] | None = None,
         render_mode: str | None = None,
-        **options: Any,
+        rate: float = 50.0,
+        substeps: int | None = None,
+        authority: float = 0.2,
+        spread: float = 1.0,
+        randomize: Mapping[str, float] | None = None,
+        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        inner: bool = False,
+        ground: bool = False,
     ) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
+        self.flying = flying(
+            vehicle,
+            task_of(task, task_options or {}),
+            rate=rate,
+            substeps=substeps,
+            authority=authority,
+            spread=spread,
+            randomize=randomize,
+            wind=wind,
+            inner=inner,
+            ground=ground,
+        )
         seen, moved = spaces(self.flying)
         self.observation_space, self.action_space = cast(Any, seen), cast(Any, moved)
         self._k = np.zeros(1, dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -40,12 +41,30 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
         *,
         task_options: dict[str, Any] | None = None,
         render_mode: str | None = None,
-        **options: Any,
+        rate: float = 50.0,
+        substeps: int | None = None,
+        authority: float = 0.2,
+        spread: float = 1.0,
+        randomize: Mapping[str, float] | None = None,
+        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        inner: bool = False,
+        ground: bool = False,
     ) -> None:
         if num_envs < 1:
             raise SwashError(f"is {num_envs}, expected at least 1.", channel="num_envs")
         self.num_envs, self.render_mode = num_envs, checked_mode(render_mode)
-        self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
+        self.flying = flying(
+            vehicle,
+            task_of(task, task_options or {}),
+            rate=rate,
+            substeps=substeps,
+            authority=authority,
+            spread=spread,
+            randomize=randomize,
+            wind=wind,
+            inner=inner,
+            ground=ground,
+        )
         self.single_observation_space, self.single_action_space = spaces(self.flying)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
