@@ -206,8 +206,11 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:
-    """Writes a text file (UTF-8, line ends as they stand in `text`) by rename when complete."""
-    return write_bytes(path, text.encode("utf-8"))
+    """Writes a text file (UTF-8, line ends as they stand in `text`) by rename when complete.
+
+    Names of files may hold bytes that are no UTF-8; "?" stands for each.
+    """
+    return write_bytes(path, text.encode("utf-8", errors="replace"))
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes | memoryview) -> Path:

@@ -313,12 +313,13 @@ def besiege(
                 for case in cases:
                     if time.monotonic() - begin > seconds:
                         break
-                    share = (k + chance.random()) / max(1, -(-max(kills, failures) // len(cases)))
-                    stop = 1 + int(min(share, 0.999) * case.calls)
+                    at, last = k + chance.random(), case.calls - 1
                     if killed.total() < kills:
+                        stop = 1 + min(int(at / -(-kills // len(cases)) * case.calls), last)
                         bad_kills += case.struck(mode=chance.choice((KILL, KILL, HALF)), stop=stop)
                         killed[case.name] += 1
                     if failed.total() < failures:
+                        stop = 1 + min(int(at / -(-failures // len(cases)) * case.calls), last)
                         kind = list(ERRORS)[(k + failed.total()) % len(ERRORS)]
                         bad_failures += [
                             f"{kind}, {words}" for words in case.struck(mode=FAIL, stop=stop, error=ERRORS[kind])

@@ -79,6 +79,10 @@ def test_a_device_is_written_to_and_not_replaced() -> None:
     assert os.path.samestat(before, os.stat("/dev/full"))
 
 
+def test_a_text_may_name_a_file_whose_name_is_no_utf_8(tmp_path: Path) -> None:
+    assert atomic.write_text(tmp_path / "page.html", "m\udce4rz.csv").read_bytes() == b"m?rz.csv"
+
+
 def test_a_pipe_that_nobody_reads_from_is_refused_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(WriteError, match="Nobody reads from this pipe"):

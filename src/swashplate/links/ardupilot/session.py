@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from swashplate.links.ardupilot.answer import line
-from swashplate.links.ardupilot.frames import SILENT, Address, Frames, PacketAction, place
+from swashplate.links.ardupilot.frames import QUIET, SILENT, Address, Frames, PacketAction, place
 from swashplate.links.ardupilot.packets import Refusal, ServoPacket, parse
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant
@@ -79,7 +79,8 @@ class ArduPilotSession:
             self._notices.tell(
                 "stray",
                 f"packets of another sender, {_at(sender)}, are ignored and counted: the link belongs to "
-                f"{_at(before.sender)} until that one has been silent for {SILENT:g} s.",
+                f"{_at(before.sender)} until that one has been silent for {SILENT:g} s ({QUIET:g} s "
+                "where another one keeps asking).",
             )
             return None
         if step is PacketAction.START:
