@@ -28,6 +28,8 @@ _STALLED = 15.0
 """s of wall clock without a step of the physics after which nothing is waited for any more."""
 _AGAIN = 1.0
 """s of wall clock after which a request is repeated."""
+_ANSWERED = 3.0
+"""s of wall clock within which a last question is answered."""
 _REACHED, _CALM = 0.3, 0.3
 """m from the height, and m/s, where the climb is over."""
 
@@ -189,6 +191,10 @@ class Trial:
 
         found = self._asked(ask, lambda: health.ready is True and health.placed is True, longest=self.plan.ekf)
         if not found:
+            if not (health.refusals or last):  # simulated seconds can be over before a first answer is heard
+                ask()
+                until = time.monotonic() + _ANSWERED
+                self.wait(lambda: bool(health.refusals) or time.monotonic() > until, longest=math.inf)
             why = "; ".join(health.refusals or last) or ", ".join(health.sick) or "it does not say why"
             why = "its EKF has no place" if health.ready else why
             self._end("ready to be armed", f"not within {self.plan.ekf:g} s: {why}", f"within {self.plan.ekf:g} s")
