@@ -29,7 +29,7 @@ def date() -> str:
 
 def card_hash(card: Card) -> str:
     """SHA-256 of a card's text, without the path that it was read from."""
-    return hashlib.sha256(card.to_toml().encode()).hexdigest()
+    return hashlib.sha256(card.to_toml().encode("utf-8", errors="replace")).hexdigest()
 
 
 def result_hash(result: dict[str, Any]) -> str:

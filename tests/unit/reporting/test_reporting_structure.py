@@ -257,6 +257,7 @@ def test_hashes_follow_the_numbers_and_nothing_else(monkeypatch: pytest.MonkeyPa
     card = one.model.card
     assert card_hash(card) == card_hash(replace(card, path="elsewhere.toml"))
     assert card_hash(card) != card_hash(one.start.card)
+    assert card_hash(replace(card, title="m\udce4rz.csv")) == card_hash(replace(card, title="m?rz.csv"))
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     assert date() == "1970-01-01 00:00 UTC"
 
