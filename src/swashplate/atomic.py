@@ -15,7 +15,7 @@ import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -277,12 +277,23 @@ def folder_when_complete(target: str | os.PathLike[str], *, ours: Collection[str
             written = {file.name for file in (temporary / _NEW).iterdir()}
             note = {"remove": sorted(set(ours) - written), "move": sorted(written)}
             _synced(temporary / _NEW)
+            before = _lying(place, note)
             write_text(temporary / _COMMIT, json.dumps(note))
             try:
                 _swap(temporary)
             except KeyboardInterrupt:
                 _swap(temporary)  # all of it is there: it is quicker to finish than to go back
                 raise
+            except OSError as error:
+                if _lying(place, note) == before and _lying(temporary / _NEW, note) == written:  # nothing was moved yet
+                    (temporary / _COMMIT).unlink()
+                    raise
+                raise WriteError(
+                    f"not all of it could be moved to its place: {error.strerror or error}. All of it is written and "
+                    f"waits in {temporary.name}.",
+                    where=os.fspath(target),
+                    hint="Free some space: the next command that writes there moves it to its place first.",
+                ) from error
     finally:
         if not (temporary / _COMMIT).exists() or not any((temporary / _NEW).iterdir()):  # otherwise it is still needed
             shutil.rmtree(temporary, ignore_errors=True)
@@ -316,6 +327,11 @@ def _without_empty(folders: list[Path]) -> None:
     with suppress(OSError):
         for folder in folders:
             folder.rmdir()
+
+
+def _lying(place: Path, note: Mapping[str, list[str]]) -> set[str]:
+    """The names of a note that are in a folder."""
+    return {name for names in note.values() for name in names if os.path.lexists(place / name)}
 
 
 def _swap(temporary: Path) -> None:

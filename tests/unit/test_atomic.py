@@ -262,6 +262,33 @@ def test_an_interrupt_while_swapping_finishes_the_swap(tmp_path: Path, monkeypat
     assert _litter(tmp_path) == []
 
 
+@pytest.mark.parametrize("old", [False, True])
+def test_a_disk_that_is_full_while_swapping(old: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    replace = os.replace
+
+    def full(source: Path, target: Path) -> None:
+        if Path(target).parent == tmp_path:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        replace(source, target)
+
+    for name in "abc" if old else "":
+        (tmp_path / name).write_text("old")
+    monkeypatch.setattr(atomic.os, "replace", full)
+
+    def write() -> None:
+        with atomic.folder_when_complete(tmp_path, ours=()) as here:
+            for name in "abc":
+                atomic.write_text(here / name, "new")
+
+    told = "waits in .swash-.* moves it to its place first" if old else "cannot be written: No space left"
+    with pytest.raises(WriteError, match=told):
+        write()
+    monkeypatch.undo()
+    assert len(os.listdir(tmp_path)) == int(old)
+    atomic.sweep(tmp_path)
+    assert _results(tmp_path) == (dict.fromkeys("abc", "new") if old else {})
+
+
 def test_a_scratch_folder_goes_and_takes_those_of_dead_processes_along(tmp_path: Path) -> None:
     left = tmp_path / ".swash-0123"
     left.mkdir()
