@@ -16,7 +16,19 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import closed_loops, export, frequency, helicopter, identifying, link, live, many, peers, single
+from benchmarks import (
+    closed_loops,
+    export,
+    frequency,
+    helicopter,
+    identifying,
+    link,
+    live,
+    many,
+    peers,
+    single,
+    state_space,
+)
 from benchmarks.rotor_options import rotor_options
 from benchmarks.timing import Result
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -109,6 +121,7 @@ def main() -> None:
         frequency.responses(repeats=repeats),
         *frequency.x8(repeats=repeats),
         frequency.fit(repeats=1),
+        state_space.against_subspaces(seconds=20.0 if options.short else state_space.SECONDS),
     ]
     show(
         "Seconds",

@@ -22,6 +22,7 @@ class Entry:
         lower, upper: bounds.
         mean, sigma: prior (sigma infinite: none).
         logarithmic: True where the row holds the natural logarithm.
+        variance: True where that logarithm is of a deviation whose square adds to the measurements' variance.
         kinked: True where the cost bends suddenly, as a delay's does when a held command passes a sample.
     """
 
@@ -34,6 +35,7 @@ class Entry:
     mean: float = 0.0
     sigma: float = np.inf
     logarithmic: bool = False
+    variance: bool = False
     kinked: bool = False
 
 

@@ -45,6 +45,9 @@ _NOISE_SPREAD = {
 
 _WIND = ("wind", "tau_wind")
 
+_ADDED = ("white", "gust", "wind", "sensor")
+"""How the noise numbers begin whose squares add to the innovations' variance; drifts and times act by ratios."""
+
 _NUISANCE = {
     # name: start, scale, prior sigma
     "delay_servo": (0.05, 0.05, 0.05),
@@ -57,6 +60,9 @@ _NUISANCE = {
     "level_psi": (0.0, 0.1, 0.2),
 }
 
+
+_Accumulated = tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]
+"""Gradient, information, runs, and slopes by record."""
 
 _KEPT = 2
 """Rows whose runs are kept: a search tries up to two, and goes on from one of them."""
@@ -152,9 +158,8 @@ class PredictionError:
         noises = _estimated(self.model, self.noise) if estimate_noise else ()
         for name in noises:
             log = float(np.log(getattr(self.noise, name)))
-            entries.append(
-                Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, _NOISE_SPREAD.get(name, 2.0), True)
-            )
+            spread, added = _NOISE_SPREAD.get(name, 2.0), name.startswith(_ADDED)
+            entries.append(Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, spread, True, added))
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
@@ -172,6 +177,7 @@ class PredictionError:
             for log, piece, first in zip(self._log, pieces, seen, strict=True)
         )
         self._kept: dict[bytes, list[Filtered]] = {}
+        self._last: tuple[bytes, _Accumulated] | None = None
         settled = round(SETTLING / self.model.dt)
         self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
 
@@ -259,7 +265,14 @@ class PredictionError:
         """What the traceable functions of `innovations` take beside a row."""
         return self._plan, self._data
 
-    def _accumulate(self, row: Array) -> tuple[Array, Array, list[Filtered], list[tuple[Array, Array]]]:
+    def _accumulate(self, row: Array) -> _Accumulated:
+        """Slopes at a row; those of the last one are kept, which a search ends with and its judges ask for."""
+        asked = np.asarray(row, dtype=np.float64).tobytes()
+        if self._last is None or self._last[0] != asked:
+            self._last = asked, self._accumulated(row)
+        return self._last[1]
+
+    def _accumulated(self, row: Array) -> _Accumulated:
         p, runs = len(self.row), self.runs(row)
         moved: list[tuple[Array, Array]] = []
         gradient, information = np.zeros(p), np.zeros((p, p))
@@ -268,22 +281,44 @@ class PredictionError:
             nu = run.innovations[first:]
             if not np.isfinite(nu).all():
                 return gradient, information, runs, moved
-            d_nu, dS = mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
+            d_nu, dS = self._moved(mine, run, row)
             Li = np.linalg.inv(np.linalg.cholesky(S))
             white = nu @ Li.T
             weight = robust.weights(white)
             d_white = (d_nu[:, first:].reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             dM = Li @ dS @ Li.T
-            moved.append((d_white, dM))
-            flat = d_white.reshape(p, -1)
-            gradient += flat @ (white * weight).ravel()
+            gradient += d_white.reshape(p, -1) @ (white * weight).ravel()
             gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
             # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
-            weighted = flat * np.sqrt(weight).ravel()
+            told = (self._foreseen(d_nu[:, first:], nu, mine.log).reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
+            moved.append((told, dM))
+            weighted = told.reshape(p, -1) * np.sqrt(weight).ravel()
             information += weighted @ weighted.T
             information += _by_covariance(dM, nu.shape[0])
         return gradient, information, runs, moved
+
+    def _moved(self, mine: RecordRun, run: Filtered, row: Array) -> tuple[Array, Array]:
+        """Slopes of a record's innovations (p, n, outputs) and of their covariance (p, outputs, outputs)."""
+        return mine.moved(run, self.table.card_row, row * self.row.scale, self.row.scale)
+
+    def _foreseen(self, d_nu: Array, nu: Array, log: int) -> Array:
+        """Slopes of innovations (p, n, outputs) without what only turns them: the part that tells something.
+
+        Innovations stand in the axes of the predicted heading. An entry that moves it turns what was measured now too,
+        which makes no flight more or less likely.
+        """
+        names = self.model.output_names
+        if not {"x", "y", "psi"} <= set(names):
+            return d_nu
+        i, j, k = (names.index(name) for name in ("x", "y", "psi"))
+        place = self.row.names.index(f"level_psi[{log}]")
+        heading = -d_nu[:, :, k]
+        heading[place] -= self.row.scale[place]  # what is tracked moves, the nose does not
+        told = d_nu.copy()
+        told[:, :, i] -= heading * nu[:, j]
+        told[:, :, j] += heading * nu[:, i]
+        return told
 
     def refresh(self, row: Array) -> None:
         """Nothing is held between iterations: the noise is part of the row."""

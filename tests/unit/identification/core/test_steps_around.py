@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swashplate.identification.core.scoring import _held, _within
+from swashplate.identification.core.damped_steps import _held, _within
 
 
 def test_holding_at_the_reach_promises_more_than_cutting_or_shortening() -> None:
