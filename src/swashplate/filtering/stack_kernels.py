@@ -2,7 +2,8 @@
 
 XLA spends three quarters of a filter's step on copies: it turns stacks of matrices so that the vehicle comes first
 wherever it multiplies, and back. Here as many vehicles as the processor's vectors hold are packed, products leave out
-what is zero in all of them (most of a Jacobian is), and only half of a symmetric matrix is computed. Compiled where a C compiler is.
+what is zero in all of them (most of a Jacobian is), and only half of a symmetric matrix is computed. Compiled where a C
+compiler is.
 """
 
 from __future__ import annotations

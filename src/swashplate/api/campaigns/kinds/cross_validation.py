@@ -93,7 +93,9 @@ class CrossValidationKind:
                 worst = int(np.argmin(np.where(known, fits, np.inf)))
                 words = (f"{np.mean(fits[known]):.1f}", f"{np.std(fits[known]):.1f}", f"{fits[worst]:.1f}")
                 told.append((name.removeprefix(_SCORE), *words, folds[worst]))
-        tables: list[Any] = [("Fits of what no fit had seen [%]", ("of", "mean", "scatter", "worst", "in"), tuple(told))]
+        tables: list[Any] = [
+            ("Fits of what no fit had seen [%]", ("of", "mean", "scatter", "worst", "in"), tuple(told))
+        ]
         cells = [_moved(name, table, usable) for name in names if np.sum(usable) > 1]
         far = [name for name, ratio, _ in cells if ratio > _FAR]
         if far:
