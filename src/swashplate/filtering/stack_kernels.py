@@ -1,8 +1,9 @@
-"""The covariance of many observers in C, called from XLA's programs: four vehicles are one vector.
+"""The covariance of many observers in C, called from XLA's programs: four vehicles, or eight, are one vector.
 
 XLA spends three quarters of a filter's step on copies: it turns stacks of matrices so that the vehicle comes first
-wherever it multiplies, and back. Here four vehicles at a time are packed, products leave out what is zero in all four
-(most of a Jacobian is), and only half of a symmetric matrix is computed. Compiled where a C compiler is.
+wherever it multiplies, and back. Here as many vehicles as the processor's vectors hold are packed, products leave out
+what is zero in all of them (most of a Jacobian is), and only half of a symmetric matrix is computed. Compiled where a C
+compiler is.
 """
 
 from __future__ import annotations
@@ -83,55 +84,64 @@ _SOURCE = """#include <math.h>
 #include <string.h>
 #include "xla/ffi/api/c_api.h"
 
-typedef double four __attribute__((vector_size(32)));
+#ifdef __AVX512F__
+enum { V = 8, TILE = 8 };
+#else
 enum { V = 4, TILE = 8 };
+#endif
+typedef double vector __attribute__((vector_size(V * sizeof(double))));
+
+static int any(vector x) {
+  int found = 0;
+  for (int l = 0; l < V; ++l) found |= x[l] != 0;
+  return found;
+}
 
 static long vehicles_in(long n, long at) { return n - at < V ? n - at : V; }
 
-/* Four vehicles of a stack from vehicle `at` on; missing ones repeat the last. */
-static void pack(four *to, const double *from, long count, long n, long at) {
+/* V vehicles of a stack from vehicle `at` on; missing ones repeat the last. */
+static void pack(vector *to, const double *from, long count, long n, long at) {
   const long here = vehicles_in(n, at);
   for (long i = 0; i < count; ++i) {
     const double *row = from + i * n + at;
-    if (here == V) memcpy(to + i, row, sizeof(four));
+    if (here == V) memcpy(to + i, row, sizeof(vector));
     else for (long l = 0; l < V; ++l) to[i][l] = row[l < here ? l : here - 1];
   }
 }
 
-static void unpack(double *to, const four *from, long count, long n, long at) {
+static void unpack(double *to, const vector *from, long count, long n, long at) {
   const long here = vehicles_in(n, at);
   for (long i = 0; i < count; ++i) memcpy(to + i * n + at, from + i, (size_t)here * sizeof(double));
 }
 
-/* Of each row the columns in which one of the four is not zero. */
-static void find(const four *a, long rows, long columns, int *used, int *count) {
+/* Of each row the columns in which one of the vehicles is not zero. */
+static void find(const vector *a, long rows, long columns, int *used, int *count) {
   for (long i = 0; i < rows; ++i) {
     count[i] = 0;
     for (long k = 0; k < columns; ++k) {
-      const four x = a[i * columns + k];
       used[i * columns + count[i]] = (int)k;
-      count[i] += x[0] != 0 || x[1] != 0 || x[2] != 0 || x[3] != 0;
+      count[i] += any(a[i * columns + k]);
     }
   }
 }
 
 /* out = scale a b, row i and column j of it at out[i down + j across]; of a symmetric one half: columns up to i. */
-static void times(four *out, long down, long across, const four *a, const int *used, const int *count, long rows,
-                  long inner, const four *b, long columns, double scale, int half) {
+static void times(vector *out, long down, long across, const vector *a, const int *used, const int *count, long rows,
+                  long inner, const vector *b, long columns, double scale, int half) {
   for (long j = 0; j < columns; j += TILE) {
     const long wide = columns - j < TILE ? columns - j : TILE;
     for (long i = half ? j : 0; i < rows; ++i) {
       const int *list = used + i * inner;
-      four sum[TILE];
-      for (int t = 0; t < TILE; ++t) sum[t] = (four){0, 0, 0, 0};
+      vector sum[TILE];
+      for (int t = 0; t < TILE; ++t) sum[t] = (vector){0};
       if (wide == TILE)
         for (int q = 0; q < count[i]; ++q) {
-          const four x = a[i * inner + list[q]], *right = b + list[q] * columns + j;
+          const vector x = a[i * inner + list[q]], *right = b + list[q] * columns + j;
           for (int t = 0; t < TILE; ++t) sum[t] += x * right[t];
         }
       else
         for (int q = 0; q < count[i]; ++q) {
-          const four x = a[i * inner + list[q]], *right = b + list[q] * columns + j;
+          const vector x = a[i * inner + list[q]], *right = b + list[q] * columns + j;
           for (long t = 0; t < wide; ++t) sum[t] += x * right[t];
         }
       for (long t = 0; t < wide; ++t) out[i * down + (j + t) * across] = scale * sum[t];
@@ -139,7 +149,7 @@ static void times(four *out, long down, long across, const four *a, const int *u
   }
 }
 
-static void mirror(four *p, long N) {
+static void mirror(vector *p, long N) {
   for (long i = 0; i < N; ++i)
     for (long j = 0; j < i; ++j) p[j * N + i] = p[i * N + j];
 }
@@ -168,7 +178,7 @@ XLA_FFI_Error *swash_propagated(XLA_FFI_CallFrame *frame) {
   if (asked) return 0;
   const long m = GIVEN(0)->dims[0], r = GIVEN(1)->dims[0], N = GIVEN(2)->dims[0], n = GIVEN(2)->dims[2];
   const double *noise = GIVEN(3)->data, dt = *(const double *)GIVEN(4)->data;
-  four a[m * m], h[m * m], f[m * m], g[N * N], p[N * N], t[N * N];
+  vector a[m * m], h[m * m], f[m * m], g[N * N], p[N * N], t[N * N];
   int used[N * N], count[N];
   for (long at = 0; at < n; at += V) {
     pack(a, GIVEN(0)->data, m * m, n, at);
@@ -182,7 +192,7 @@ XLA_FFI_Error *swash_propagated(XLA_FFI_CallFrame *frame) {
     }
     memset(g, 0, sizeof g);
     for (long i = 0; i < m; ++i) {
-      memcpy(g + i * N, h + i * m, (size_t)m * sizeof(four));
+      memcpy(g + i * N, h + i * m, (size_t)m * sizeof(vector));
       g[i * N + i] += 1;
     }
     for (long i = m; i < N - r; ++i) g[i * N + i] += 1;
@@ -203,7 +213,7 @@ XLA_FFI_Error *swash_updated(XLA_FFI_CallFrame *frame) {
   if (asked) return 0;
   const long c = GIVEN(0)->dims[0], N = GIVEN(1)->dims[0], n = GIVEN(1)->dims[2];
   const double *noise = GIVEN(4)->data;
-  four h[c * N], p[N * N], mean[N], news[c], hp[c * N], s[c * c], told[N * c], less[N * N];
+  vector h[c * N], p[N * N], mean[N], news[c], hp[c * N], s[c * c], told[N * c], less[N * N];
   int used[N * N], count[N];
   for (long at = 0; at < n; at += V) {
     pack(h, GIVEN(0)->data, c * N, n, at);
@@ -214,20 +224,20 @@ XLA_FFI_Error *swash_updated(XLA_FFI_CallFrame *frame) {
     times(hp, N, 1, h, used, count, c, N, p, N, 1, 0);
     for (long i = 0; i < c; ++i)
       for (long j = 0; j < c; ++j) {
-        four sum = {0, 0, 0, 0};
+        vector sum = {0};
         for (int q = 0; q < count[i]; ++q) sum += h[i * N + used[i * N + q]] * hp[j * N + used[i * N + q]];
         s[i * c + j] = i == j ? sum + noise[i] : sum;
       }
     unpack(FOUND(2)->data, s, c * c, n, at);
     for (long i = 0; i < c; ++i) {  /* rows of [S | H P | innovation] without those above them */
-      four one;
+      vector one;
       for (int l = 0; l < V; ++l) one[l] = 1 / sqrt(s[i * c + i][l]);
       for (long j = i; j < c; ++j) s[i * c + j] *= one;
       for (long j = 0; j < N; ++j) hp[i * N + j] *= one;
       news[i] *= one;
       for (long k = i + 1; k < c; ++k) {
-        const four x = s[i * c + k];
-        if (x[0] == 0 && x[1] == 0 && x[2] == 0 && x[3] == 0) continue;
+        const vector x = s[i * c + k];
+        if (!any(x)) continue;
         for (long j = k; j < c; ++j) s[k * c + j] -= x * s[i * c + j];
         for (long j = 0; j < N; ++j) hp[k * N + j] -= x * hp[i * N + j];
         news[k] -= x * news[i];

@@ -221,6 +221,7 @@ def _own_cluster(make: Any, workers: int) -> Any:
                 processes=True,
                 memory_limit=None,
                 dashboard_address=None,
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},  # not 8787: others run too
                 silence_logs=logging.CRITICAL,
             )
         except RuntimeError:

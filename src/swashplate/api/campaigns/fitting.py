@@ -1,19 +1,22 @@
-"""What campaigns of fits share: what their files say of a fit, where it starts, and one that may fail."""
+"""What campaigns of fits share: what their files say of a fit and its logs, where it starts, and one that may fail."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from swashplate.api.campaigns.kind import CampaignSettings
+from swashplate.api.campaigns.flown import vehicle_of
+from swashplate.api.campaigns.kind import CampaignSettings, NamedFile
 from swashplate.api.campaigns.tasks import Columns
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
+from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.result import Result, bounds_of
 from swashplate.identification.identify import identify
@@ -61,6 +64,35 @@ class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, fr
             wind=self.wind,
             biases=biases,
         )
+
+
+class LogsCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """What campaigns of fits to logs say in their files, about the vehicle's numbers.
+
+    Attributes:
+        flights: logs to fit to.
+        condition: False takes the logs as they are, at one rate already. rate: otherwise, samples per second [Hz].
+        biases: as of `sp.identify`.
+    """
+
+    flights: list[str] = msgspec.field(default_factory=list)
+    condition: bool = True
+    rate: float = 100.0
+    biases: list[str] = msgspec.field(default_factory=list)
+
+    @property
+    def logs(self) -> tuple[NamedFile, ...]:
+        """The vehicle's file and the logs."""
+        return NamedFile("vehicle", self.vehicle, True), *(NamedFile("flights", name) for name in self.flights)
+
+    def model(self, files: Mapping[str, Path]) -> Vehicle:
+        """The vehicle."""
+        return vehicle_of(str(files.get(self.vehicle, self.vehicle)))
+
+    def records(self, files: Mapping[str, Path]) -> tuple[Flight, ...]:
+        """Its logs, conditioned, in the order of the file."""
+        raw = (read(files[name]) for name in self.flights)
+        return tuple(flight.condition(rate=self.rate, cutoff=0.0) if self.condition else flight for flight in raw)
 
 
 @dataclass(frozen=True)

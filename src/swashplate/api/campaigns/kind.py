@@ -9,7 +9,9 @@ from typing import Any, NamedTuple, Protocol
 
 import msgspec
 
+from swashplate import documents
 from swashplate.api.campaigns.tasks import Columns, Portion, portions
+from swashplate.errors import CampaignError
 from swashplate.registry import Registry
 
 
@@ -46,8 +48,22 @@ class NamedFile(NamedTuple):
     or_name: bool = False
 
 
-NO_RESULT = ("kind", "of", "title", "count", "batch")
+NO_RESULT = ("kind", "of", "title", "count", "batch", "over")
 """Entries that no task's result depends on: its portion says the rest."""
+
+
+class ChoiceCurve(NamedTuple):
+    """A line of a figure over choices.
+
+    Attributes:
+        what, along: of the axes. name: of the line.
+        points: x, y, and the ends of y's 95 % interval, each.
+    """
+
+    what: str
+    along: str
+    name: str
+    points: tuple[tuple[float, float, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -60,6 +76,8 @@ class CampaignFindings:
         worst: column by whose size rows are bad, the largest worst; "" where none is.
         tables: further ones: caption, headings, cells.
         careful: what a reader must see first.
+        counted: column of 0 and 1 whose share of ones is told of each choice of a sweep; "" where none is.
+        curves: lines of one figure.
     """
 
     summary: tuple[tuple[str, str, str], ...]
@@ -67,6 +85,8 @@ class CampaignFindings:
     worst: str = ""
     tables: tuple[tuple[str, tuple[str, ...], tuple[tuple[str, ...], ...]], ...] = field(default=())
     careful: tuple[str, ...] = ()
+    counted: str = ""
+    curves: tuple[ChoiceCurve, ...] = ()
 
 
 class CampaignKind(Protocol):
@@ -122,6 +142,9 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
         "recovery": "swashplate.api.campaigns.kinds.recovery:RECOVERY",
         "multi-start": "swashplate.api.campaigns.kinds.multi_start:MULTI_START",
         "fleet": "swashplate.api.campaigns.kinds.fleet:FLEET",
+        "cross-validation": "swashplate.api.campaigns.kinds.cross_validation:CROSS_VALIDATION",
+        "bootstrap": "swashplate.api.campaigns.kinds.bootstrap:BOOTSTRAP",
+        "sweep": "swashplate.api.campaigns.kinds.sweep:SWEEP",
     },
 )
 """By the name that a campaign's file says as `of`."""
@@ -130,3 +153,13 @@ CAMPAIGNS: Registry[CampaignKind] = Registry(
 def in_batches(settings: CampaignSettings, *, usual: int) -> tuple[Portion, ...]:
     """The campaign's rows in tasks of `batch`, or of `usual` where the file says nothing."""
     return portions(count=settings.count, batch=settings.batch or usual, seed=settings.seed)
+
+
+def settings_of(name: str, document: Mapping[str, Any], *, where: str = "") -> Any:
+    """The document of a campaign of the kind `name`, held against the kind's schema.
+
+    Raises:
+        CampaignError: an entry that is missing, unknown or of another type.
+    """
+    whole = {"kind": "campaign", "of": name, **document}
+    return documents.checked(whole, CAMPAIGNS[name].schema, where=where, error=CampaignError)

@@ -122,7 +122,7 @@ def _serve(pipe: Connection, work: Work) -> None:
     while True:
         try:
             task = pipe.recv()
-        except EOFError:
+        except (EOFError, OSError):  # the client has ended, in one way or another
             return
         answer: tuple[Columns | None, str] = (None, "")
         try:
@@ -130,7 +130,10 @@ def _serve(pipe: Connection, work: Work) -> None:
         except Exception as error:  # whatever a task's own code raises is its outcome
             answer = (None, in_words(error))
         sys.stdout.flush()
-        pipe.send(answer)
+        try:
+            pipe.send(answer)
+        except OSError:
+            return
 
 
 def in_words(error: BaseException) -> str:

@@ -13,12 +13,11 @@ import numpy as np
 import xarray as xr
 
 from swashplate import atomic
-from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings
+from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.plan import planned_in
 from swashplate.api.campaigns.shares import quantile
 from swashplate.api.campaigns.store import CampaignStore
 from swashplate.api.campaigns.tasks import Columns
-from swashplate.api.campaigns.worker import settings_of
 from swashplate.errors import CampaignError
 from swashplate.reporting.campaign import FailedTask, Shape, WorstRow, compose_campaign
 from swashplate.reporting.structure import Report
@@ -72,9 +71,8 @@ class Campaign(Shown):
     @cached_property
     def findings(self) -> CampaignFindings:
         """What its kind makes of the table."""
-        kind = CAMPAIGNS[self.of]
         document = {key: value for key, value in self.document.items() if key not in ("kind", "of")}
-        return kind.findings(settings_of(kind, self.of, document, where=str(self.folder)), self.table)
+        return CAMPAIGNS[self.of].findings(settings_of(self.of, document, where=str(self.folder)), self.table)
 
     @property
     def quantiles(self) -> dict[str, tuple[tuple[float, float, float], ...]]:
@@ -145,6 +143,7 @@ class Campaign(Shown):
             worst_by=f"{found.worst} [{unit}]" if unit else found.worst,
             folder=str(self.folder),
             tables=found.tables,
+            curves=found.curves,
             failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
                     for told in self.failed.values()],
         )  # fmt: skip

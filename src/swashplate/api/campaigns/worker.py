@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate import documents
-from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignKind, CampaignSettings
+from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignKind, settings_of
 from swashplate.api.campaigns.tasks import CampaignTask, Columns
 from swashplate.atomic import scratch_folder
 from swashplate.errors import CampaignError
@@ -55,13 +54,7 @@ def opened(task: CampaignTask) -> tuple[CampaignKind, Any, Mapping[str, Path]]:
 
     set_up()
     kind = CAMPAIGNS[task.kind]
-    return kind, settings_of(kind, task.kind, task.settings), {n: _put(n, c) for n, c in task.files.items()}
-
-
-def settings_of(kind: CampaignKind, name: str, document: Mapping[str, Any], *, where: str = "") -> CampaignSettings:
-    """A campaign's document, held against its kind's schema."""
-    whole = {"kind": "campaign", "of": name, **document}
-    return documents.checked(whole, kind.schema, where=where, error=CampaignError)
+    return kind, settings_of(task.kind, task.settings), {n: _put(n, c) for n, c in task.files.items()}
 
 
 def chosen(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:

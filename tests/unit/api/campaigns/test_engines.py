@@ -177,6 +177,24 @@ def test_a_scheduler_by_its_address_and_then_it_is_gone(tmp_path: Path, monkeypa
 
 
 @pytest.mark.proof
+def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp_path: Path) -> None:
+    (tmp_path / "swashplate.py").write_text("raise ModuleNotFoundError(\"No module named 'swashplate'\")")
+    every = made_campaigns.tasks(150, batch=1, wait=0.1)
+    with cluster() as (address, _, _):
+        engine = DaskEngine(made_campaigns.numbers, workers=1, scheduler=address)
+        words = ["dask", "worker", address, "--nthreads", "1", "--no-dashboard"]
+        bare = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        late = subprocess.Popen([sys.executable, "-m", *words], env=bare, stderr=subprocess.DEVNULL)
+        try:
+            store, _ = done(every, engine, tmp_path / "late")
+        finally:
+            late.terminate()
+            late.wait()
+    assert store.failed() == {}
+    assert bits(store) == expected(every, tmp_path / "here")
+
+
+@pytest.mark.proof
 def test_a_worker_of_another_program_is_refused() -> None:
     other = {"XLA_FLAGS": "--xla_cpu_enable_fast_math=true"}
     with cluster(environment=other) as (address, _, _), pytest.raises(CampaignError) as refused:

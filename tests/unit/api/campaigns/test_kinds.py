@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 import swashplate as sp
 from swashplate.api.campaigns import worker
-from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings
+from swashplate.api.campaigns.kind import CAMPAIGNS, CampaignFindings, settings_of
 from swashplate.api.campaigns.kinds import monte_carlo as of_flights
 from swashplate.api.campaigns.kinds.fleet import FLEET
 from swashplate.api.campaigns.kinds.multi_start import MULTI_START, optima, start_values
@@ -90,7 +90,7 @@ def test_flights_are_asked_for_as_the_file_says(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(of_flights, "load_controller", lambda path: f"from {path}")
     varies = {"gusts": {"indoor": 0.3}, "numbers": {"mass": "5%"}, "payload": 0.01, "fit": "fit.json"}
     document = {**FLIGHTS, "varies": varies, "limits": {"lean": 30.0, "place": 0.0}, "bits": 8}
-    settings: Any = worker.settings_of(CAMPAIGNS["monte-carlo"], "monte-carlo", document)
+    settings: Any = settings_of("monte-carlo", document)
     files = {"c.toml": tmp_path / "c.toml", "fit.json": tmp_path / "fit.json"}
     table = of_flights.MONTE_CARLO.run(settings, Portion(4, 2, 77), files)
     assert list(table) == ["lost_after", "lost", "lean", "place", "place_rms", "drawn.mass"]
@@ -116,7 +116,7 @@ def test_flights_are_asked_for_as_the_file_says(tmp_path: Path, monkeypatch: pyt
     ],
 )
 def test_a_file_of_flights_that_means_nothing_is_refused(wrong: dict[str, Any], said: str) -> None:
-    settings: Any = worker.settings_of(CAMPAIGNS["monte-carlo"], "monte-carlo", {**FLIGHTS, **wrong})
+    settings: Any = settings_of("monte-carlo", {**FLIGHTS, **wrong})
     with pytest.raises(sp.SwashError, match=said):
         CAMPAIGNS["monte-carlo"].parts(settings, Path())
 
@@ -227,14 +227,17 @@ def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) ->
     page = (Path(__file__).parents[4] / "docs" / "howto" / "campaigns.md").read_text(encoding="utf-8")
     written = re.findall(r"<!-- file: (\S+) -->\n```toml\n(.*?)```", page, re.DOTALL)
     (tmp_path / "logs").mkdir()
-    for name in ("hold.toml", "fit.json", "flight.nc", "logs/a.bin"):
+    for name in ("hold.toml", "fit.json", "flight.nc", "logs/a.bin", "july.nc", "august.nc", "september.nc"):
         (tmp_path / name).write_bytes(b"")
     rows = {}
     for name, text in written:
         (tmp_path / name).write_text(text)
         made = sp.plan_campaign(tmp_path / name)
         rows[made.of] = made.rows
-    assert rows == {"monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1}
+    assert rows == {
+        "monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1, "cross-validation": 3,
+        "bootstrap": 200, "sweep": 3 * 5 * 200,
+    }  # fmt: skip
     assert set(rows) == set(CAMPAIGNS), "every kind is shown"
 
 

@@ -7,26 +7,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from swashplate.api.campaigns.fitting import (
     Attempt,
-    FitCampaign,
+    LogsCampaign,
     outcome_columns,
     spreads_of,
     started,
     values_of,
     within_bounds,
 )
-from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CampaignFindings, NamedFile, in_batches
 from swashplate.api.campaigns.shares import share_words
 from swashplate.api.campaigns.tasks import Columns, Portion, seed_of
 from swashplate.arrays import Array
 from swashplate.errors import CampaignError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.read import read
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.vehicle import Vehicle
@@ -34,23 +31,17 @@ from swashplate.models.vehicle import Vehicle
 _SHOWN = 6
 
 
-class MultiStartCampaign(FitCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
+class MultiStartCampaign(LogsCampaign, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """The file of a campaign of starts, about the vehicle's numbers.
 
     Attributes:
-        flights: logs to fit to. responses: or measured responses (.nc) instead, for a state-space model.
-        condition: False takes the logs as they are, at one rate already. rate: otherwise, samples per second [Hz].
-        biases: as of `sp.identify`.
+        responses: measured responses (.nc) instead of flights, for a state-space model.
         factor: each free number starts at its value times or divided by up to this; one that is zero, within plus and
             minus `factor` times its standard deviation or one.
         same: costs that differ by no more are of one optimum, in units of the cost.
     """
 
-    flights: list[str] = msgspec.field(default_factory=list)
     responses: str | None = None
-    condition: bool = True
-    rate: float = 100.0
-    biases: list[str] = msgspec.field(default_factory=list)
     factor: float = 3.0
     same: float = 0.1
 
@@ -62,9 +53,8 @@ class MultiStartKind:
     schema = MultiStartCampaign
 
     def files(self, settings: MultiStartCampaign) -> Sequence[NamedFile]:
-        logs = [NamedFile("flights", name) for name in settings.flights]
         measured = [] if settings.responses is None else [NamedFile("responses", settings.responses)]
-        return (NamedFile("vehicle", settings.vehicle, True), *logs, *measured)
+        return (*settings.logs, *measured)
 
     def parts(self, settings: MultiStartCampaign, folder: Path) -> tuple[Portion, ...]:
         if bool(settings.flights) == (settings.responses is not None):
@@ -118,19 +108,15 @@ class MultiStartKind:
         more = f" (the best {_SHOWN} of {len(groups)})" if len(groups) > _SHOWN else ""
         return CampaignFindings(
             summary, {"cost": ("", 1.0)}, tables=((f"Optima that starts ended at{more}", head, cells),),
-            careful=tuple(careful),
+            careful=tuple(careful), counted="usable",
         )  # fmt: skip
 
     def _read(
         self, settings: MultiStartCampaign, files: Mapping[str, Path]
     ) -> tuple[Vehicle, tuple[Flight, ...] | FrequencyResponse]:
-        model = vehicle_of(str(files.get(settings.vehicle, settings.vehicle)))
         if settings.responses is not None:
-            return model, FrequencyResponse.load(files[settings.responses])
-        raw = [read(files[name]) for name in settings.flights]
-        if settings.condition:
-            raw = [flight.condition(rate=settings.rate, cutoff=0.0) for flight in raw]
-        return model, tuple(raw)
+            return settings.model(files), FrequencyResponse.load(files[settings.responses])
+        return settings.model(files), settings.records(files)
 
 
 def _fitted(
