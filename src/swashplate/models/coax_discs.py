@@ -57,6 +57,7 @@ def _numbers(par: Any, side: str) -> tuple[Scalar, Any]:
         rotor_twist=par.rotor_twist,
         rotor_speed=getattr(par, f"k_drive_{side}"),
         blade_inertia=par.blade_inertia,
+        blade_first_moment=1.0,
         hub_stiffness=getattr(par, f"hub_stiffness_{side}"),
         hinge_offset=0.0,
         precone=0.0,
