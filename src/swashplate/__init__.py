@@ -106,6 +106,7 @@ if TYPE_CHECKING:
     from swashplate.simulation.adaptive import simulate_adaptive
     from swashplate.simulation.closed_loop import simulate_closed_loop, simulate_maneuver
     from swashplate.simulation.derivatives_over_speed import derivatives
+    from swashplate.simulation.height_velocity import height_velocity
     from swashplate.simulation.integrate import simulate
     from swashplate.simulation.linearize import linearize
     from swashplate.simulation.lpv import schedule as speed_schedule
@@ -176,6 +177,7 @@ __all__ = [
     "fly_maneuver",
     "handling_qualities",
     "harmonics",
+    "height_velocity",
     "hover_hold",
     "hover_trim",
     "identify",

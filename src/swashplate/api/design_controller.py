@@ -25,6 +25,8 @@ from swashplate.reporting.structure import Report
 from swashplate.shown import Shown
 from swashplate.text_table import text_table
 
+_NEARLY = 1.05
+"""Of a limit: closer is none."""
 USUAL_SENSORS = "imu@100,mocap@100+10ms"
 Method = Literal["lqg", "lqr"]
 Gain = Literal["flying", "steady"]
@@ -39,12 +41,14 @@ class ControllerDesign(Shown):
         analyses: modes, margins and expected spread at every speed.
         speeds: of the trims [m/s].
         late: how late commands are taken to be, in words.
+        fast: loops that cross higher than what is late together asks for, in words; "" for none.
     """
 
     controller: Lqg
     analyses: tuple[Analysis, ...]
     speeds: tuple[float, ...]
     late: str
+    fast: str = ""
 
     def save(self, path: str | Path) -> Path:
         """Write the controller's file (.toml)."""
@@ -65,6 +69,7 @@ class ControllerDesign(Shown):
             "sensors": [str(sensor) for sensor in made.plan.sensors],
             "delays": [d / made.rate for d in made.plan.delays],
             "late": self.late,
+            **({"fast": self.fast} if self.fast else {}),
             "trims": [
                 {
                     "speed": speed,
@@ -80,7 +85,9 @@ class ControllerDesign(Shown):
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""
         rows = spread_rows(self.controller, self.analyses[0])
-        return compose_design(self.controller, self.speeds, self.analyses, rows, title=title, late=self.late)
+        return compose_design(
+            self.controller, self.speeds, self.analyses, rows, title=title, late=self.late, fast=self.fast
+        )
 
     def __repr__(self) -> str:
         plan, vehicle = self.controller.plan, self.controller.vehicle
@@ -88,7 +95,7 @@ class ControllerDesign(Shown):
         lines = [f"{'LQG' if plan.sensors else 'LQR'} of {vehicle.called}, {plan.rate:g} Hz, {plan.n} states"]
         if plan.period:
             told += f"; constant gains, a cycle of {plan.period}"
-        lines += [f"sensors: {told}", f"late: {self.late}"]
+        lines += [f"sensors: {told}", f"late: {self.late}", *([f"Careful: {self.fast}"] if self.fast else [])]
         waits = ", ".join(f"{name} {d}" for name, d in zip(vehicle.input_names, plan.delays, strict=True) if d)
         if waits:
             lines.append(f"in whole samples: {waits}")
@@ -182,4 +189,19 @@ def design_controller(
         found = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in found]
     took = "not known, one sample is left for it" if computation is None else f"{1e3 * computation:g} ms"
     late = f"{lateness(vehicle, None, given=delays)}; computation: {took}"
-    return ControllerDesign(made, tuple(found), tuple(speeds), late)
+    return ControllerDesign(made, tuple(found), tuple(speeds), late, _fast(made, found))
+
+
+def _fast(made: Lqg, found: Sequence[Analysis]) -> str:
+    """Loops that cross above what the design aimed at and could not reach with less effort, in words."""
+    told = []
+    for name, limit in made.figures["crossover_limits"].items():
+        highest = max((a.crossover for one in found for a in one.margins.axes if a.name == name), default=0.0)
+        if highest > _NEARLY * limit:
+            told.append(f"{name} at {highest:.3g} rad/s (asked for: {limit:.3g})")
+    if not told:
+        return ""
+    return (
+        f"loops that cross above 1/(3 T), T what is late together: {', '.join(told)}. Less effort does not slow them: "
+        "judge them by the delay margin"
+    )

@@ -23,6 +23,7 @@ from swashplate.cli import (
     fit_ss,
     fit_tf,
     fit_time,
+    height_velocity,
     identify,
     inspect,
     link,
@@ -97,6 +98,9 @@ app.command("reconstruct", short_help="Find biases and scale factors of a flight
     reconstruct.reconstruct
 )
 app.command("trim", short_help="Find a vehicle's steady flight, at one speed or over a range.")(trim.trim)
+app.command("height-velocity", short_help="Heights and speeds from which an engine failure can be landed.")(
+    height_velocity.height_velocity
+)
 app.command("linearize", short_help="Linear models and modes about steady flight.")(trim.linearize)
 app.command("stitch", short_help="One model from linear models at several speeds.")(stitch.stitch)
 app.command("combine", short_help="Multiply, divide, invert responses; close or open a loop.")(combine.combine)

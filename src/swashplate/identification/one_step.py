@@ -70,6 +70,19 @@ def in_words(tests: Sequence[EffectTest]) -> str:
     return f"{line}{rest}. By one step from this fit; --nested fits them."
 
 
+def not_judged(fit: Result[Any, Any], effects: Sequence[PhysicalEffect] | None = None) -> str:
+    """What `one_step_effects` says nothing of, in a sentence: parts that the fit leaves out, where its likelihood
+    cannot free them without being compiled anew; "" where there are none."""
+    if fit.fitted is not None and hasattr(fit.fitted.likelihood, "widened"):
+        return ""
+    if effects is None:
+        effects = fit.model.traits.effects(fit.model.card)
+    held = [effect.name for effect in effects if not any(name in fit.names for name in effect.without)]
+    if not held:
+        return ""
+    return f"Held and not judged here: {', '.join(held)}; --nested fits them (only a prediction-error fit judges them)."
+
+
 @dataclass(frozen=True)
 class _Split:
     """Information on tested numbers and on the others, at an optimum of the others."""

@@ -139,12 +139,12 @@ class Plant:
         self._stepping.surround(voltage=voltage)
 
     def rotor_speeds(self, held: Motion) -> tuple[float, float]:
-        """Of main and tail rotor, or of lower and upper rotor [rad/s]."""
+        """Of main and tail rotor, or of both main rotors [rad/s]."""
         speeds = [max(0.0, held.states[k]) for k in self._rotors]
         if len(speeds) == 2:
             return speeds[0], speeds[1]
         (main,) = speeds
-        return main, main * self.numbers["tail_gear"]
+        return main, main * self.numbers.get("tail_gear", 1.0)
 
     def _break(self, why: str, states: list[float]) -> None:
         self.broken = why

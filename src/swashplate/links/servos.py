@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from operator import mul
 from pathlib import Path
 
 import numpy as np
@@ -12,80 +11,125 @@ import numpy as np
 from swashplate import documents
 from swashplate.errors import LinkError
 from swashplate.files import is_file
-from swashplate.links import swashplates
 from swashplate.links.mapping_table import MappingTable
-from swashplate.links.servo import CENTRE, HALF
+from swashplate.links.plate import Plate
 from swashplate.models.vehicle import Vehicle
 
 
-class HelicopterMapping:
-    """Swashplate, tail and rotor speed control of a conventional helicopter.
+class Engine:
+    """A rotor speed control's output, behind which an engine starts.
 
     The throttle follows its output no faster than `spool` allows, as an engine that is started does: an autopilot only
     ramps its output, and a governor that gets the whole engine at once would turn the helicopter on its skids.
 
     Attributes:
-        channels: outputs that it uses, from 1.
-        shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
-        type: of the swashplate. swash, tail, throttle: its outputs.
-        angles: of its servos from the nose [deg]; empty where the file has none, or a phase.
-        collective_pulse, collective_deg, cyclic_deg, tail_deg, full, spool: as the file has them [us], [deg], [1], [s].
+        servo: the output. full: share of its travel that is the whole engine. spool: from rest to that [s].
     """
 
-    def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
-        swash, tail, throttle = (table.part(name) for name in ("swashplate", "tail", "throttle"))
-        servos = table.part("servos", missing={})
-        numbers = swash.numbers("channels")
-        self.type = swash.text("type")
-        self.swash = tuple(swash.servo(number, servos) for number in numbers)
-        angles, phase = swash.numbers("angles", missing=()), swash.number("phase", missing=0.0)
-        self.angles = tuple(angles) if phase == 0.0 else ()
-        rows = swashplates.shares(
-            self.type,
-            angles=angles,
-            phase=phase,
-            matrix=swash.rows("matrix"),
-            where=table.where,
-        )
-        if len(rows) != len(self.swash):
-            raise table.error("swashplate.channels", f"has {len(self.swash)} servos, the type has {len(rows)}.")
-        self._inverse = swashplates.unmixed(rows).tolist()
-        self.collective_pulse, self.collective_deg = swash.pair("collective_pulse"), swash.pair("collective_deg")
-        pulses, pitches = (np.array(self.collective_pulse) - CENTRE) / HALF, np.radians(self.collective_deg)
-        if pulses[0] == pulses[1]:
-            raise swash.error("collective_pulse", "has two equal pulses.")
-        self._collective = (*pulses.tolist(), *pitches.tolist())
-        self.cyclic_deg = swash.pair("cyclic_deg")
-        self._cyclic = np.radians(self.cyclic_deg).tolist()
-        self.tail = tail.servo(tail.number("channel"), servos)
-        self.tail_deg = tail.pair("deg")
-        self._tail_pitch = np.radians(self.tail_deg).tolist()
-        self.throttle = throttle.servo(throttle.number("channel"), servos)
+    def __init__(self, throttle: MappingTable, servos: MappingTable, table: MappingTable) -> None:
+        self.servo = throttle.servo(throttle.number("channel"), servos)
         self.full = throttle.number("full", missing=1.0)
         self.spool = throttle.number("spool_time", missing=8.0)
         if not (self.full > 0.0 and self.spool > 0.0):
             raise table.error("throttle", "expected full and spool_time above zero.")
-        table.done()
-        self.channels = tuple(s.channel for s in (*self.swash, self.tail, self.throttle))
-        self.shares = (self.throttle.channel,)
         self.restart()
 
     def restart(self) -> None:
         """Engine off."""
         self._running = 0.0
 
+    def running(self, pulses: Sequence[float], duration: float) -> float:
+        """The throttle, 0 to 1, after pulses [us] by output were held for `duration` [s]."""
+        asked = min(1.0, self.servo.share(pulses[self.servo.channel - 1]) / self.full)
+        self._running = min(asked, self._running + duration / self.spool)
+        return self._running
+
+
+class HelicopterMapping:
+    """Swashplate, tail and rotor speed control of a conventional helicopter.
+
+    Attributes:
+        channels: outputs that it uses, from 1.
+        shares: those of them that go from nothing to all (motors, throttles) instead of both ways.
+        type: of the swashplate. swash, tail, throttle: its outputs.
+        angles: of its servos from the nose [deg]; empty where the file has none, or a phase.
+        engine: behind the throttle.
+        collective_pulse, collective_deg, cyclic_deg, tail_deg, full, spool: as the file has them [us], [deg], [1], [s].
+    """
+
+    def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
+        tail, servos = table.part("tail"), table.part("servos", missing={})
+        self._plate = Plate(table.part("swashplate"), servos, where=table.where)
+        self.type, self.swash, self.angles = self._plate.type, self._plate.servos, self._plate.angles
+        self.collective_pulse, self.collective_deg = self._plate.collective_pulse, self._plate.collective_deg
+        self.cyclic_deg = self._plate.cyclic_deg
+        self.tail = tail.servo(tail.number("channel"), servos)
+        self.tail_deg = tail.pair("deg")
+        self._tail_pitch = np.radians(self.tail_deg).tolist()
+        self.engine = Engine(table.part("throttle"), servos, table)
+        self.throttle, self.full, self.spool = self.engine.servo, self.engine.full, self.engine.spool
+        table.done()
+        self.channels = tuple(s.channel for s in (*self.swash, self.tail, self.throttle))
+        self.shares = (self.throttle.channel,)
+
+    def restart(self) -> None:
+        """Engine off."""
+        self.engine.restart()
+
     def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
         """theta0, B1, A1, theta0T [rad] and throttle for pulses [us] by output, held for `duration` [s]."""
-        throws = [s.throw(pulses[s.channel - 1]) for s in self.swash]
-        collective, roll, pitch = (sum(map(mul, row, throws)) for row in self._inverse)
-        first, last, least, most = self._collective
-        theta0 = least + (collective - first) / (last - first) * (most - least)
-        side, ahead = self._cyclic
         low, high = self._tail_pitch
         tail = 0.5 * (low + high) + 0.5 * (high - low) * self.tail.travel(pulses[self.tail.channel - 1])
-        asked = min(1.0, self.throttle.share(pulses[self.throttle.channel - 1]) / self.full)
-        self._running = min(asked, self._running + duration / self.spool)
-        return [theta0, -ahead * pitch, side * roll, tail, self._running]
+        return [*self._plate.pitches(pulses), tail, self.engine.running(pulses, duration)]
+
+
+class TwinMapping:
+    """Two swashplates and one rotor speed control of a coaxial helicopter with collective pitch.
+
+    Attributes:
+        upper, lower: the swashplates; both have the same linkage.
+        yaw_share: how much of the swashplates' collective a full yaw command moves (H_DCP_SCALER).
+        first: of these two the one whose rotor turns counter-clockwise from above, which more yaw to the right gives
+            more collective; ArduPilot's swashplate 1. second: the other.
+        engine: of both rotors.
+        channels, shares: as `HelicopterMapping`.
+    """
+
+    def __init__(self, table: MappingTable, vehicle: Vehicle) -> None:
+        swash, servos = table.part("swashplates"), table.part("servos", missing={})
+        self.upper, self.lower = (Plate(swash, servos, where=table.where, channels=s) for s in ("upper", "lower"))
+        self.yaw_share = swash.number("yaw_share", missing=0.25)
+        if not 0.0 < self.yaw_share <= 1.0:
+            raise swash.error("yaw_share", f"is {self.yaw_share:g}, expected more than 0, and 1 at most.")
+        self.engine = Engine(table.part("throttle"), servos, table)
+        table.done()
+        self._sense = float(vehicle.options.upper.sense)
+        self.first, self.second = (self.upper, self.lower) if self._sense > 0.0 else (self.lower, self.upper)
+        self._names = vehicle.input_names
+        outputs = (*self.upper.servos, *self.lower.servos, self.engine.servo)
+        self.channels = tuple(s.channel for s in outputs)
+        if len(set(self.channels)) < len(self.channels):
+            raise swash.error("lower", f"outputs {list(self.channels)} are not all different ones.")
+        self.shares = (self.engine.servo.channel,)
+
+    def restart(self) -> None:
+        """Engine off."""
+        self.engine.restart()
+
+    def inputs(self, pulses: Sequence[float], duration: float) -> list[float]:
+        """The vehicle's inputs [rad, 1] for pulses [us] by output, held for `duration` [s]."""
+        u, d = self.upper.pitches(pulses), self.lower.pitches(pulses)
+        mean, half = ([0.5 * (a + sign * b) for a, b in zip(u, d, strict=True)] for sign in (1.0, -1.0))
+        known = {
+            "theta0": mean[0],
+            "B1": mean[1],
+            "A1": mean[2],
+            "theta0d": self._sense * half[0],
+            "B1d": half[1],
+            "A1d": half[2],
+            "throttle": self.engine.running(pulses, duration),
+        }
+        return [known[name] for name in self._names]
 
 
 class CoaxialMapping:
@@ -120,9 +164,10 @@ class CoaxialMapping:
         return [*motors, servos[0], -servos[1]]
 
 
-ServoMapping = HelicopterMapping | CoaxialMapping
-_LAYOUTS: Mapping[str, type[HelicopterMapping] | type[CoaxialMapping]] = {
+ServoMapping = HelicopterMapping | TwinMapping | CoaxialMapping
+_LAYOUTS: Mapping[str, type[HelicopterMapping] | type[TwinMapping] | type[CoaxialMapping]] = {
     "swashplate": HelicopterMapping,
+    "two swashplates": TwinMapping,
     "two motors": CoaxialMapping,
 }
 """By `Traits.servo_layout`."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from swashplate.models.coax_discs import UNITS as FLAPPING_UNITS
+from swashplate.models.coax_discs import disc_pair
 from swashplate.models.coax_rotors import SLOWEST, InflowOptions, rotor_pair
 from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
 from swashplate.physics import drive_train, fuselage, rotor, stabilizer_bar, swashplate
@@ -88,12 +90,16 @@ CoaxParameters = NamedTuple("CoaxParameters", [(name, Any) for name in UNITS])  
 CoaxInflowParameters = NamedTuple(  # type: ignore[misc]
     "CoaxInflowParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS)]
 )
+CoaxBladeParameters = NamedTuple(  # type: ignore[misc]
+    "CoaxBladeParameters", [(name, Any) for name in (*UNITS, *INFLOW_UNITS, *FLAPPING_UNITS)]
+)
 
 
 class CoaxState(NamedTuple):
     """Rigid body, lower tip-path plane, stabilizer bar (None where it is taken off) and the two rotor speeds.
 
-    Rotors with inflow carry their induced velocities; None in the paper's form.
+    Rotors with inflow carry their induced velocities, and with flapping blades the upper tip-path plane too; None in
+    the paper's form.
     """
 
     body: RigidBody
@@ -101,6 +107,7 @@ class CoaxState(NamedTuple):
     bar: StabilizerBar | None
     drive: Drive
     inflow: Induced | None = None
+    upper: TipPathPlane | None = None
 
 
 class Drive(NamedTuple):
@@ -122,7 +129,8 @@ class CoaxInputs(NamedTuple):
 class CoaxialLoads(NamedTuple):
     """What acts on the fuselage, in body axes, how the moving parts move, and thrust and torque of both rotors.
 
-    Upper first: `lift` [N] along its disc's normal, `torque` [N m] about it.
+    Upper first: `planes`, the discs' tilts [rad], `lift` [N] along their normals and `torque` [N m] about them (with
+    flapping blades along and about the shafts). `upper` moves with flapping blades only.
     """
 
     force: Vector
@@ -131,6 +139,8 @@ class CoaxialLoads(NamedTuple):
     bar: StabilizerBar | None
     drive: Drive
     inflow: Induced | None
+    upper: TipPathPlane | None
+    planes: tuple[TipPathPlane, TipPathPlane]
     lift: tuple[Scalar, Scalar]
     torque: tuple[Scalar, Scalar]
 
@@ -159,7 +169,7 @@ def loads(
 
     Bench and flight use this same function: the bench holds the body still.
     """
-    body, lower, bar, drive, inflow = state
+    body, lower, bar, drive, inflow, flapping = state
     density = env.air_density / par.air_density
     air = body.velocity + local_to_body(env.wind, body.attitude, xp).scaled(-1.0)
 
@@ -221,55 +231,87 @@ def loads(
         phase_asymmetry=par.phase_asymmetry_lower,
     )
     held = _turning(drive.omega_lower, par.k_drive_lower, xp)
-    lower_rates = swashplate.lower_rotor_rates(
-        lower, commanded, air, body.rates, tau_f_lower=par.tau_f_lower, flap=_flap_response(par), turning=held, xp=xp
-    )
 
-    # Forces and torques (eqs 1 to 7)
-    normals = (rotor.thrust_direction(upper, xp), rotor.thrust_direction(lower, xp))
-    inflow_rates = None
-    if rotors is None or inflow is None:
-        lift_upper = rotor.thrust(par.k_thrust_upper, drive.omega_upper, density)
-        lift_lower = rotor.thrust(par.k_thrust_lower, drive.omega_lower, density)
-        torque_upper = rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density)
-        torque_lower = rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density)
-    else:
+    # Forces and torques of the discs (eqs 1 to 7)
+    omegas, planes, upper_rates, inflow_rates = (drive.omega_upper, drive.omega_lower), (upper, lower), None, None
+    if rotors is not None and inflow is not None:
         level = xp.cos(body.attitude.phi) * xp.cos(body.attitude.theta)
-        lift_upper, lift_lower, torque_upper, torque_lower, inflow_rates, _ = rotor_pair(
-            air,
-            normals,
-            (drive.omega_upper, drive.omega_lower),
-            inflow,
-            (par.hub_height_upper * level - body.z, par.hub_height_lower * level - body.z),
-            par,
-            env.air_density,
-            rotors,
-            xp,
+        heights = (par.hub_height_upper * level - body.z, par.hub_height_lower * level - body.z)
+    if rotors is not None and inflow is not None and rotors.flapping != "paper":
+        asked = TipPathPlane(held * commanded.alpha, held * commanded.beta)
+        if flapping is None:  # the discs follow at once, and what is asked for has the paper's lag
+            tau = par.tau_f_lower
+            lower_rates = TipPathPlane((asked.alpha - lower.alpha) / tau, (asked.beta - lower.beta) / tau)
+            asked, tilts = lower, None
+        else:
+            tilts = (flapping, lower)
+        discs = disc_pair(
+            air, body.rates, (upper, asked), tilts, omegas, inflow, heights, par, env.air_density, rotors, xp
         )
-    thrust_upper, thrust_lower = normals[0].scaled(lift_upper), normals[1].scaled(lift_lower)
+        if flapping is not None:
+            upper_rates, lower_rates = discs.turning
+        planes, lifts, torques, inflow_rates = discs.planes, discs.lift, discs.torque, discs.inflow
+        thrust, on_hubs = discs.acting.force, [discs.acting.moment]
+        shaft_torques: tuple[Scalar, Scalar] = (0.0, 0.0)
+    else:
+        lower_rates = swashplate.lower_rotor_rates(
+            lower,
+            commanded,
+            air,
+            body.rates,
+            tau_f_lower=par.tau_f_lower,
+            flap=_flap_response(par),
+            turning=held,
+            xp=xp,
+        )
+        normals = (rotor.thrust_direction(upper, xp), rotor.thrust_direction(lower, xp))
+        if rotors is None or inflow is None:
+            lifts = (
+                rotor.thrust(par.k_thrust_upper, drive.omega_upper, density),
+                rotor.thrust(par.k_thrust_lower, drive.omega_lower, density),
+            )
+            torques = (
+                rotor.drag_torque(par.k_torque_upper, drive.omega_upper, density),
+                rotor.drag_torque(par.k_torque_lower, drive.omega_lower, density),
+            )
+        else:
+            pair = rotor_pair(air, normals, omegas, inflow, heights, par, env.air_density, rotors, xp)
+            lifts, torques = (pair.thrust_upper, pair.thrust_lower), (pair.torque_upper, pair.torque_lower)
+            inflow_rates = pair.inflow
+        thrust_upper, thrust_lower = normals[0].scaled(lifts[0]), normals[1].scaled(lifts[1])
+        thrust, shaft_torques = thrust_upper + thrust_lower, torques
+        on_hubs = [
+            rotor.thrust_moment(thrust_upper, par.hub_height_upper),
+            rotor.thrust_moment(thrust_lower, par.hub_height_lower),
+            rotor.flapping_moment(par.hub_stiffness_upper, upper),
+            rotor.flapping_moment(par.hub_stiffness_lower, lower),
+        ]
     drag = fuselage.drag_force(
         air, drag_x=par.drag_x, drag_y=par.drag_y, drag_z=par.drag_z, damping_w=par.damping_w, xp=xp
     ).scaled(density)
-    moment = (
-        rotor.yaw_moment(torque_upper, par.inertia_drive_upper, drive_rates.omega_upper, SENSE_UPPER)
-        + rotor.yaw_moment(torque_lower, par.inertia_drive_lower, drive_rates.omega_lower, SENSE_LOWER)
-        + rotor.thrust_moment(thrust_upper, par.hub_height_upper)
-        + rotor.thrust_moment(thrust_lower, par.hub_height_lower)
-        + rotor.flapping_moment(par.hub_stiffness_upper, upper)
-        + rotor.flapping_moment(par.hub_stiffness_lower, lower)
-        + fuselage.yaw_damping_moment(body.r, par.damping_r)
-        + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_upper, drive.omega_upper, SENSE_UPPER)
-        + rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_lower, drive.omega_lower, SENSE_LOWER)
+    shafts = (
+        rotor.yaw_moment(shaft_torques[0], par.inertia_drive_upper, drive_rates.omega_upper, SENSE_UPPER),
+        rotor.yaw_moment(shaft_torques[1], par.inertia_drive_lower, drive_rates.omega_lower, SENSE_LOWER),
     )
+    others = (
+        fuselage.yaw_damping_moment(body.r, par.damping_r),
+        rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_upper, drive.omega_upper, SENSE_UPPER),
+        rotor.gyroscopic_moment(body.rates, par.gyroscopic * par.inertia_drive_lower, drive.omega_lower, SENSE_LOWER),
+    )
+    moment = shafts[0]
+    for part in (shafts[1], *on_hubs, *others):
+        moment = moment + part
     return CoaxialLoads(
-        thrust_upper + thrust_lower + drag,
+        thrust + drag,
         moment,
         lower_rates,
         bar_rates,
         drive_rates,
         inflow_rates,
-        (lift_upper, lift_lower),
-        (torque_upper, torque_lower),
+        upper_rates,
+        planes,
+        lifts,
+        torques,
     )
 
 
@@ -293,6 +335,7 @@ def derivatives(
         acting.bar,
         acting.drive,
         acting.inflow,
+        acting.upper,
     )
 
 

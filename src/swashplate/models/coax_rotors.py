@@ -1,7 +1,7 @@
 """The CoaX's two rotors with inflow: thrust and torque that know climb, descent, flight across and each other's wake.
 
 Blade elements and momentum theory as for the single-rotor helicopter (`physics.blade_element`), in place of the paper's
-k Omega^2. The tip-path planes stay the paper's: the loads act along and about them.
+k Omega^2. The tip-path planes stay the paper's: the loads act along and about them (`coax_discs` has those of blades).
 """
 
 from __future__ import annotations
@@ -58,10 +58,16 @@ class InflowOptions(NamedTuple):
     Attributes:
         interference: one of `coaxial_wake.FORMS`.
         ground_effect: one of `ground_effect.FORMS`, over ground at z = 0.
+        flapping: of the discs: "paper" (its equations with fitted constants), "blades" (`coax_discs`: blades flap,
+            with their own lag), or "settled-blades" (they follow at once, the swashplate with the paper's lag).
     """
 
     interference: str = "vortex-tube"
     ground_effect: str = "none"
+    flapping: str = "paper"
+
+
+FLAPPINGS = ("paper", "blades", "settled-blades")
 
 
 class RotorPair(NamedTuple):
@@ -93,6 +99,22 @@ def _rotor(
     return CT, (lam - mu_z + uneven) * CT + profile
 
 
+def air_between(
+    axial: Scalar, across2: Scalar, own: Induced, par: Any, options: InflowOptions, xp: Backend
+) -> tuple[WakeShares, tuple[Scalar, Scalar]]:
+    """The flow's shares, and what the upper and the lower disc get of the other's induced flow [m/s]."""
+    shares = coaxial_wake.wake_shares(
+        axial,
+        across2,
+        own,
+        separation=par.hub_height_upper - par.hub_height_lower,
+        radius=par.rotor_radius,
+        form=options.interference,
+        xp=xp,
+    )
+    return shares, (shares.on_upper * own.induced_lower, shares.on_lower * own.induced_upper)
+
+
 def rotor_pair(
     air: Vector,
     normals: tuple[Vector, Vector],
@@ -121,19 +143,8 @@ def rotor_pair(
     area = _PI * radius * radius
     across2 = air.x * air.x + air.y * air.y
     axial = tuple(air.x * n.x + air.y * n.y + air.z * n.z for n in normals)
-    shares = coaxial_wake.wake_shares(
-        0.5 * (axial[0] + axial[1]),
-        across2,
-        own,
-        separation=par.hub_height_upper - par.hub_height_lower,
-        radius=radius,
-        form=options.interference,
-        xp=xp,
-    )
-    flows = (
-        own.induced_upper + shares.on_upper * own.induced_lower,
-        own.induced_lower + shares.on_lower * own.induced_upper,
-    )
+    shares, given = air_between(0.5 * (axial[0] + axial[1]), across2, own, par, options, xp)
+    flows = (own.induced_upper + given[0], own.induced_lower + given[1])
     full = (par.k_drive_upper, par.k_drive_lower)
     pitches, drags = (par.pitch_upper, par.pitch_lower), (par.rotor_drag_upper, par.rotor_drag_lower)
     thrusts, torques, rates = [], [], []
@@ -215,21 +226,13 @@ def _settled_inflow(omega_upper: Scalar, omega_lower: Scalar, par: Any, options:
         disc = still._replace(theta0=pitch - 0.75 * par.rotor_twist, twist=par.rotor_twist)
         free.append(tip * tip * blade_element.thrust_coefficient(disc, solidity, par.rotor_lift_slope, blade))
         loss.append(tip * 0.5 * solidity * par.rotor_lift_slope * blade.m1)
-    shares = coaxial_wake.wake_shares(
-        0.0,
-        0.0,
-        Induced(1.0, 1.0),  # at rest the shares do not depend on the velocities
-        separation=par.hub_height_upper - par.hub_height_lower,
-        radius=par.rotor_radius,
-        form=options.interference,
-        xp=xp,
-    )
+    shares, _ = air_between(0.0, 0.0, Induced(1.0, 1.0), par, options, xp)  # at rest they depend on no velocity
     return coaxial_wake.hover_induced(
         (free[0], free[1]), (loss[0], loss[1]), on_upper=shares.on_upper, on_lower=shares.on_lower, xp=xp
     )
 
 
-def checked_blades(card: Card) -> Card:
+def checked_blades(card: Card, options: InflowOptions) -> Card:
     """The card itself, if it has what rotors with inflow need and no number that no rotor has.
 
     Raises:
@@ -240,15 +243,20 @@ def checked_blades(card: Card) -> Card:
     def refuse(name: str, problem: str, hint: str | None = None) -> None:
         raise CardError(problem, where=card.where, channel=name, hint=hint)
 
-    for name, meaning in _NEEDED.items():
+    flaps = options.flapping != "paper"
+    needed = [(name, UNITS[name], meaning, "rotor = 'inflow'") for name, meaning in _NEEDED.items()]
+    if flaps:
+        told = "of one blade about its root; at most half of what a two-bladed rotor and its drive have"
+        needed.append(("blade_inertia", "kg m^2", told, f"flapping = '{options.flapping}'"))
+    for name, unit, meaning, asking in needed:
         if name not in value:
-            told = f'unit = "{UNITS[name]}", source and status'
+            told = f'unit = "{unit}", source and status'
             refuse(
                 name,
-                f"is missing, and rotor = 'inflow' needs it ({meaning}).",
+                f"is missing, and {asking} needs it ({meaning}).",
                 f"Add [parameters.{name}] with value, {told}; the packaged card 'coax' has the CoaX's.",
             )
-    for name in ("rotor_chord", "rotor_lift_slope"):
+    for name in ("rotor_chord", "rotor_lift_slope", *(("blade_inertia",) if flaps else ())):
         if not value[name] > 0.0:
             refuse(name, f"is {value[name]:g}, expected more than 0.")
     for name in ("rotor_drag_upper", "rotor_drag_lower"):

@@ -13,6 +13,7 @@ from swashplate.errors import CardError
 from swashplate.models.card import Card, Parameter, no_option
 from swashplate.models.coax import (
     UNITS,
+    CoaxBladeParameters,
     CoaxialLoads,
     CoaxInflowParameters,
     CoaxInputs,
@@ -23,13 +24,21 @@ from swashplate.models.coax import (
     loads,
     specific_force,
 )
-from swashplate.models.coax_choices import CHOICES, EFFECTS, INFLOW_CHOICES, INFLOW_EFFECTS
+from swashplate.models.coax_choices import (
+    BLADE_EFFECTS,
+    CHOICES,
+    EFFECTS,
+    INFLOW_CHOICES,
+    INFLOW_EFFECTS,
+    blade_choices,
+)
+from swashplate.models.coax_discs import UNITS as FLAPPING_UNITS
+from swashplate.models.coax_rotors import FLAPPINGS, InflowOptions, balanced_hover, checked_blades
 from swashplate.models.coax_rotors import UNITS as INFLOW_UNITS
-from swashplate.models.coax_rotors import InflowOptions, balanced_hover, checked_blades
 from swashplate.models.nesting import rebuild
 from swashplate.models.traits import Axis, Pose, RecordingFit, Traits
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics import rotor, stabilizer_bar
+from swashplate.physics import rotor
 from swashplate.physics.backend import Backend, FloatBackend, Scalar
 from swashplate.physics.coaxial_wake import FORMS as INTERFERENCES
 from swashplate.physics.drive_train import steady_speed
@@ -69,29 +78,15 @@ def acting_at(vehicle: Vehicle, x: Sequence[float], u: Sequence[float], around: 
 
 def pose(vehicle: Vehicle) -> Pose:
     """Both discs with their thrusts, and the bar's tilt against the fuselage."""
-    parameters = vehicle.values()
 
     def coaxial(x: Sequence[float], u: Sequence[float], around: Environment) -> dict[str, Any]:
         state: CoaxState = rebuild(vehicle.state, [float(value) for value in x])
-        par = parameters
-        upper, bar = TipPathPlane(0.0, 0.0), None
-        if state.bar is not None:
-            body = state.body.attitude
-            bar = [state.bar.eta - body.phi, state.bar.zeta - body.theta]
-            upper = stabilizer_bar.upper_tip_path_plane(
-                state.bar,
-                body,
-                linkage=par.linkage_upper,
-                lag=stabilizer_bar.phase_lag(par.k_zeta_upper, par.o_zeta_upper, state.drive.omega_upper),
-                mixing=vehicle.card.options.get("mixing", "rotation"),
-                xp=_XP,
-                linkage_asymmetry=par.linkage_asymmetry_upper,
-            )
+        body = state.body.attitude
+        bar = None if state.bar is None else [state.bar.eta - body.phi, state.bar.zeta - body.theta]
         acting = acting_at(vehicle, x, u, around)
         rotors = []
-        for plane, lift, omega in (
-            (upper, acting.lift[0], state.drive.omega_upper),
-            (state.lower, acting.lift[1], state.drive.omega_lower),
+        for plane, lift, omega in zip(
+            acting.planes, acting.lift, (state.drive.omega_upper, state.drive.omega_lower), strict=True
         ):
             rotors.append([plane.alpha, plane.beta, omega, *rotor.thrust_direction(plane, _XP).scaled(lift)])
         return {"rotors": rotors, "bar": bar, "tail": None}
@@ -269,6 +264,13 @@ INFLOW_TRAITS = replace(
     doubts=inflow_doubts,
     power=inflow_power,
 )
+BLADE_TRAITS = replace(INFLOW_TRAITS, choices=blade_choices, effects=lambda card: BLADE_EFFECTS, heavy=True)
+
+
+def _traits(rotors: InflowOptions | None) -> Traits:
+    if rotors is None:
+        return TRAITS
+    return INFLOW_TRAITS if rotors.flapping == "paper" else BLADE_TRAITS
 
 
 _SYMMETRY = Parameter(
@@ -299,6 +301,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "rotor": ("paper", "inflow"),
     "interference": INTERFERENCES,
     "ground_effect": GROUND_EFFECTS,
+    "flapping": FLAPPINGS,
 }
 
 
@@ -324,7 +327,7 @@ def coax(card: Card) -> Vehicle:
 
     `bar` (True, False), `mixing` ("rotation", "as_printed"), `rotor`: "paper" for thrust and torque by Omega^2, or
     "inflow" for rotors that know climb, speed and each other's wake (`coax_rotors`, two states more); those have
-    `interference` and `ground_effect` (`InflowOptions`).
+    `interference`, `ground_effect` and `flapping` (`InflowOptions`).
 
     Raises:
         CardError: for an unknown option, or a number that is missing, unknown, in another unit or impossible.
@@ -335,39 +338,43 @@ def coax(card: Card) -> Vehicle:
         rotors = InflowOptions(**{name: options[name] for name in InflowOptions._fields if name in options})
     card = _symmetric_where_silent(card)
     if rotors is not None:
-        card = checked_blades(card)
-    needed = {**UNITS, **{name: unit for name, unit in INFLOW_UNITS.items() if name in card.parameters}}
+        card = checked_blades(card, rotors)
+    also = {**INFLOW_UNITS, **FLAPPING_UNITS}
+    needed = {**UNITS, **{name: unit for name, unit in also.items() if name in card.parameters}}
     card = card.checked_against(needed)
     bar = StabilizerBar(0.0, 0.0) if options["bar"] else None
     bar_names = ("eta_bar", "zeta_bar") if options["bar"] else ()
     drive, induced = Drive(0.0, 0.0), None
     parameters: Any = CoaxParameters
     if rotors is not None:
-        parameters = CoaxInflowParameters
+        parameters = CoaxInflowParameters if rotors.flapping == "paper" else CoaxBladeParameters
         numbers = card.values()
         hovering = balanced_hover(parameters(*(numbers[name] for name in parameters._fields)), rotors, _XP)
         drive, induced = Drive(hovering.omega_lower, hovering.omega_upper), hovering.induced
     inflow_names = () if induced is None else induced._fields
+    upper = TipPathPlane(0.0, 0.0) if rotors is not None and rotors.flapping == "blades" else None
+    upper_names = () if upper is None else ("alpha_upper", "beta_upper")
     return Vehicle(
         card=card,
-        state=CoaxState(RigidBody(*(0.0,) * 12), TipPathPlane(0.0, 0.0), bar, drive, induced),
+        state=CoaxState(RigidBody(*(0.0,) * 12), TipPathPlane(0.0, 0.0), bar, drive, induced, upper),
         inputs=CoaxInputs,
         parameters=parameters,
         state_names=(
             *RigidBody._fields,
-            *("alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper", *inflow_names),
+            *("alpha_lower", "beta_lower", *bar_names, "omega_lower", "omega_upper", *inflow_names, *upper_names),
         ),
         state_units=(
             *BODY_UNITS,
             *("rad",) * (2 + len(bar_names)),
             *("rad/s", "rad/s"),
             *("m/s",) * len(inflow_names),
+            *("rad",) * len(upper_names),
         ),
         input_names=CoaxInputs._fields,
         input_units=("1",) * 4,
         input_limits=((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)),
         derivatives=partial(derivatives, mixing=options["mixing"], rotors=rotors),
         specific_force=partial(specific_force, mixing=options["mixing"], rotors=rotors),
-        traits=TRAITS if rotors is None else INFLOW_TRAITS,
+        traits=_traits(rotors),
         options=rotors,
     )

@@ -75,8 +75,8 @@ class Traits:
         observed: the observer of validation (tracked pose, gusts, delays of servos and motors) is made for it.
         published: name of the packaged card of just these equations, "" where cards differ by aircraft.
         servos: name of its packaged servo mapping, "" where that is its card's.
-        servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two motors" (and two
-            cyclic servos), or "" where no autopilot can be linked.
+        servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two swashplates" (with
+            one throttle), "two motors" (and two cyclic servos), or "" where no autopilot can be linked.
         no_link: why no autopilot can be linked, where there is something to say; "" where nothing is.
         choices: a card's ready choices of what a fit may free.
         effects: parts of a card's physics that numbers can leave out: what a comparison of nested structures tries.

@@ -62,11 +62,15 @@ def hinge(
     lift_slope: Scalar,
     chord: Scalar,
     radius: Scalar,
+    first_moment: Scalar = 1.0,
 ) -> Hinge:
     """Flap frequency and hub stiffness from the blade and the hub (Bramwell 2001, eqs 1.9 and 3.60).
 
     `hub_stiffness` is the whole hub's [N m/rad], N_b / 2 times a blade's spring; `hinge_offset` a fraction e of R. Two
     blades pass their moment on twice per revolution unevenly; the mean over a revolution is taken.
+
+    `first_moment` is the blade's first moment about the hinge over that of an even blade with the same inertia, 3/2 of
+    I / ((1 - e) R); the centrifugal force on the offset, and the hub moment that it makes, are in proportion to it.
 
     Blades that begin at the hinge have less moment of the air: by pitch and hub rates 4 int_e^1 (x - e) x^2 dx =
     1 - 4 e / 3 + e^4 / 3, by flapping 4 int_e^1 (x - e)^2 x dx = 1 - 8 e / 3 + 2 e^2 - e^4 / 3 of that about the centre
@@ -76,7 +80,7 @@ def hinge(
     by_pitch = 1.0 - hinge_offset * (4.0 - cubed) / 3.0
     by_flapping = 1.0 - hinge_offset * (8.0 - 6.0 * hinge_offset + cubed) / 3.0
     centrifugal = blade_inertia * omega * omega
-    offset = 1.5 * hinge_offset / (1.0 - hinge_offset)
+    offset = first_moment * (1.5 * hinge_offset / (1.0 - hinge_offset))
     half = 0.5 * blades
     return Hinge(
         hub_stiffness / (half * centrifugal) + offset,

@@ -19,6 +19,7 @@ def compose_design(
     *,
     title: str | None,
     late: str,
+    fast: str = "",
 ) -> Report:
     """The report's structure.
 
@@ -28,6 +29,7 @@ def compose_design(
         spread: at the first: of every state its name, how far it strays, how well it is known.
         title: heading.
         late: how late commands are taken to be, in words.
+        fast: loops that are faster than that asks for, in words; "" for none.
     """
     plan, card = made.plan, made.vehicle.card
     slowest = max((a.modes[0] for a in analyses), key=lambda mode: mode.real)
@@ -41,6 +43,7 @@ def compose_design(
         summary=(
             ("Told", f"{told}, {plan.rate:g} steps a second", "plain"),
             ("Commands are late by", late, "plain"),
+            *((("Loops that are fast for that", fast, "caution"),) if fast else ()),
             ("Modes", f"least stable {slowest.real:+.3g} ± {abs(slowest.imag):.3g}j 1/s", "plain"),
             ("Delay margin", _milliseconds(least), "plain"),
         ),

@@ -12,7 +12,7 @@ from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.result import Estimate, Result
-from swashplate.identification.one_step import in_words, one_step_effects
+from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.reporting.figures_fit import (
     cost_history,
@@ -36,7 +36,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     blocks += [Text(fit.beside_truth)] if fit.beside_truth else []
     asked_for = in_words(one_step_effects(fit))
     if asked_for:
-        blocks.append(Text(f"Structure: the flights say that the model {asked_for}"))
+        blocks.append(Text(f"Structure: the flights say that the model {asked_for} {not_judged(fit)}".rstrip()))
     blocks.append(
         Table(
             "Parameters before and after the fit",

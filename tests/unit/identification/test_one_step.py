@@ -11,7 +11,7 @@ import pytest
 from made_results import result
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.result import Fitted
-from swashplate.identification.one_step import in_words, one_step_effects
+from swashplate.identification.one_step import in_words, not_judged, one_step_effects
 from swashplate.models.catalogue import vehicle
 from swashplate.models.choices import PhysicalEffect
 
@@ -90,6 +90,17 @@ def test_a_part_that_is_free_is_judged_as_the_fit_without_it_judges() -> None:
     assert test.moved["linkage_lower"] == pytest.approx(by, rel=1e-6)
     assert "needs flap-back" in in_words([test])
     assert "linkage_lower by" in in_words([test])
+
+
+def test_what_no_step_can_judge_is_named() -> None:
+    """Another likelihood cannot free more numbers: what is held is said to be unjudged, not silently fine."""
+    fit, _ = fitted(NAMES, {"linkage_lower": 0.2})
+    assert not_judged(fit, [SPIN, DRAG]) == ""  # this one can
+    object.__setattr__(fit, "fitted", None)
+    told = not_judged(fit, [SPIN, DRAG])
+    assert SPIN.name in told
+    assert DRAG.name not in told  # its number is free
+    assert not_judged(fit, [DRAG]) == ""
 
 
 def test_nothing_is_said_of_a_fit_that_did_not_converge() -> None:

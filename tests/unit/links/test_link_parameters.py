@@ -14,6 +14,7 @@ from link_bench import QUICK, bench
 from swashplate.api import link
 from swashplate.errors import ControllerError, LinkError
 from swashplate.links.ardupilot.gains import ardupilot_law, read_parameter_file
+from swashplate.links.ardupilot.mixing import tail_sense
 from swashplate.links.ardupilot.parameters import parameter_file, parameters
 from swashplate.links.servos import servo_mapping
 
@@ -129,3 +130,13 @@ def test_a_swashplate_that_ardupilot_has_no_number_for_is_refused(tmp_path: Path
     custom = 'type = "custom"\nmatrix = [[1, 1, 0.5], [1, -1, 0.5], [1, 0, -1]]'
     with pytest.raises(LinkError, match="type 'custom' has no number in ArduPilot"):
         of("raptor50", changed(tmp_path, 'type = "H3-120"', custom))
+
+
+def test_servos_and_delays_do_not_hide_which_way_the_tail_turns() -> None:
+    """Their states stand between the command and the nose; a tail that is wired the other way is still seen."""
+    slow = sp.vehicle("raptor50", servos=True)
+    hover = sp.trim(slow)
+    assert tail_sense((-10.0, 30.0), slow, hover) == 1.0
+    assert tail_sense((30.0, -10.0), slow, hover) == -1.0
+    with pytest.raises(LinkError, match="the tail moves nothing"):
+        tail_sense((10.0, 10.0), slow, hover)

@@ -156,9 +156,11 @@ def test_off_axis_flapping_reverses_at_a_wake_distortion_of_one() -> None:
 
 
 def flap_residual(
-    e: float, lock: float, tilt: tuple[float, float], shaft: tuple[float, float], B1: float
+    e: float, lock: float, tilt: tuple[float, float], shaft: tuple[float, float], B1: float, heavier: float = 0.0
 ) -> np.ndarray:
-    """First harmonics of the moments about a hinge at e of a uniform blade in hover, from its motion in space.
+    """First harmonics of the moments about a hinge at e of a blade in hover, from its motion in space.
+
+    Its mass per length grows from 1 at the hinge to 1 + `heavier` at the tip; 0 is a uniform blade.
 
     Every element's acceleration by differences of its place: the shaft rolls and pitches at (p, q), the rotor turns,
     the blade flaps. Axes aft, right, up.
@@ -181,7 +183,8 @@ def flap_residual(
         acceleration = (place(psi, h) - 2.0 * place(psi, 0.0) + place(psi, -h)) / h**2
         tip, beta = np.array([math.cos(psi), math.sin(psi)]), flap(psi)
         normal = acceleration[2] * math.cos(beta) - tip @ acceleration[:2] * math.sin(beta)
-        inertia = 3.0 / (1.0 - e) ** 3 * float(weights @ ((x - e) * normal))
+        mass = 1.0 + heavier * (x - e) / (1.0 - e)
+        inertia = float(weights * mass @ ((x - e) * normal)) / float(weights * mass @ (x - e) ** 2)
         rate = a1 * math.sin(psi) - b1 * math.cos(psi)
         flow = -(x - e) * rate + x * (p * math.sin(psi) + q * math.cos(psi)) - B1 * math.sin(psi) * x
         air = 0.5 * lock * float(weights @ ((x - e) * x * flow))
@@ -189,8 +192,8 @@ def flap_residual(
     return found
 
 
-@pytest.mark.parametrize("e", [0.0, 0.05, 0.15])
-def test_flapping_about_an_offset_hinge_balances_every_element(e: float) -> None:
+@pytest.mark.parametrize(("e", "heavier"), [(0.0, 0.0), (0.05, 0.0), (0.15, 0.0), (0.05, 2.0), (0.15, -0.9)])
+def test_flapping_about_an_offset_hinge_balances_every_element(e: float, heavier: float) -> None:
     """Steady roll, pitch and cyclic: the closed form's tilt leaves no moment about the hinge (to the small angles)."""
     inertia, shaft, B1 = 0.7, (4e-5, -6e-5), 3e-5
     held = flapping.hinge(
@@ -203,6 +206,7 @@ def test_flapping_about_an_offset_hinge_balances_every_element(e: float) -> None
         lift_slope=5.7,
         chord=0.06,
         radius=1.0,
+        first_moment=(0.5 + heavier / 3.0) / (1.5 * (1.0 / 3.0 + heavier / 4.0)),
     )
 
     def rates(a1: float, b1: float) -> np.ndarray:
@@ -213,7 +217,7 @@ def test_flapping_about_an_offset_hinge_balances_every_element(e: float) -> None
     at_rest = rates(0.0, 0.0)
     slope = np.stack([rates(1.0, 0.0) - at_rest, rates(0.0, 1.0) - at_rest], axis=1)
     tilt = np.linalg.solve(slope, np.array(shaft) - at_rest)
-    left = flap_residual(e, 1.2 * 5.7 * 0.06 / inertia, (tilt[0], tilt[1]), shaft, B1)
+    left = flap_residual(e, 1.2 * 5.7 * 0.06 / inertia, (tilt[0], tilt[1]), shaft, B1, heavier)
     assert np.max(np.abs(left)) < 1e-8
 
 

@@ -153,7 +153,8 @@ class Lqg:
         start: the trim that it begins at.
         unrest: what its process noise was made of.
         seed: of the simulated sensors.
-        figures: what the design found, by name (modes, margins, expected spread), for its file and reader.
+        figures: what the design found, by name: "crossover_limits", of the loops by input [rad/s], infinite where the
+            effort was given; empty for one from a file.
     """
 
     vehicle: Vehicle

@@ -158,7 +158,8 @@ def design(
         pace=np.array(_PACE),
         place=np.array(1.0 if holding == "place" else 0.0),
     )
-    return Lqg(vehicle, plan, numbers, feedback, trims[0], chosen)
+    limits_of = dict(zip(vehicle.input_names, map(float, most), strict=True))
+    return Lqg(vehicle, plan, numbers, feedback, trims[0], chosen, figures={"crossover_limits": limits_of})
 
 
 def design_states(vehicle: Vehicle, delays: Sequence[int]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from swashplate.control.analysis.cascade import COARSE, cascade_plant
 from swashplate.control.analysis.cascade_gains import largest_rate
 from swashplate.control.laws.ardupilot.law import RATE_OF_LOOPS, ArduPilotLaw
+from swashplate.control.laws.ardupilot.mixers import SwashplateMixer
 from swashplate.control.laws.ardupilot.parameters import AXES, RATE, known, renamed
 from swashplate.errors import LinkError
 from swashplate.files import read_text
@@ -50,7 +51,7 @@ def ardupilot_law(
     """
     frame, mixer = vehicle.traits.servo_layout, mixer_of(mapping, vehicle, hover)
     k = known(given or {}, frame=frame)
-    single = frame == "swashplate"
+    single = isinstance(mixer, SwashplateMixer)
     throttle = "H_COL_HOVER" if single else "MOT_THST_HOVER"
     for _ in range(3):  # a coaxial's flaps are divided by the thrust
         k[throttle] = round(float(mixer.unmixed(hover.inputs, k)[3]), 4)
@@ -75,7 +76,7 @@ def ardupilot_law(
 
 def written_gains(law: ArduPilotLaw) -> Parameters:
     """What of a law stands in a parameter file, 4.7's names where it has others beside those of 4.6."""
-    k, single = law.parameters, law.frame == "swashplate"
+    k, single = law.parameters, isinstance(law.mixer, SwashplateMixer)
     names = [f"ATC_ANG_{axis}_P" for axis in AXES]
     names += [f"ATC_RAT_{axis}_{name}" for axis in AXES for name in RATE if single or name != "ILMI"]
     names += ["PSC_POSXY_P", "PSC_VELXY_P", "PSC_VELXY_I", "PSC_VELXY_D", "PSC_POSZ_P", "PSC_VELZ_P"]

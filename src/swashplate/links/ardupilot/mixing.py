@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 
-from swashplate.control.laws.ardupilot.mixers import CoaxialMixer, Mixer, SwashplateMixer
+from swashplate.control.laws.ardupilot.mixers import CoaxialMixer, Mixer, SwashplateMixer, TwinSwashplateMixer
 from swashplate.errors import LinkError
-from swashplate.links.servos import CoaxialMapping, ServoMapping
+from swashplate.links.servos import CoaxialMapping, ServoMapping, TwinMapping
 from swashplate.models.vehicle import Vehicle
+from swashplate.simulation.discretisation import zero_order_hold
 from swashplate.simulation.linearize import linearize
 from swashplate.simulation.trim import Trim
 
 CYCLIC = 0.9
 """Share of the servos' travel that a full roll or pitch command takes (twice the 0.45 of AP_MotorsHeli_Swash)."""
+DIFFERENTIAL = 450.0
+"""us of collective that a full yaw command gives one swashplate and takes from the other at H_DCP_SCALER 1."""
+_LATER = 0.5
+"""s: when the nose is asked which way it turns."""
 
 
 def mixer_of(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Mixer:
@@ -27,6 +32,8 @@ def mixer_of(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Mixer:
     if isinstance(mapping, CoaxialMapping):
         roll, pitch = mapping.travel
         return CoaxialMixer(roll, -pitch, *mapping.stopped)
+    if isinstance(mapping, TwinMapping):
+        return _twin(mapping, hover)
     least, most = map(math.radians, mapping.collective_deg)
     side, ahead = (CYCLIC * math.radians(angle) for angle in mapping.cyclic_deg)
     low, high = map(math.radians, mapping.tail_deg)
@@ -36,14 +43,27 @@ def mixer_of(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Mixer:
     return SwashplateMixer(least, most, side, ahead, 0.5 * (low + high), sense * 0.5 * (high - low), engine)
 
 
+def _twin(mapping: TwinMapping, hover: Trim) -> Mixer:
+    """Both swashplates alike, and yaw by their difference in collective (AP_MotorsHeli_Dual::mix_intermeshing)."""
+    plate = mapping.upper
+    least, most = map(math.radians, plate.collective_deg)
+    side, ahead = (CYCLIC * math.radians(angle) for angle in plate.cyclic_deg)
+    first, last = plate.collective_pulse
+    turn = DIFFERENTIAL * mapping.yaw_share * (most - least) / (last - first)
+    return TwinSwashplateMixer(least, most, side, ahead, 0.0, turn, hover.commands().get("throttle", 1.0))
+
+
 def tail_sense(deg: tuple[float, float], vehicle: Vehicle, hover: Trim) -> float:
     """1 where more of the tail's output turns the nose right, -1 where it has to be reversed.
+
+    The nose is asked half a second after a step, for servos and delays stand between.
 
     Raises:
         LinkError: where it moves nothing.
     """
     model = linearize(vehicle, hover)
-    turn = (deg[1] - deg[0]) * float(model.B[model.states.index("r"), model.inputs.index("theta0T")])
+    _, stepped = zero_order_hold(model.A, model.B, _LATER)
+    turn = (deg[1] - deg[0]) * float(stepped[model.states.index("r"), model.inputs.index("theta0T")])
     if turn == 0.0:
         raise LinkError("the tail moves nothing.", channel="tail.deg")
     return math.copysign(1.0, turn)

@@ -6,7 +6,7 @@ Names: ArduPilot's parameter reference of Copter 4.5. The file stands before the
 from __future__ import annotations
 
 from swashplate.flights.maneuvers.ardupilot_chirp import Chirp
-from swashplate.links.ardupilot.parameters import SINGLE_ROTOR, Parameters
+from swashplate.links.ardupilot.parameters import DUAL, SINGLE_ROTOR, Parameters
 
 _CHANNELS = range(1, 9)
 _MAGNETOMETERS = {"": (5.0, 13.0, -18.0), "2": (5.0, 13.0, -18.0), "3": (5.0, 13.0, -18.0)}
@@ -32,7 +32,7 @@ def trial_parameters(vehicle: Parameters, chirp: Chirp) -> Parameters:
         for axis in "XYZ":
             found |= {f"INS_ACC{unit}OFFS_{axis}": 0.001, f"INS_ACC{unit}SCAL_{axis}": 1.001}
     found |= {"BATT_MONITOR": 4.0}
-    if vehicle["FRAME_CLASS"] == SINGLE_ROTOR:
+    if vehicle["FRAME_CLASS"] in (SINGLE_ROTOR, DUAL):
         for axis, (target, error, most) in _FILTERS.items():
             name = f"ATC_RAT_{axis}"
             found |= {f"{name}_FLTT": target, f"{name}_FLTE": error, f"{name}_FLTD": 0.0, f"{name}_IMAX": most}

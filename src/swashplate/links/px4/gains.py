@@ -15,8 +15,10 @@ from swashplate.control.analysis.cascade_gains import largest_rate
 from swashplate.control.laws.ardupilot.law import GRAVITY, ArduPilotLaw
 from swashplate.control.laws.ardupilot.mixers import CoaxialMixer, Mixer, SwashplateMixer
 from swashplate.control.laws.ardupilot.parameters import AXES, known
+from swashplate.errors import LinkError
 from swashplate.links.ardupilot.mixing import CYCLIC, mixer_of
-from swashplate.links.servos import ServoMapping
+from swashplate.links.px4.parameters import NO_TWIN
+from swashplate.links.servos import ServoMapping, TwinMapping
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.trim import Trim
 
@@ -38,6 +40,8 @@ def px4_law(mapping: ServoMapping, vehicle: Vehicle, hover: Trim, *, rate: float
         vehicle, hover: in free flight, its hover.
         rate: of the loops [Hz].
     """
+    if isinstance(mapping, TwinMapping):
+        raise LinkError(NO_TWIN, channel="--servos")
     frame, mixer = vehicle.traits.servo_layout, _mixer(mapping, vehicle, hover)
     k = known({}, frame=frame)
     single = frame == "swashplate"

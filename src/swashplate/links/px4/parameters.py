@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 
+from swashplate.errors import LinkError
 from swashplate.links.ardupilot.parameters import RUN_UP
 from swashplate.links.servo import CENTRE, HALF
-from swashplate.links.servos import CoaxialMapping, ServoMapping
+from swashplate.links.servos import CoaxialMapping, ServoMapping, TwinMapping
 
 HELICOPTER, COAXIAL = 11, 12
 """CA_AIRFRAME: helicopter with a tail servo, coaxial helicopter."""
+NO_TWIN = "PX4 has no frame with two swashplates (its page 'Helicopters': coaxial and dual rotors are not supported)."
 _MOTOR, _SERVO = 101, 201
 _UNHURRIED = {"COM_DISARM_PRFLT": 60.0, "MPC_MANTHR_MIN": 0.0}
 """As PX4's own helicopters (rc.heli_defaults): else it disarms 10 s after arming, while the rotor still spools up."""
@@ -32,6 +34,8 @@ def parameters(mapping: ServoMapping) -> dict[str, float]:
         motors, servos, plate = mapping.motors, mapping.servos, len(mapping.servos)
         angles, found = _COAXIAL_ANGLES, {"CA_AIRFRAME": float(COAXIAL)}
     else:
+        if isinstance(mapping, TwinMapping):
+            raise LinkError(NO_TWIN, channel="--servos")
         motors, servos, plate = (mapping.throttle,), (mapping.tail, *mapping.swash), len(mapping.swash)
         low, high = ((pulse - CENTRE) / HALF for pulse in mapping.collective_pulse)
         angles = mapping.angles

@@ -89,11 +89,12 @@ ANGLES = (*(n for n in SINGLE_ANGLES if n in UNITS and n != "cyclic_phase"), "di
 
 CoaxialParameters = NamedTuple("CoaxialParameters", [(name, Any) for name in UNITS])  # type: ignore[misc]
 
-OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, "hub_height", "shaft_tilt")])  # type: ignore[misc]
-"""The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright."""
+_EACH = ("hub_height", "shaft_tilt", "blade_first_moment")
+OneRotor = NamedTuple("OneRotor", [(name, Any) for name in (*_ROTOR, *_EACH)])  # type: ignore[misc]
+"""The numbers of one of the rotors, by the names that `main_rotor` reads; shafts are upright, blades even."""
 
 
 def one_rotor(par: Any, hub_height: Any) -> Any:
     """The numbers of the rotor at this height."""
     numbers = [getattr(par, name) for name in _ROTOR]
-    return OneRotor._make((*numbers, hub_height, 0.0))
+    return OneRotor._make((*numbers, hub_height, 0.0, 1.0))

@@ -120,8 +120,7 @@ _EFFECTS = (
 TRAITS = Traits(
     axes=_AXES,
     heavy=True,
-    no_link="its two swashplates and one throttle have no servo mapping yet (ArduPilot's dual helicopter frame with "
-    "H_DUAL_MODE 2 is what would fly it)",
+    servo_layout="two swashplates",
     standing={"ground": True, "grip": True, "rotor_speed": "throttle"},
     effects=lambda card: _EFFECTS,
     recording=RecordingFit(),

@@ -96,6 +96,7 @@ def main_rotor_slopes(
         lift_slope=slope,
         chord=par.rotor_chord,
         radius=par.rotor_radius,
+        first_moment=par.blade_first_moment,
     )
     cone_gain = 0.5 * held.lock / (1.0 + held.excess) if options.coning else 0.0
     cone = cone_gain * blade_element.flap_moments(seen).mean if options.coning else par.precone

@@ -119,6 +119,12 @@ _TABLE: tuple[tuple[str, str, str], ...] = (
     ("stabilator_collective", "1", "incidence per main rotor collective above the neutral one; 0 for none"),
     ("stabilator_neutral", "rad", "main rotor collective at which its schedule is that of speed alone"),
     ("stabilator_pitch_rate", "s", "incidence per pitch rate; 0 for none"),
+    (
+        "blade_first_moment",
+        "1",
+        "a main blade's mass times its CG's distance from the hinge, over that of an even blade, 3/2 blade_inertia / "
+        "((1 - hinge_offset) rotor_radius); counts only with hinge_offset",
+    ),
 )
 
 UNITS: Mapping[str, str] = {name: unit for name, unit, _ in _TABLE}
@@ -153,6 +159,7 @@ ADDED: Mapping[str, tuple[str | None, float | str]] = {
     "stabilator_collective": (None, 0.0),
     "stabilator_neutral": (None, 0.0),
     "stabilator_pitch_rate": (None, 0.0),
+    "blade_first_moment": (None, 1.0),
 }
 """What the first cards lack: the option that needs it, and the number or parameter that stood for it before."""
 
@@ -198,6 +205,7 @@ POSITIVE = (
     "skid_depth",
     "rotor_tip_loss",
     "rotor_induced_factor",
+    "blade_first_moment",
 )
 """What is greater than zero on every helicopter."""
 NOT_NEGATIVE = (

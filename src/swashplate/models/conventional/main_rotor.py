@@ -102,6 +102,7 @@ def main_rotor(
         lift_slope=flap_slope,
         chord=par.rotor_chord,
         radius=par.rotor_radius,
+        first_moment=par.blade_first_moment,
     )
     if options.stiff_blades:
         held = held._replace(stiffness_pace=flapping.regressing_pace(held.excess, xp))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
 
 import swashplate as sp
+from made_results import result
+from swashplate.api.design_controller import _fast
 from swashplate.control.analysis.check import ControlCheck, check_controller, with_delay_verdict
 from swashplate.control.analysis.sampled_loop import SampledLoop, sampled_loop
 from swashplate.control.analysis.stability import loop_modes, margins_at, margins_of, modes_of
+from swashplate.control.draws.robustness import draw_models
 from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.analysis import analyse
 from swashplate.control.lqg.controller import Lqg
@@ -141,6 +145,16 @@ def test_default_loops_are_no_faster_than_their_delays_allow(late: Vehicle, dela
     assert crossovers(*loop.sensitivities(np.asarray(usual.feedback.gains)[0])).max() > 1.5 * most[0]
 
 
+def test_a_loop_that_less_effort_does_not_slow_is_told(aware: Lqg) -> None:
+    found = [analyse(aware)]
+    assert _fast(aware, found) == ""
+    asked = replace(aware, figures={"crossover_limits": {**aware.figures["crossover_limits"], "motor_upper": 1.0}})
+    assert "motor_upper at 3." in _fast(asked, found)
+    assert "(asked for: 1)" in _fast(asked, found)
+    free = replace(aware, figures={"crossover_limits": dict.fromkeys(aware.figures["crossover_limits"], np.inf)})
+    assert _fast(free, found) == ""
+
+
 def test_computation_is_a_delay_of_every_input(late: Vehicle) -> None:
     made = design(late, computation=0.009)
     assert made.plan.delays == (8, 8, 5, 5)
@@ -177,6 +191,27 @@ def test_a_design_that_knows_them_flies_as_late_as_the_aircraft_is(judged: Contr
     heading = next(step for step in judged.steps if step.reference == "psi")
     assert heading.metrics.overshoot < 0.2
     assert heading.metrics.settling < 4.0
+
+
+def test_from_a_fits_file_to_an_aircraft_that_flies_in_short(late: Vehicle, tmp_path: Path) -> None:
+    """What a fit wrote, read again, designed on, and flown late and in gusts on an aircraft that the fit allows.
+
+    The whole chain, from a real log and with a hundred aircraft, quantised and with a tired battery, is
+    `recovery/test_log_to_flight`; this one has the shapes that are compiled above.
+    """
+    found = result(late, {"tau_f_upper": 1.6, "linkage_lower": 0.1355}, np.diag([0.1, 0.005]) ** 2)
+    found.save(tmp_path / "fit.json")
+    fit = sp.load(tmp_path / "fit.json")
+    assert input_delays(fit.model) == input_delays(late)
+    made = design(fit.model, sensors=suite(SENSORS))
+    drawn = {name: float(values[0]) for name, values in draw_models(fit.model, fit, count=1, seed=3).items()}
+    assert abs(drawn["tau_f_upper"] - 1.6) > 0.05
+    aircraft = fit.model.with_values(drawn)
+    flown = check_controller(aircraft, made, sp.trim(aircraft, voltage=12.22), duration=8.0)
+    assert flown.problems == ()
+    assert flown.in_gusts is not None
+    assert flown.in_gusts.place < 0.25
+    assert flown.in_gusts.heading < np.radians(10.0)
 
 
 def test_the_loop_of_the_law_is_the_map_of_the_aircraft_with_its_commands_on_their_way(late: Vehicle) -> None:

@@ -289,6 +289,6 @@ def test_a_card_that_no_craft_has_is_refused(change: dict[str, float], options: 
         from_card(replace(card, options={**card.options, **options}))
 
 
-def test_an_autopilot_is_refused_in_words() -> None:
-    with pytest.raises(LinkError, match="two swashplates and one throttle have no servo mapping"):
+def test_another_vehicles_servos_are_refused_in_words() -> None:
+    with pytest.raises(LinkError, match="vehicle: is 'conventional', the vehicle has the equations of 'coaxial'"):
         servo_mapping("raptor50", sp.vehicle("coaxial15"))

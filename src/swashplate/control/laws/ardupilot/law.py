@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from swashplate.arrays import Array
 from swashplate.control.laws.ardupilot.filters import low_pass, notch, one_pole, reached_by
-from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer
+from swashplate.control.laws.ardupilot.mixers import FRAMES, Mixer, SwashplateMixer
 from swashplate.control.laws.ardupilot.parameters import AXES, DEFAULTS, RATE
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Scalar
@@ -82,7 +82,7 @@ class ArduPilotLaw:
     @property
     def frame(self) -> str:
         """What is mixed: a key of `FRAMES`."""
-        return next(name for name, kind in FRAMES.items() if isinstance(self.mixer, kind))
+        return next(name for name, kind in FRAMES.items() if type(self.mixer) is kind)
 
     @property
     def memory(self) -> Array:
@@ -96,7 +96,7 @@ class ArduPilotLaw:
     @property
     def hover(self) -> float:
         """The throttle that it takes for the hover's."""
-        return self.parameters["H_COL_HOVER" if self.frame == "swashplate" else "MOT_THST_HOVER"]
+        return self.parameters["H_COL_HOVER" if isinstance(self.mixer, SwashplateMixer) else "MOT_THST_HOVER"]
 
     @property
     def gains(self) -> Array:
@@ -142,7 +142,7 @@ def ardupilot_step(
     mixer = FRAMES[frame](*numbers)
     m = {name: memory[where] for name, where in _PLACES.items()}
     body = RigidBody(*(measured[i] for i in range(len(RigidBody._fields))))
-    heli = frame == "swashplate"
+    heli = issubclass(FRAMES[frame], SwashplateMixer)
     after: dict[str, Any] = {"begun": jnp.ones(1)}
     velocity = _to_north_east_down(body)
 

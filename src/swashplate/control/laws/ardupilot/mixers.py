@@ -70,6 +70,10 @@ class SwashplateMixer(NamedTuple):
         return np.array([roll, pitch, (tail - self.tail) / self.turn, (theta0 - self.least) / (self.most - self.least)])
 
 
+class TwinSwashplateMixer(SwashplateMixer):
+    """Two swashplates that tilt alike; `tail` and `turn` are half of their difference in collective [rad]."""
+
+
 class CoaxialMixer(NamedTuple):
     """Two motors, lower and upper (counter-clockwise from above), and flaps or cyclic servos.
 
@@ -125,6 +129,7 @@ class CoaxialMixer(NamedTuple):
 Mixer = SwashplateMixer | CoaxialMixer
 FRAMES: Mapping[str, type[SwashplateMixer] | type[CoaxialMixer]] = {
     "swashplate": SwashplateMixer,
+    "two swashplates": TwinSwashplateMixer,
     "two motors": CoaxialMixer,
 }
 """By `Traits.servo_layout`."""

@@ -79,13 +79,29 @@ BASE: Mapping[str, Mapping[str, float]] = {
         "PSC_VELXY_I": 0.5,
         "PSC_ACCZ_P": 0.28,
     },
+    "two swashplates": {
+        **_rates("RLL", 0.21, 0.06, 0.105, 0.0001, 20.0, 20.0, 0.0, 0.4, 0.1),
+        **_rates("PIT", 0.44, 0.15, 0.095, 0.005, 20.0, 20.0, 0.0, 0.4, 0.1),
+        **_rates("YAW", 0.0, 0.14685, 0.0245, 0.0015, 20.0, 0.0, 0.0, 1.0, 0.0),
+        "ATC_ANG_RLL_P": 4.0,
+        "ATC_ANG_PIT_P": 4.5,
+        "ATC_ANG_YAW_P": 4.5,
+        "ATC_INPUT_TC": 0.2,
+        "ATC_ACCEL_R_MAX": 60000.0,
+        "ATC_ACCEL_P_MAX": 60000.0,
+        "ATC_ACCEL_Y_MAX": 60000.0,
+        "PSC_VELXY_P": 1.0,
+        "PSC_VELXY_I": 0.5,
+        "PSC_ACCZ_P": 0.28,
+    },
     "two motors": {
         **_rates("RLL", 0.0, 2.0, 2.0, 0.2, 20.0, 0.0, 20.0, 1.0, 0.0),
         **_rates("PIT", 0.0, 2.0, 2.0, 0.2, 20.0, 0.0, 20.0, 1.0, 0.0),
         **_rates("YAW", 0.0, 1.397085, 0.139709, 0.0, 20.0, 2.5, 20.0, 0.222, 0.0),
     },
 }
-"""What a frame's own file changes (copter-heli.parm with the helicopter firmware's defaults, copter-coax.parm), by
+"""What a frame's own file changes (copter-heli.parm with the helicopter firmware's defaults, with
+copter-heli-dual.parm over it, copter-coax.parm), by
 `Traits.servo_layout`."""
 RENAMED: Mapping[str, tuple[str, float]] = {
     **{f"PSC_NE_POS_{n}": (f"PSC_POSXY_{n}", 1.0) for n in ("P",)},

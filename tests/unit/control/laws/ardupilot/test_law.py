@@ -166,7 +166,7 @@ def test_its_file(tmp_path: Path) -> None:
     text = (tmp_path / "law.toml").read_text(encoding="utf-8")
     for old, new, told in (
         ('mode = "loiter"', 'mode = "auto"', "mode"),
-        ('frame = "two motors"', 'frame = "tandem"', "expected swashplate, two motors"),
+        ('frame = "two motors"', 'frame = "tandem"', "expected swashplate, two swashplates, two motors"),
         ("roll = 1.0", "rol = 1.0", "expected roll, pitch"),
         ("rate = 400.0", "rate = 4.0", "expected 50 to 2000"),
         ("ANGLE_MAX = 3000.0", "ANGLE_MOST = 3000.0", "no parameter of the law"),

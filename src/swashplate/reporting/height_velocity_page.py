@@ -1,0 +1,81 @@
+"""A page about one height-velocity diagram."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.reporting.structure import Figure, Key, Points, Report, Section
+from swashplate.reporting.theme import GREY, VERMILION, axis, base_layout, line
+from swashplate.reporting.versions import date, versions
+from swashplate.simulation.height_velocity import HeightVelocity
+
+_AVOID = "rgba(213,94,0,0.35)"
+
+
+def compose_height_velocity(found: HeightVelocity, *, title: str | None = None) -> Report:
+    """The page's structure: the diagram, its numbers and what it stands on."""
+    heading = title or f"Height-velocity diagram of {found.vehicle.card.title}"
+    return Report(
+        title=heading,
+        banners=(),
+        summary=(
+            ("Hover", hover_words(found), "plain"),
+            ("Where to trust it", found.vehicle.card.trust or "the card does not say", "plain"),
+        ),
+        picture=None,
+        sections=(section_of_height_velocity(found),),
+        made=f"swashplate {versions()['swashplate']}, {date()}",
+    )
+
+
+def hover_words(found: HeightVelocity) -> str:
+    """Both hover heights in words."""
+    high = f"and from {found.high_hover:.3g} m" if math.isfinite(found.high_hover) else "and from no height shown here"
+    return f"an engine failure can be landed up to {found.low_hover:.3g} m {high}"
+
+
+def section_of_height_velocity(found: HeightVelocity) -> Section:
+    """The diagram and its assumptions."""
+    return Section(
+        "engine-failure",
+        "Where an engine failure cannot be landed",
+        (_diagram(found), Points(found.assumptions, title="What this assumes")),
+    )
+
+
+def _edges(at: Array) -> Array:
+    """Borders of cells round points that ascend."""
+    middle = 0.5 * (at[1:] + at[:-1])
+    return np.concatenate([[at[0]], middle, [at[-1]]])
+
+
+def _diagram(found: HeightVelocity) -> Figure:
+    v, h = _edges(found.speeds), np.exp(_edges(np.log(found.heights)))
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for i, k in zip(*np.nonzero(~found.safe), strict=True):
+        low, high, left, right = h[i], h[i + 1], v[k], v[k + 1]
+        x += [left, right, right, left, left, None]
+        y += [low, low, high, high, low, None]
+    avoid = line(x, y, name="avoid", color=VERMILION, width=0.0)
+    traces = [avoid | {"fill": "toself", "fillcolor": _AVOID, "hoverinfo": "skip", "hovertemplate": None}]
+    for height, words in ((found.low_hover, "low hover"), (found.high_hover, "high hover")):
+        if math.isfinite(height) and height > 0.0:
+            told = f"{words}: {height:.3g} m"
+            traces.append(line([v[0], v[-1]], [height] * 2, name=words, color=GREY, dash="dash", width=1.0, hover=told))
+    layout = base_layout(420) | {
+        "xaxis": axis("speed [m/s]", range=[float(v[0]), float(v[-1])]),
+        "yaxis": axis("height [m]", type="log", range=[float(np.log10(h[0])), float(np.log10(h[-1]))]),
+    }
+    return Figure(
+        "height-velocity",
+        {"data": traces, "layout": layout},
+        420,
+        f"From the coloured heights and speeds no way to land that was tried ended within the limits, with a pilot who "
+        f"acts {found.delay:g} s after the engine has stopped. Dashed: the two hover heights.",
+        f"Height over speed; {hover_words(found)}.",
+        (Key("avoid", VERMILION, "band"), Key("hover heights", GREY, "dash")),
+    )
