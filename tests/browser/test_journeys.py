@@ -120,7 +120,9 @@ def test_a_notebook_is_told_of_a_flipped_gyro_mends_it_and_identifies(
         (output,) = (o for o in cell.outputs if o.output_type == "execute_result")
         assert "<img" in output.data["text/html"], name
     fit = next(f for f in docs_running.fences(page) if "omega_pole" in f.text)
-    assert docs_running.same(fit.text, "\n".join(line for line in printed.splitlines() if line in fit.text.splitlines()))
+    assert docs_running.same(
+        fit.text, "\n".join(line for line in printed.splitlines() if line in fit.text.splitlines())
+    )
     keep("journey-csv.png", (tmp_path / "journey-csv.png").read_bytes())
 
 
