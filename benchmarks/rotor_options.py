@@ -21,6 +21,8 @@ CASES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("raptor50", "aerofoil", {"aerofoil": "naca0012"}),
     ("raptor50", "aerofoil, inflow = pitt-peters", {"aerofoil": "naca0012", "inflow": "pitt-peters"}),
 )
+SHORT = CASES[:1]
+"""Whose plain loop another benchmark has compiled; each of the others compiles a trim and a loop, for 8 s."""
 
 
 def _loop(name: str, options: dict[str, Any], steps: int) -> Any:
@@ -33,11 +35,12 @@ def _loop(name: str, options: dict[str, Any], steps: int) -> Any:
     return lambda: jax.block_until_ready(trajectory(equations_of(flown), *arguments, substeps=1, held=True))
 
 
-def rotor_options(*, steps: int, repeats: int) -> list[Result]:
+def rotor_options(*, steps: int, repeats: int, short: bool) -> list[Result]:
     """One result each: the rate with the option, and in its note the share of the rate without."""
-    plain = {name: _loop(name, {}, steps) for name in dict.fromkeys(name for name, _, _ in CASES)}
+    cases = SHORT if short else CASES
+    plain = {name: _loop(name, {}, steps) for name in dict.fromkeys(name for name, _, _ in cases)}
     found = []
-    for name, said, options in CASES:
+    for name, said, options in cases:
         with_it = _loop(name, options, steps)
         rates = [0.0, 0.0]
         for _ in range(repeats):

@@ -50,11 +50,11 @@ def measure(*, short: bool) -> list[Result]:
         export.environments(steps=100 * scale, repeats=repeats),
         *many.batches("coax", "float64", steps=50 * scale, repeats=repeats),
         *many.batches("coax", "float32", steps=50 * scale, repeats=repeats),
-        *many.batches("raptor50", "float64", steps=20 * scale, repeats=repeats, promised=False),
+        *([] if short else many.batches("raptor50", "float64", steps=20 * scale, repeats=repeats, promised=False)),
         helicopter.scan(steps=20_000 * scale, repeats=2 * repeats),
         helicopter.speeds(repeats=repeats),
         helicopter.lpv(steps=1_000 * scale, repeats=repeats),
-        *rotor_options(steps=20_000 * scale, repeats=repeats),
+        *rotor_options(steps=20_000 * scale, repeats=repeats, short=short),
         *link.measure(short=short),
         *([] if short else [closed_loops.observers(count=128, repeats=2)]),
     ]

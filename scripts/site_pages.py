@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import docs_pages
+import docs_running
 import site_reference
 from pygments.lexers.special import TextLexer
 from sphinx.search.en import SearchEnglish
@@ -81,7 +82,7 @@ def notebook(text: str) -> dict[str, Any]:
         if piece.strip():
             cells.append({"cell_type": "markdown", "metadata": {}, "source": piece.strip()})
 
-    for fence in docs_pages.fences(text):
+    for fence in docs_running.fences(text):
         if fence.language not in ("python", "text"):
             continue
         opening = text.rindex("```", 0, fence.start)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import docs_pages
+import docs_running
 import pytest
 import site_pages
 import test_live_in_chromium as live_page
@@ -119,8 +119,10 @@ def test_a_notebook_is_told_of_a_flipped_gyro_mends_it_and_identifies(
     for name, cell in zip(shown, cells[-len(shown) :], strict=True):
         (output,) = (o for o in cell.outputs if o.output_type == "execute_result")
         assert "<img" in output.data["text/html"], name
-    fit = next(f for f in docs_pages.fences(page) if "omega_pole" in f.text)
-    assert docs_pages.same(fit.text, "\n".join(line for line in printed.splitlines() if line in fit.text.splitlines()))
+    fit = next(f for f in docs_running.fences(page) if "omega_pole" in f.text)
+    assert docs_running.same(
+        fit.text, "\n".join(line for line in printed.splitlines() if line in fit.text.splitlines())
+    )
     keep("journey-csv.png", (tmp_path / "journey-csv.png").read_bytes())
 
 

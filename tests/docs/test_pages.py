@@ -33,14 +33,14 @@ def _script(name: str) -> ModuleType:
     return module
 
 
-docs, diagram = _script("docs_pages"), _script("block_diagram")
+running, docs, diagram = _script("docs_running"), _script("docs_pages"), _script("block_diagram")
 PAGES = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in docs.pages()}
 COMMANDS = [
     (name, command)
     for name, text in PAGES.items()
-    for fence in docs.fences(text)
+    for fence in running.fences(text)
     if fence.language == "console"
-    for command in docs.commands(fence)
+    for command in running.commands(fence)
 ]
 
 
@@ -50,17 +50,17 @@ def _anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if docs.runs_something(text)])
+@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if running.runs_something(text)])
 def test_a_page_runs_and_prints_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     mpl.use("Agg")
     here = all(datasets.find("coax56", file) for file in _FLIGHTS)
     left_out = []
-    for shown in docs.run_page(PAGES[name], real=False, data_is_here=here):
+    for shown in running.run_page(PAGES[name], real=False, data_is_here=here):
         if shown.came is None:
             left_out.append(shown.what.strip().splitlines()[0])
         elif shown.said:
-            assert docs.same(shown.said, shown.came), f"{name}: {shown.what}\nprints now:\n{shown.came}"
+            assert running.same(shown.said, shown.came), f"{name}: {shown.what}\nprints now:\n{shown.came}"
     if left_out and not here:
         pytest.skip(f"the flights of coax56 are not here; not run: {'; '.join(left_out)}")
 

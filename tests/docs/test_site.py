@@ -19,7 +19,7 @@ from chromium import running_browser
 sphinx = pytest.importorskip("sphinx", reason="the site's packages are not installed")
 
 import build_site  # noqa: E402
-import docs_pages  # noqa: E402
+import docs_running  # noqa: E402
 import real_results  # noqa: E402
 import site_pages  # noqa: E402
 import site_reference  # noqa: E402
@@ -89,7 +89,7 @@ def test_a_worked_example_is_a_notebook_too(site: Path) -> None:
     page = (ROOT / "docs" / "notebooks" / f"{made[0].stem}.md").read_text(encoding="utf-8")
     cells = json.loads(made[0].read_text(encoding="utf-8"))["cells"]
     code = [cell["source"] + "\n" for cell in cells if cell["cell_type"] == "code"]
-    assert code == [fence.text for fence in docs_pages.fences(page) if fence.language == "python"]
+    assert code == [fence.text for fence in docs_running.fences(page) if fence.language == "python"]
     assert cells[0]["source"].startswith("# ")
 
 

@@ -15,6 +15,9 @@ FROZEN = Path(__file__).parent / "frozen"
 
 RELATIVE = 1e-10
 """How far a number may be from its frozen value, relative to the value."""
+ELSEWHERE = 1e-5
+"""The same on another machine than the one that froze it, for light cases: between processors with other instructions
+their numbers were up to 7e-7 apart (`CHANGED.md`)."""
 SMALL = 1e-14
 """Floor of a single number, in its own unit: below it a number is rounding. A list holds one quantity (else it goes
 through `apart`), and its floor is RELATIVE times its largest entry."""

@@ -59,15 +59,4 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             Curve("Directions of the bar", "lean from the mean plane [deg]", "share of the samples below",
                   spread, share, spread[:0], share[:0])
         )  # fmt: skip
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        (),
-        np.zeros(0),
-        np.zeros((0, 0)),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        findings=tuple(findings),
-    )
+    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.bench.record import BenchRecord
 from swashplate.identification.core.result import Result
 from swashplate.models.vehicle import Vehicle
 
@@ -113,6 +114,34 @@ class BenchResult:
     findings: tuple[BenchFinding, ...] = ()
     tables: tuple[Rows, ...] = ()
     records_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def of_findings(
+        cls,
+        procedure: str,
+        title: str,
+        source: str,
+        records: Sequence[BenchRecord],
+        checks: Sequence[BenchCheck],
+        curves: Sequence[Curve],
+        findings: Sequence[BenchFinding],
+        *,
+        tables: Sequence[Rows] = (),
+    ) -> BenchResult:
+        """What a procedure found that estimates no parameter of the card."""
+        return cls(
+            procedure,
+            title,
+            source,
+            (),
+            np.zeros(0),
+            np.zeros((0, 0)),
+            tuple(record.name for record in records),
+            tuple(checks),
+            tuple(curves),
+            findings=tuple(findings),
+            tables=tuple(tables),
+        )
 
     @property
     def sigma(self) -> Array:

@@ -116,15 +116,4 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 )
             )
     checks.append(BenchCheck("The bound of the interference does not hold what remounting the blades changes."))
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        (),
-        np.zeros(0),
-        np.zeros((0, 0)),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        findings=tuple(findings),
-    )
+    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)

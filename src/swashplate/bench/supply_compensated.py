@@ -66,15 +66,4 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 Curve(f"Speed of the {rotor} rotor, compensated", "supply voltage [V]", "rotor speed [rad/s]", volts,
                       found[f"omega_{rotor}"], ends, line.values[1] + left * (ends - volts.mean()))
             )  # fmt: skip
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        (),
-        np.zeros(0),
-        np.zeros((0, 0)),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        findings=tuple(findings),
-    )
+    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)

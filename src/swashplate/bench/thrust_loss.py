@@ -152,19 +152,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 Curve(f"Thrust that {name} loses", "pulse width [us]", "loss [%]", 1e6 * found.pwm[at], 1e2 * loss[at],
                       1e6 * found.pwm[at], 1e2 * loss[at], name=words)
             )  # fmt: skip
-    return BenchResult(
-        NAME,
-        TITLE,
-        SOURCE,
-        (),
-        np.zeros(0),
-        np.zeros((0, 0)),
-        tuple(record.name for record in records),
-        tuple(checks),
-        tuple(curves),
-        findings=tuple(findings),
-        tables=tuple(rows),
-    )
+    return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings, tables=rows)
 
 
 def _measured(name: str, runs: Sequence[BenchRecord]) -> Rows:

@@ -74,7 +74,11 @@ OPTIONS = {"bar": True, "servos": True, "gyro": True, "coning": True, "inflow": 
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [("raptor50", OPTIONS), ("coax", {}), ("coax", {"bar": False})],
+    [
+        pytest.param("raptor50", OPTIONS, marks=pytest.mark.proof),
+        ("coax", {}),
+        pytest.param("coax", {"bar": False}, marks=pytest.mark.proof),
+    ],
 )
 def test_everything_can_stand(name: str, options: dict[str, object]) -> None:
     made = standing(vehicle(name, **options))

@@ -241,31 +241,30 @@ def _sampled(part: Complex, first: int, short: int, hop: int) -> Complex:
     return np.asarray(np.fft.ifft(folded.reshape(-1, short).sum(axis=0)) / hop)
 
 
+_REACH = 3
+"""Rows that a path rises in a frame at most: 3 octaves a second."""
+
+
 def _best_path(gain: Array) -> tuple[int, NDArray[np.int64]] | None:
     """First frame and rows of the path with the largest sum of gains that never falls in frequency (Viterbi)."""
     rows, frames = gain.shape
-    reach = 3  # rows a frame: 3 octaves a second
-    # Sums of the paths so far, behind a margin from which none comes; [row, step] is that of `step` rows below.
-    padded = np.concatenate([np.full(reach, -np.inf), np.zeros(rows)])
-    best, below = padded[reach:], np.lib.stride_tricks.sliding_window_view(padded, reach + 1)[:, ::-1]
-    own = np.arange(rows)
-    steps = np.empty((frames, rows), dtype=np.int8)
-    tops, scores = np.empty(frames, dtype=np.int64), np.empty(frames)
-    for k, gained in enumerate(np.ascontiguousarray(gain.T)):
-        choice = below.argmax(axis=1)
-        before = below[own, choice]
-        on = before > 0.0
-        steps[k] = np.where(on, choice, -1)
-        np.add(np.where(on, before, 0.0), gained, out=best)
-        tops[k] = top = best.argmax()
-        scores[k] = best[top]
-    k = int(np.argmax(scores))
-    if scores[k] <= 0.0:
+    # Sums of the paths that end at a row, behind a margin from which none comes.
+    sums = np.full((frames + 1, _REACH + rows), -np.inf)
+    sums[0, _REACH:] = 0.0
+    for before, after, gained in zip(sums, sums[1:, _REACH:], np.ascontiguousarray(gain.T), strict=False):
+        np.maximum(before[_REACH:], 0.0, out=after)  # one begins here, or comes from the same row or one below
+        for step in range(1, _REACH + 1):
+            np.maximum(after, before[_REACH - step : -step], out=after)
+        after += gained
+    best = sums[1:, _REACH:]
+    k, row = divmod(int(best.argmax()), rows)
+    if best[k, row] <= 0.0:
         return None
-    row = int(tops[k])
     path = [row]
-    while steps[k, row] >= 0:
-        row -= int(steps[k, row])
-        k -= 1
+    while True:
+        from_below = sums[k, row : row + _REACH + 1][::-1]
+        step = int(from_below.argmax())
+        if not from_below[step] > 0.0:
+            return k, np.asarray(path[::-1], dtype=np.int64)
+        row, k = row - step, k - 1
         path.append(row)
-    return k, np.asarray(path[::-1], dtype=np.int64)

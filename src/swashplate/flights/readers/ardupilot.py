@@ -23,7 +23,7 @@ from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked, dataflash, dataflash_text
 from swashplate.flights.readers.ardupilot_events import seconds, story
 from swashplate.flights.readers.dataflash import Messages, MessageTable
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 from swashplate.flights.schema import is_known
 
@@ -126,12 +126,7 @@ def read(source: Source, options: Options) -> Flight:
     Raises:
         FlightError: where nothing in the log can be used, or a mapping is given.
     """
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for an ArduPilot log: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "an ArduPilot log", where=source.name)
     text = source.text
     found = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
     found, end, said = _one_run(found)

@@ -23,7 +23,7 @@ from swashplate.flights.readers.blackbox_fields import Fields, gps_place
 from swashplate.flights.readers.blackbox_frames import FoundFrames, find_frames
 from swashplate.flights.readers.blackbox_header import Header, as_number, read_header
 from swashplate.flights.readers.blackbox_values import Main, main_frames
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 
 NAME = "blackbox"
@@ -46,12 +46,7 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where the header says what cannot be, or nothing in the log can be used, or a mapping is
             given.
     """
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for a Blackbox log: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "a Blackbox log", where=source.name)
     start, stop, number, note = _chosen(source, options.log)
     header = read_header(source.content, start, stop, where=source.name)
     found = find_frames(source.content, header, stop=stop, where=source.name)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from swashplate.errors import FlightError
 from swashplate.flights import growing
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 
 NAME = "growing"
@@ -23,10 +22,5 @@ def read(source: Source, options: Options) -> Flight:
     Raises:
         FlightError: where its head is damaged, or a mapping is given.
     """
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for a recording of swashplate: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "a recording of swashplate", where=source.name)
     return growing.parse(source.content, where=source.name)

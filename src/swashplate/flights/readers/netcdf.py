@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 
 NAME = "netcdf"
@@ -30,10 +30,5 @@ def read(source: Source, options: Options) -> Flight:
         raise FlightError(
             "is a classic netCDF file, not one that swashplate wrote.", where=source.name, hint="Export it as CSV."
         )
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for a swashplate netCDF file: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "a swashplate netCDF file", where=source.name)
     return Flight.load(source.path)

@@ -72,3 +72,11 @@ def with_mocap_table(options: Options) -> Options:
             channel=wrong[0],
         )
     return replace(options, **given)
+
+
+def refuse_mapping(options: Options, what: str, *, where: str) -> None:
+    """Raises a FlightError where a mapping is given for a file whose channels are known, such as "a ULog file"."""
+    if options.mapping:
+        raise FlightError(
+            f"a mapping has no meaning for {what}: its channels are known.", where=where, hint="Leave it out."
+        )

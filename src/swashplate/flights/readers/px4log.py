@@ -18,7 +18,7 @@ from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import ardupilot, checks, clocked, dataflash
 from swashplate.flights.readers.dataflash import Messages, MessageTable
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 
 NAME = "px4log"
@@ -69,12 +69,7 @@ def read(source: Source, options: Options) -> Flight:
     Raises:
         FlightError: where nothing in the log can be used, or a mapping is given.
     """
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for a PX4 log: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "a PX4 log", where=source.name)
     found = dataflash.messages(source.content)
     notes: list[str] = list(found.notes)
     clock = found.get("TIME") or MessageTable({}, np.zeros(0, np.int64))

@@ -23,7 +23,7 @@ from swashplate.extras import library
 from swashplate.flights.flight import Flight
 from swashplate.flights.provenance import Event
 from swashplate.flights.readers import checks, clocked
-from swashplate.flights.readers.options import Options
+from swashplate.flights.readers.options import Options, refuse_mapping
 from swashplate.flights.readers.source import Source
 from swashplate.flights.readers.ulog_messages import MAGIC, Whole, whole_messages
 from swashplate.flights.schema import QUATERNION
@@ -110,12 +110,7 @@ def read(source: Source, options: Options) -> Flight:
     Raises:
         FlightError: where pyulog is not installed, nothing in the log can be used, or a mapping is given.
     """
-    if options.mapping:
-        raise FlightError(
-            "a mapping has no meaning for a ULog file: its channels are known.",
-            where=source.name,
-            hint="Leave it out.",
-        )
+    refuse_mapping(options, "a ULog file", where=source.name)
     whole = whole_messages(source.content)
     log = _decoded(whole.content, source.name)
     notes: list[str] = []

@@ -56,7 +56,8 @@ def _shares(piece: Signals, n_in: int, n_out: int) -> list[tuple[float, float] |
         return np.concatenate([values[reach + k : last + k : step, n_in:] for k in shifts], axis=1)
 
     past = _explained(targets, shifted(range(-reach, 1, step)))
-    later = _explained(targets, shifted(range(step, reach + 1, step)))
+    # What follows is asked only where the past explains an input.
+    later = _explained(targets, shifted(range(step, reach + 1, step))) if np.any(past >= _ANSWER) else past
     still = np.ptp(targets, axis=0) == 0.0
     return [None if still[i] else (float(past[i]), float(later[i])) for i in range(n_in)]
 

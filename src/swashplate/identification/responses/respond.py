@@ -167,8 +167,9 @@ def respond(
         for name in response_warnings.still(flights, references)
     ]
     told = any(event.kind == "sweep" for flight in flights for event in flight.provenance.events)
-    if not question.references and not told and not any(map(sweeps, flights)):
-        problems += answer_words(pieces, inputs, outputs)
+    if not question.references and not told:
+        answers = answer_words(pieces, inputs, outputs)
+        problems += [] if answers and any(map(sweeps, flights)) else answers
     if question.references:
         # Both as the windows blur them, so that only the loop tells them apart.
         beside = _composed(matrices, omega, replace(question, references=0), [None] * len(matrices))

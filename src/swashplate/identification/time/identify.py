@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -46,18 +47,11 @@ _BEGIN = 1.0
 """The same for a search that another goes on from."""
 
 FlightLikelihood = PredictionError | OutputError
-LikelihoodOf = Callable[[Parameterization, Sequence[Record], Question], FlightLikelihood]
-Search = Callable[[FlightLikelihood, int, Progress | None], Optimum]
+L = TypeVar("L", bound=FlightLikelihood)
 
 
 def identify_flight(
-    vehicle: Vehicle,
-    flights: Sequence[Flight],
-    question: Question,
-    *,
-    method: str,
-    likelihood_of: LikelihoodOf,
-    search: Search,
+    vehicle: Vehicle, flights: Sequence[Flight], question: Question, *, by: FlightEstimator[L]
 ) -> Result[Vehicle, FlightDetails]:
     """Identify a helicopter whose pose was tracked.
 
@@ -65,14 +59,12 @@ def identify_flight(
         vehicle: the equations and the card to start from.
         flights: conditioned; each unbroken piece is a record with its own delays, trims and lever arm.
         question: what is asked.
-        method: its name.
-        likelihood_of: makes the likelihood of records.
-        search: finds its optimum.
+        by: the estimator.
 
     Raises:
         IdentificationError, FlightError: see `identify`.
     """
-    horizon = None if question.horizon is None else Horizon.of(question.horizon)
+    horizon = _horizon(question)
     free = "full" if question.free is None else question.free
     outputs = POSE if question.outputs is None else question.outputs
     flights = [monitored(flight, vehicle) for flight in flights]
@@ -93,29 +85,28 @@ def identify_flight(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
     )
     notes = [] if axes else [_UNJUDGED]
-    if method == "prediction-error" and not question.keep_unexcited:
+    if by.method == "prediction-error" and not question.keep_unexcited:
         table, held = hold_unexcited(table, axes)
         notes += held
-    likelihood = likelihood_of(table, pieces, question)
+    likelihood = by.likelihood_of(table, pieces, question)
     where = ", ".join(piece.name for piece in pieces)
     likelihood.refresh(likelihood.row.starts())
-    accuracy.refuse_unseen(likelihood.row, _quick(likelihood).scores(likelihood.row.starts())[2], where=where)
-    most = ITERATIONS if question.iterations is None else question.iterations
-    optimum = search(likelihood, most, question.progress)
-    found, row = _found(table, likelihood, optimum, horizon, most, question.progress)
-    optimum, parameters, problems = found.optimum, *estimates_of(found, vehicle)
-    problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(row), flights)]
-    if isinstance(likelihood, PredictionError):  # output error weighs residuals by their own size: nothing to compare
-        apart = unrelated(lambda others: _quick(likelihood_of(table, others, question)).cost(row), pieces)
+    accuracy.refuse_unseen(likelihood.row, likelihood.constant.scores(likelihood.row.starts())[2], where=where)
+    optimum = by.search(likelihood, _most(question), question.progress)
+    found, row = by.conclude(table, likelihood, optimum, question)
+    optimum = found.optimum
+    parameters, problems = estimates_of(found, vehicle)
+    noise = likelihood.noise_of(row)
+    problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
+    if noise is not None:  # else residuals are weighed by their own size: nothing to compare
+        apart = unrelated(lambda others: by.likelihood_of(table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters
         if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
     ]
-    identified = _identified(
-        found, likelihood.noise_of(row), likelihood.nuisance_of(row), vehicle, parameters, pieces, method
-    )
+    identified = _identified(found, noise, likelihood.nuisance_of(row), vehicle, parameters, pieces, by.method)
     told = constants(found)
     if vehicle.traits.balance is not None:
         trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
@@ -123,12 +114,12 @@ def identify_flight(
             vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
         )
     return Result(
-        method=method,
+        method=by.method,
         solution=identified,
         start=vehicle,
         estimates=parameters,
         constants=told,
-        noise=likelihood.noise_of(row),
+        noise=noise,
         nuisance=likelihood.nuisance_of(row),
         names=table.names,
         covariance=found.scaled(found.plain),
@@ -147,7 +138,7 @@ def identify_flight(
         fitted=Fitted(likelihood, optimum.row) if horizon is None else None,
         seconds=time.perf_counter() - started,
         settings={
-            "method": method,
+            "method": by.method,
             "choice": free if isinstance(free, str) else "given",
             "free": list(table.names),
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
@@ -165,13 +156,22 @@ def identify_flight(
 
 
 @dataclass(frozen=True)
-class FlightEstimator:
-    """An estimator of helicopters whose pose was tracked: a likelihood and a search."""
+class FlightEstimator(Generic[L]):
+    """An estimator of helicopters whose pose was tracked.
+
+    Attributes:
+        method: its name.
+        takes: names of the fields of a question that it answers.
+        likelihood_of: makes the likelihood of records.
+        search: finds its optimum, in so many iterations at most.
+        conclude: what the optimum says, and the likelihood's whole row there.
+    """
 
     method: str
     takes: frozenset[str]
-    likelihood_of: LikelihoodOf
-    search: Search
+    likelihood_of: Callable[[Parameterization, Sequence[Record], Question], L]
+    search: Callable[[L, int, Progress | None], Optimum]
+    conclude: Callable[[Parameterization, L, Optimum, Question], tuple[Found, Array]]
 
     def unsuited(self, model: Vehicle | StateSpaceModel, data: Data) -> str:
         if isinstance(data, FrequencyResponse):
@@ -183,9 +183,7 @@ class FlightEstimator:
         return f"it fits helicopters, and the vehicle lacks {', '.join(lacking)}" if lacking else ""
 
     def estimate(self, model: Vehicle, data: Sequence[Flight], question: Question) -> Result[Vehicle, FlightDetails]:
-        return identify_flight(
-            model, data, question, method=self.method, likelihood_of=self.likelihood_of, search=self.search
-        )
+        return identify_flight(model, data, question, by=self)
 
 
 def _prediction_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> PredictionError:
@@ -197,13 +195,8 @@ def _output_error(table: Parameterization, pieces: Sequence[Record], question: Q
     return OutputError(table, pieces)
 
 
-def _quick(likelihood: FlightLikelihood) -> FlightLikelihood:
-    """What a search may begin with: the same row with less work."""
-    return likelihood.constant if isinstance(likelihood, PredictionError) else likelihood
-
-
-def _scoring(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
-    quick = _quick(likelihood)
+def _scoring(likelihood: PredictionError, iterations: int, progress: Progress | None) -> Optimum:
+    quick = likelihood.constant
     if quick is likelihood:
         return minimise_over_valleys(likelihood, iterations=iterations, progress=progress)
     first = minimise_over_valleys(quick, iterations=iterations, tolerance=_BEGIN, progress=progress)
@@ -218,22 +211,55 @@ def _after(done: int, progress: Progress | None) -> Progress | None:
     return progress and (lambda iteration, cost: progress(done + iteration, cost))
 
 
-def _scoring_together(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
+def _scoring_together(likelihood: OutputError, iterations: int, progress: Progress | None) -> Optimum:
     return minimise_over_valleys(likelihood, iterations=iterations, together=True, progress=progress)
 
 
-def _simplex(likelihood: FlightLikelihood, iterations: int, progress: Progress | None) -> Optimum:
+def _simplex(likelihood: OutputError, iterations: int, progress: Progress | None) -> Optimum:
     del iterations
-    assert isinstance(likelihood, OutputError)
     return nelder_mead.minimise_squares(likelihood, progress=progress)
+
+
+def _horizon(question: Question) -> Horizon | None:
+    return None if question.horizon is None else Horizon.of(question.horizon)
+
+
+def _most(question: Question) -> int:
+    return ITERATIONS if question.iterations is None else question.iterations
+
+
+def _found(
+    table: Parameterization, likelihood: FlightLikelihood, optimum: Optimum, question: Question
+) -> tuple[Found, Array]:
+    """What the search says."""
+    del question
+    lags = round(LAGS / likelihood.model.dt)
+    return found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags), optimum.row
+
+
+def _found_ahead(
+    table: Parameterization, likelihood: PredictionError, optimum: Optimum, question: Question
+) -> tuple[Found, Array]:
+    """What the search says, or the search for small errors ahead that follows it."""
+    first, row = _found(table, likelihood, optimum, question)
+    horizon = _horizon(question)
+    if horizon is None:
+        return first, row
+    criterion = MultiStepErrors(
+        likelihood, row, likelihood.pieces, horizon=horizon, settling=SETTLING, known=first.corrected
+    )
+    ahead = minimise(criterion, start=criterion.start, iterations=_most(question), progress=question.progress)
+    ahead = replace(ahead, converged=ahead.converged and optimum.converged)
+    found = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
+    return replace(found, corrected=TWICE * found.corrected), criterion.whole(ahead.row)
 
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
 PREDICTION_ERROR = FlightEstimator(
-    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon"}, _prediction_error, _scoring
+    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon"}, _prediction_error, _scoring, _found_ahead
 )
-OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together)
-NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex)
+OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together, _found)
+NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex, _found)
 
 SHORTEST = 6.0
 """Seconds below which a piece is left out: the filter settles in a quarter of that."""
@@ -268,29 +294,6 @@ def hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> t
         )
         notes.append(f"{', '.join(at)} held: {judged[0].words}")
     return table, notes
-
-
-def _found(
-    table: Parameterization,
-    likelihood: FlightLikelihood,
-    optimum: Optimum,
-    horizon: Horizon | None,
-    iterations: int,
-    progress: Progress | None,
-) -> tuple[Found, Array]:
-    """What the search says, or the search for small errors ahead that follows it; and the likelihood's whole row."""
-    lags = round(LAGS / likelihood.model.dt)
-    first = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags)
-    if horizon is None:
-        return first, optimum.row
-    assert isinstance(likelihood, PredictionError)  # no other estimator takes a horizon
-    criterion = MultiStepErrors(
-        likelihood, optimum.row, likelihood.pieces, horizon=horizon, settling=SETTLING, known=first.corrected
-    )
-    ahead = minimise(criterion, start=criterion.start, iterations=iterations, progress=progress)
-    ahead = replace(ahead, converged=ahead.converged and optimum.converged)
-    found = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
-    return replace(found, corrected=TWICE * found.corrected), criterion.whole(ahead.row)
 
 
 def _identified(

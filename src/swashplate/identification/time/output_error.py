@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, commands, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
@@ -221,8 +222,14 @@ class OutputError:
             sensitivities.append(full)
         return white, sensitivities, np.zeros((p, p))
 
-    def noise_of(self, row: Array) -> None:
+    @property
+    def constant(self) -> OutputError:
+        """Itself: it has no gain."""
+        return self
+
+    def noise_of(self, row: Array) -> Noise | None:
         """It knows of no process noise."""
+        return None
 
     def nuisance_of(self, row: Array) -> Nuisance:
         """The records' mean nuisance at a row."""

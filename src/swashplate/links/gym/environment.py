@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any, Unpack, cast
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
-from swashplate.links.gym.flying import Flying, flying
+from swashplate.links.gym.flying import Flying, FlyingOptions, flying
 from swashplate.links.gym.tasks import Task, task_of
 from swashplate.models.vehicle import Vehicle
 
@@ -37,7 +36,7 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         task: "hover", "trajectory", "sweep" or a `Task`.
         task_options: for the task by name, e.g. {"duration": 5.0}.
         render_mode: "rgb_array" for pictures by `render` (needs matplotlib), or None.
-        rate, substeps, authority, spread, randomize, wind, inner, ground: as `flying` takes them.
+        options: of the flight, see `flying.FlyingOptions`.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 50}  # noqa: RUF012  (Gymnasium's own)
@@ -49,28 +48,10 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         *,
         task_options: dict[str, Any] | None = None,
         render_mode: str | None = None,
-        rate: float = 50.0,
-        substeps: int | None = None,
-        authority: float = 0.2,
-        spread: float = 1.0,
-        randomize: Mapping[str, float] | None = None,
-        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        inner: bool = False,
-        ground: bool = False,
+        **options: Unpack[FlyingOptions],
     ) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.flying = flying(
-            vehicle,
-            task_of(task, task_options or {}),
-            rate=rate,
-            substeps=substeps,
-            authority=authority,
-            spread=spread,
-            randomize=randomize,
-            wind=wind,
-            inner=inner,
-            ground=ground,
-        )
+        self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
         seen, moved = spaces(self.flying)
         self.observation_space, self.action_space = cast(Any, seen), cast(Any, moved)
         self._k = np.zeros(1, dtype=np.int64)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypedDict
 
 import jax
 import jax.numpy as jnp
@@ -158,6 +158,31 @@ class Flying:
         return np.array([self.trim.states()["phi"], self.trim.states()["theta"]])
 
 
+class FlyingOptions(TypedDict, total=False):
+    """How both environments fly; `flying` has the defaults.
+
+    Attributes:
+        rate: actions per second [Hz]; 50.
+        substeps: Runge-Kutta steps between actions; None for 5, or as many as skids on the ground need.
+        authority: share of an input's whole range that an action of 1 adds to its trim; 0.2.
+        spread: scale of `SPREAD`, 1; 0 starts every episode at the trim.
+        randomize: relative standard deviation by parameter name, drawn anew for each episode, cut at three.
+        wind: north, east and down [m/s].
+        inner: observe the states of rotors, bar and inflow too.
+        ground: there is ground at z = 0 (`standing`), and episodes start on it with the rotors stopped and the heading
+            spread; the task's place is `ABOVE` it. A throttle that a trim holds is then an action like the others.
+    """
+
+    rate: float
+    substeps: int | None
+    authority: float
+    spread: float
+    randomize: Mapping[str, float] | None
+    wind: tuple[float, float, float]
+    inner: bool
+    ground: bool
+
+
 def flying(
     vehicle: Vehicle | str,
     task: Task,
@@ -176,15 +201,7 @@ def flying(
     Args:
         vehicle: a vehicle, its name or a card's or model's file.
         task: see `tasks`.
-        rate: actions per second [Hz].
-        substeps: Runge-Kutta steps between actions; None for 5, or as many as skids on the ground need.
-        authority: share of an input's whole range that an action of 1 adds to its trim.
-        spread: scale of `SPREAD`; 0 starts every episode at the trim.
-        randomize: relative standard deviation by parameter name, drawn anew for each episode, cut at three.
-        wind: north, east and down [m/s].
-        inner: observe the states of rotors, bar and inflow too.
-        ground: there is ground at z = 0 (`standing`), and episodes start on it with the rotors stopped and the heading
-            spread; the task's place is `ABOVE` it. A throttle that a trim holds is then an action like the others.
+        rate, substeps, authority, spread, randomize, wind, inner, ground: see `FlyingOptions`.
 
     Raises:
         SwashError: for numbers that make no sense, a parameter that the vehicle does not have, or one without ground.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.errors import SwashError
 from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
 from swashplate.links.gym.environment import spaces
-from swashplate.links.gym.flying import flying
+from swashplate.links.gym.flying import FlyingOptions, flying
 from swashplate.links.gym.tasks import Task, task_of
 from swashplate.models.vehicle import Vehicle
 
@@ -41,30 +40,12 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
         *,
         task_options: dict[str, Any] | None = None,
         render_mode: str | None = None,
-        rate: float = 50.0,
-        substeps: int | None = None,
-        authority: float = 0.2,
-        spread: float = 1.0,
-        randomize: Mapping[str, float] | None = None,
-        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        inner: bool = False,
-        ground: bool = False,
+        **options: Unpack[FlyingOptions],
     ) -> None:
         if num_envs < 1:
             raise SwashError(f"is {num_envs}, expected at least 1.", channel="num_envs")
         self.num_envs, self.render_mode = num_envs, checked_mode(render_mode)
-        self.flying = flying(
-            vehicle,
-            task_of(task, task_options or {}),
-            rate=rate,
-            substeps=substeps,
-            authority=authority,
-            spread=spread,
-            randomize=randomize,
-            wind=wind,
-            inner=inner,
-            ground=ground,
-        )
+        self.flying = flying(vehicle, task_of(task, task_options or {}), **options)
         self.single_observation_space, self.single_action_space = spaces(self.flying)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
