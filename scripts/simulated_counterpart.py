@@ -19,8 +19,8 @@ from scipy.signal import lfilter
 import swashplate as sp
 from swashplate.models.vehicle import Vehicle
 
-LINE, SEEN = 34.4, {"phi": 1.4e-3, "theta": 1.4e-3, "z": 2e-4}
-"""The upper rotor's line [Hz] and its rms in what is measured [rad, m]."""
+SEEN = {"phi": (1.4e-3, 0.0), "theta": (1.4e-3, 0.5 * np.pi), "z": (2e-4, 1.0)}
+"""The upper rotor's line in what is measured: rms [rad, m] and phase [rad]; roll + i pitch turns as the rotor does."""
 FLOWN = "multisine:roll+pitch+yaw+heave,0.3-4Hz,18s,0.05"
 
 
@@ -30,10 +30,11 @@ def flight(aircraft: Vehicle, *, gusts: float, line: bool, seed: int) -> sp.Flig
     blown = {"wind_north": wind[0], "wind_east": wind[1]}
     flown = sp.simulate_maneuver(aircraft, FLOWN, controller=sp.hover_hold, lead=1, tail=1, wind=blown)
     seen = sp.observe(flown, aircraft, sensors=sp.QUIET, seed=seed).condition(rate=100.0, cutoff=0.0)
-    streams = dict(seen.streams)
-    for phase, (name, rms) in enumerate(SEEN.items() if line else ()):
+    streams, turning = dict(seen.streams), flown.time("omega_upper")
+    turned = np.cumsum(flown.values("omega_upper")) * float(np.median(np.diff(turning)))
+    for name, (rms, phase) in SEEN.items() if line else ():
         at = seen.stream_of(name)
-        wave = rms * np.sqrt(2.0) * np.sin(2.0 * np.pi * LINE * seen.time(name) + phase)
+        wave = rms * np.sqrt(2.0) * np.sin(np.interp(seen.time(name), turning, turned) + phase)
         streams[at] = streams[at].assign({name: streams[at][name] + wave})
     return replace(seen, streams=streams)
 

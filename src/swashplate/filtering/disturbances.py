@@ -25,6 +25,9 @@ class Noise(NamedTuple):
     `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
+    `line_hertz`: signed frequency of a rotor's line in what is measured, as `swash rotor-speed` tells it [Hz]; 0: none.
+    `line_angle`, `line_height`: its root mean square in roll and pitch [rad] and in height [m]; `line_time`: how long
+    its phase lasts [s].
     `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces.
     """
 
@@ -49,6 +52,10 @@ class Noise(NamedTuple):
     drift_yaw: Any = 0.0
     tau_gust_vertical: Any = 0.0
     drift_vertical: Any = 0.0
+    line_hertz: Any = 0.0
+    line_angle: Any = 1e-3
+    line_height: Any = 2e-4
+    line_time: Any = 0.3
 
 
 SEPARATE: Mapping[str, tuple[str, float, float]] = {

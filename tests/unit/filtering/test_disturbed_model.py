@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import DISTURBED, Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import POSE
 from swashplate.identification.time.start_states import steady_flight
@@ -120,7 +121,8 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
 
 def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
-    model, noise = stochastic_model(COAX, POSE, DT, windy=True), Noise(wind=0.4, tau_wind=0.5, speed=0.1)
+    noise = Noise(wind=0.4, tau_wind=0.5, speed=0.1)
+    model = stochastic_model(COAX, POSE, DT, noise=noise)
     x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
     A, C, Q, _ = jax.jit(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
     n = x.size
