@@ -28,7 +28,8 @@ class Noise(NamedTuple):
     `line_hertz`: signed frequency of a rotor's line in what is measured, as `swash rotor-speed` tells it [Hz]; 0: none.
     `line_angle`, `line_height`: its root mean square in roll and pitch [rad] and in height [m]; `line_time`: how long
     its phase lasts [s].
-    `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces.
+    `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces;
+    `sensor_heading` 0: that of all angles.
     """
 
     white_tilt: Any = 0.5
@@ -56,6 +57,7 @@ class Noise(NamedTuple):
     line_angle: Any = 1e-3
     line_height: Any = 2e-4
     line_time: Any = 0.3
+    sensor_heading: Any = 0.0
 
 
 SEPARATE: Mapping[str, tuple[str, float, float]] = {
@@ -63,6 +65,7 @@ SEPARATE: Mapping[str, tuple[str, float, float]] = {
     "drift_yaw": ("drift_moment", 0.3, 1.0),
     "tau_gust_vertical": ("tau_gust_force", 0.5, 0.5),
     "drift_vertical": ("drift_force", 0.03, 0.5),
+    "sensor_heading": ("sensor_angle", 1e-3, 2.0),
 }
 """Numbers that yaw and heave may have for themselves: what else stands for each, a first guess, and the standard
 deviation of its logarithm's prior."""

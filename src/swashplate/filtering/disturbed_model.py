@@ -278,6 +278,7 @@ class StochasticModel:
     def sensor_variances(self, noise: Noise, xp: Any = jnp) -> Any:
         """Variances of the measured channels."""
         sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
+        sigma["psi"] = xp.where(noise.sensor_heading > 0.0, noise.sensor_heading, noise.sensor_angle)
         return xp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
 
     @property

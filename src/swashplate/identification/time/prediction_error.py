@@ -93,6 +93,8 @@ def in_wind(pieces: Sequence[Record]) -> Noise:
 def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
     """First guesses of the noise with a rotor's line at a signed frequency [Hz].
 
+    The heading, which the line does not shake, then has a white noise of its own.
+
     Raises:
         IdentificationError: where the records' rate cannot show it.
     """
@@ -104,7 +106,7 @@ def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
             channel="rotor_line",
             hint="Take what `swash rotor-speed` says of the flight, and condition to a higher rate where it needs one.",
         )
-    return noise._replace(line_hertz=float(hertz))
+    return noise._replace(line_hertz=float(hertz), sensor_heading=SEPARATE["sensor_heading"][1])
 
 
 def _typical_speed(pieces: Sequence[Record]) -> float:
