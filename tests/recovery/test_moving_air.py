@@ -90,4 +90,3 @@ def test_the_sensors_noise_is_right_with_the_line_and_too_large_without() -> Non
         related.append(np.sum(errors[3:] * errors[:-3], axis=0) / np.sum(errors**2, axis=0))
     assert np.all(related[0][2:5] > 0.25)  # z, phi, theta
     assert np.all(np.abs(related[1][2:5]) < 0.1)
-    assert np.mean([off < 2.0 for off in _off(known).values()]) > 0.8

@@ -10,7 +10,7 @@ from swashplate.filtering.disturbances import Noise
 
 MOVING = 0.2
 """Root mean square [rad/s^2] of gusts in roll and pitch from which they may be moving air. A CoaX simulated in still
-air comes out at 0.003, in wind of 0.1 m/s at 1; its real flights indoors at 1.9."""
+air comes out at 0.003, in wind of 0.1 m/s at 0.7; its real flights indoors at 1.9."""
 
 
 @dataclass(frozen=True)
