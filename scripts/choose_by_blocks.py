@@ -1,6 +1,6 @@
 """Choice of what a fit frees and how far ahead it looks, by blocked cross-validation inside one flight: a table.
 
-    python scripts/choose_by_blocks.py august|july
+    python scripts/choose_by_blocks.py august|july [CHOICE ...]
 
 Each third of the flight's longest record is predicted by what the other two taught, with their delays, trims and noise;
 no other flight is looked at. Some minutes of processor time. The table is in docs/decisions/0099.
@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from real_flights import CHANNELS, FLIGHTS
@@ -19,15 +20,15 @@ import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.multi_step import Horizon, MultiStepErrors
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.scoring import minimise
+from swashplate.identification.estimators import Question
 from swashplate.identification.time.estimates import LAGS, found_at
 from swashplate.identification.time.feedback import excitation
 from swashplate.identification.time.flight_details import AxisExcitation
-from swashplate.identification.time.identify import hold_unexcited
+from swashplate.identification.time.identify import ITERATIONS, PREDICTION_ERROR, hold_unexcited
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.models.vehicle import Vehicle
@@ -35,12 +36,22 @@ from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.prediction import predict
 
-CHOICES: dict[str, tuple[tuple[float, float], ...]] = {
-    "full": (),
-    "balanced": ((0.25, 1.0), (0.25, 2.0)),
-    "asymmetric": ((0.25, 2.0),),
+
+class Choice(NamedTuple):
+    """What is freed, horizons after the likelihood, and what else the fit is asked."""
+
+    free: str
+    horizons: tuple[tuple[float, float], ...] = ()
+    asked: Question = Question()
+
+
+CHOICES: dict[str, Choice] = {
+    "full": Choice("full"),
+    "balanced": Choice("balanced", ((0.25, 1.0), (0.25, 2.0))),
+    "asymmetric": Choice("asymmetric", ((0.25, 2.0),)),
+    "wind": Choice("balanced", ((0.25, 1.0),), Question(wind=True)),
+    "line": Choice("balanced", ((0.25, 1.0),), Question(rotor_line=34.4)),
 }
-"""What is freed, and horizons after the likelihood."""
 HELD = ("full",)
 """Of these, what only an axis could tell that the flight does not move by itself is held, as by default."""
 BLOCKS, AHEAD, EVERY = 3, 1.0, 0.05
@@ -60,21 +71,21 @@ def block(record: Record, number: int) -> Record:
 
 def learnt(
     coax: Vehicle,
-    choice: str,
-    horizons: Sequence[tuple[float, float]],
+    choice: Choice,
     pieces: list[Record],
     axes: Sequence[AxisExcitation],
 ) -> Iterator[Learnt]:
     """What the likelihood finds in the pieces, and what each horizon makes of it."""
-    table = parameterize(coax, choice)
-    if choice in HELD:
+    table = parameterize(coax, choice.free)
+    if choice.free in HELD:
         table, _ = hold_unexcited(table, axes)
-    likelihood = PredictionError(table, pieces)
-    optimum = minimise_over_valleys(likelihood)
+    likelihood = PREDICTION_ERROR.likelihood_of(table, pieces, choice.asked)
+    assert isinstance(likelihood, PredictionError)
+    optimum = PREDICTION_ERROR.search(likelihood, ITERATIONS, None)
     rows = {"likelihood": optimum.row}
     lags = round(LAGS / likelihood.model.dt)
     known = found_at(table, likelihood, optimum, logs=likelihood.logs, lags=lags).corrected
-    for first, last in horizons:
+    for first, last in choice.horizons:
         for how, beside in (("alone", None), ("beside the likelihood", known)):
             criterion = MultiStepErrors(
                 likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
@@ -96,7 +107,7 @@ def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -
     return (found.states[counted, ahead - 1] - truth[first + ahead]) ** 2, (truth[first + ahead] - truth[first]) ** 2
 
 
-def main(flight: str) -> int:
+def main(flight: str, *names: str) -> int:
     enable_double_precision()
     enable_compilation_cache()
     coax = sp.vehicle("coax")
@@ -105,11 +116,11 @@ def main(flight: str) -> int:
     axes = excitation(coax, whole, measured_states(whole, Nuisance()))
     print(f"| in {flight.capitalize()} | criterion | {' | '.join(CHANNELS)} | mean of {', '.join(JUDGED)} |")
     print("|" + " --- |" * (3 + len(CHANNELS)))
-    for choice, horizons in CHOICES.items():
+    for choice in names or CHOICES:
         made: dict[str, list[tuple[Array, Array]]] = {}
         for left in range(BLOCKS):
             others = [block(whole, i) for i in range(BLOCKS) if i != left]
-            for name, *model in learnt(coax, choice, horizons, others, axes):
+            for name, *model in learnt(coax, CHOICES[choice], others, axes):
                 made.setdefault(name, []).append(errors(model[0], block(whole, left), *model[1:]))
         for name, parts in made.items():
             wrong, moved = (np.concatenate(part).mean(axis=0) for part in zip(*parts, strict=True))
@@ -120,4 +131,4 @@ def main(flight: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))

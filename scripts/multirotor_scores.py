@@ -23,7 +23,8 @@ from scipy.spatial.transform import Rotation
 
 import swashplate as sp
 from swashplate.arrays import Array
-from swashplate.filtering.disturbed_model import Nuisance, commands, stochastic_model
+from swashplate.filtering.arriving_commands import commands
+from swashplate.filtering.disturbed_model import Nuisance, stochastic_model
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states

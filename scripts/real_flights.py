@@ -55,7 +55,7 @@ def beside(validation: sp.Validation, channels: Sequence[str], horizon: float) -
 
 
 def missed(validation: sp.Validation) -> list[str]:
-    """Where a rival is at least as good although it should not be."""
+    """Where a rival is at least as good although it should not be, and how sure that is."""
     found = []
     for horizon, channels in WANTED.items():
         for name in channels:
@@ -63,7 +63,9 @@ def missed(validation: sp.Validation) -> list[str]:
             rivals = {p: validation.score(name, horizon, p).fit for p in PREDICTORS if p != "model"}
             best = max(rivals, key=lambda p: rivals[p])
             if own <= rivals[best]:
-                found.append(f"{name} at {horizon:g} s: {own:.1f} %, {best} {rivals[best]:.1f} %")
+                told = validation.floor(name, horizon)
+                sure = f"{told.lead:+.1f} points, 95 % from {told.lead_low:+.1f} to {told.lead_high:+.1f}"
+                found.append(f"{name} at {horizon:g} s: {own:.1f} %, {best} {rivals[best]:.1f} % ({sure})")
     return found
 
 

@@ -37,6 +37,10 @@ def test_every_identified_value_is_physical(fit: sp.Result) -> None:
     assert values["inertia_zz"] < values["inertia_xx"] + values["inertia_yy"]
 
 
+def test_it_says_that_the_air_may_have_moved(fit: sp.Result) -> None:
+    assert any(words.startswith("gusts of ") and "--wind" in words for words in fit.problems)
+
+
 def test_the_tracked_point_is_far_from_the_centre_of_gravity(fit: sp.Result) -> None:
     """0.17 m or more to the right, as the regression of the measured accelerations says independently."""
     levers = {e.name: e.value for e in fit.constants if e.name.startswith("lever")}

@@ -60,6 +60,22 @@ def identify(
     wind: Annotated[
         bool, typer.Option("--wind", help="Estimate a horizontal wind too: flights outdoors or in strong gusts.")
     ] = False,
+    rotor_line: Annotated[
+        float | None,
+        typer.Option(
+            "--rotor-line",
+            metavar="HERTZ",
+            help="Model a rotor's line in the measured pose, at the signed frequency that swash rotor-speed tells.",
+        ),
+    ] = None,
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--leave-out",
+            metavar="START,STOP",
+            help="Learn nothing from this stretch [s], e.g. where the aircraft was touched; repeatable.",
+        ),
+    ] = None,
     nested: Annotated[
         bool,
         typer.Option(
@@ -112,6 +128,8 @@ def identify(
                 ("--horizon", horizon is not None),
                 ("--posterior", posterior is not None),
                 ("--wind", wind),
+                ("--rotor-line", rotor_line is not None),
+                ("--leave-out", bool(leave_out)),
                 ("--keep-unexcited", keep_unexcited),
                 ("--close-loop", bool(close_loop)),
             )
@@ -143,6 +161,8 @@ def identify(
             prior_card=prior_card,
             keep_unexcited=keep_unexcited,
             wind=wind,
+            rotor_line=rotor_line,
+            leave_out=[(a, b) for a, b in (options.numbers(t, option="--leave-out", count=2) for t in leave_out or ())],
             horizon=options.seconds_ahead(horizon),
             close_loop=options.names(close_loop),
             posterior=posterior,

@@ -25,7 +25,11 @@ class Noise(NamedTuple):
     `white_*` [rad/s^2 or m/s^2 per sqrt(Hz)], `gust_*` and `drift_*` [rad/s^3 or m/s^3 per sqrt(Hz)], `wind`
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
-    `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces.
+    `line_hertz`: signed frequency of a rotor's line in what is measured, as `swash rotor-speed` tells it [Hz]; 0: none.
+    `line_angle`, `line_height`: its root mean square in roll and pitch [rad] and in height [m]; `line_time`: how long
+    its phase lasts [s].
+    `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces;
+    `sensor_heading` 0: that of all angles.
     """
 
     white_tilt: Any = 0.5
@@ -49,6 +53,11 @@ class Noise(NamedTuple):
     drift_yaw: Any = 0.0
     tau_gust_vertical: Any = 0.0
     drift_vertical: Any = 0.0
+    line_hertz: Any = 0.0
+    line_angle: Any = 1e-3
+    line_height: Any = 2e-4
+    line_time: Any = 0.3
+    sensor_heading: Any = 0.0
 
 
 SEPARATE: Mapping[str, tuple[str, float, float]] = {
@@ -56,6 +65,7 @@ SEPARATE: Mapping[str, tuple[str, float, float]] = {
     "drift_yaw": ("drift_moment", 0.3, 1.0),
     "tau_gust_vertical": ("tau_gust_force", 0.5, 0.5),
     "drift_vertical": ("drift_force", 0.03, 0.5),
+    "sensor_heading": ("sensor_angle", 1e-3, 2.0),
 }
 """Numbers that yaw and heave may have for themselves: what else stands for each, a first guess, and the standard
 deviation of its logarithm's prior."""

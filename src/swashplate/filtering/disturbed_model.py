@@ -3,7 +3,8 @@
 The vehicle's own states are joined by two disturbances on each of the six accelerations: a gust (Ornstein-Uhlenbeck,
 it fades) and a drift (random walk: trims, battery, servo zeros). Where asked, a horizontal wind (Ornstein-Uhlenbeck
 too) acts through the equations themselves: what moving air does to the rotors depends on the very parameters that are
-sought. All are held over a sample. The measurement update has a constant gain from the Riccati equation around hover,
+sought. All are held over a sample. A rotor that shakes what the cameras see may be among the sensors' noise: a line at
+its frequency, of wandering phase. The measurement update has a constant gain from the Riccati equation around hover,
 or around the mean flight of a helicopter that is faster (Jategaonkar 2015, sec. 5.4); horizontal position errors are
 turned into the heading first, so that the gain does not depend on where the nose points.
 """
@@ -40,12 +41,14 @@ N_DISTURBANCES = len(DISTURBED)
 
 
 class FilterGain(NamedTuple):
-    """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance."""
+    """Constant measurement update of states, gusts (the wind with them) and drifts, and the innovations' covariance;
+    and that of a rotor's line, where there is one."""
 
     state: Any
     gust: Any
     drift: Any
     covariance: Any
+    line: Any = ()
 
 
 Advance = Callable[[Any, Any, Any], Any]
@@ -53,11 +56,13 @@ Advance = Callable[[Any, Any, Any], Any]
 
 
 class FilterState(NamedTuple):
-    """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts."""
+    """Estimated vehicle states, gusts (six accelerations, and the wind to north and east where modelled) and drifts;
+    and where a rotor's line is modelled, its part of roll and pitch and of height, each with its quadrature."""
 
     x: Any
     gust: Any
     drift: Any
+    line: Any = ()
 
 
 @dataclass(frozen=True)
@@ -71,12 +76,14 @@ class StochasticModel:
         output_names: measured channels.
         dt: sample time [s].
         windy: a horizontal wind is among the disturbances.
+        lined: a rotor's line is among the sensors' noise.
     """
 
     equations: Equations
     output_names: tuple[str, ...]
     dt: float
     windy: bool = False
+    lined: bool = False
 
     @property
     def vehicle(self) -> Vehicle:
@@ -87,6 +94,11 @@ class StochasticModel:
     def n_gusts(self) -> int:
         """What fades: a gust on each disturbed acceleration, and perhaps the wind to north and east."""
         return N_DISTURBANCES + 2 * self.windy
+
+    @property
+    def n_line(self) -> int:
+        """A rotor's line: a pair that turns for roll and pitch, and one for height."""
+        return 2 * len(_LINE) * self.lined
 
     # ---- one sample --------------------------------------------------------------------------------------------
     def step(self, x: Any, gust: Any, u: Any, parameters: Any, voltage: Any) -> Any:
@@ -140,7 +152,7 @@ class StochasticModel:
     def linear(
         self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance
     ) -> tuple[Any, Any, Any, Any]:
-        """A, C, Q, R of the joined system (states, gusts, drifts) around an equilibrium with the nose north.
+        """A, C, Q, R of the joined system (states, gusts, drifts, line) around an equilibrium with the nose north.
 
         Wind acts through terms that grow with the square of the speed and have no slope at rest; with wind, slopes are
         averaged over a normal distribution of the horizontal air speed by four points (statistical linearisation,
@@ -171,13 +183,14 @@ class StochasticModel:
             noise: numbers, or rows of them along the axes in front.
             xp: `numpy` or `jax.numpy`.
         """
-        n, g, d = by_x.shape[-1], self.n_gusts, N_DISTURBANCES
+        n, g, d, k = by_x.shape[-1], self.n_gusts, N_DISTURBANCES, self.n_line
         by_x, held = held_series(by_x, self.dt, np.eye(n))  # as `step` makes it of a linear system
         by_gust = self.dt * held @ by_gust
         by_push = by_gust[..., :d]
-        fade = _diagonal(self.fade(noise, xp), xp)
-        A = _blocks([[by_x, by_gust, by_push], [None, fade, None], [None, None, np.eye(d)]], (n, g, d), xp)
-        C = xp.concatenate([by_state, xp.zeros((*by_state.shape[:-1], g + d))], axis=-1)
+        moves = xp.concatenate([by_gust, by_push, xp.zeros((*by_push.shape[:-1], k))], axis=-1)
+        A = _blocks([[by_x, moves], [None, self.lasting(noise, xp)]], (n, g + d + k), xp)
+        shaken = xp.broadcast_to(self.line_seen, (*by_state.shape[:-1], k))
+        C = xp.concatenate([by_state, xp.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
         return A, C, self.process_noise(by_push, noise, xp), _diagonal(self.sensor_variances(noise, xp), xp)
 
     def rates(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> Any:
@@ -196,7 +209,7 @@ class StochasticModel:
         return by_x, jnp.concatenate([pushed, by_wind], axis=1)
 
     def process_noise(self, by_push: Any, noise: Noise, xp: Any = jnp) -> Any:
-        """Covariance of what a sample adds to states, gusts and drifts.
+        """Covariance of what a sample adds to states, gusts, drifts and the line.
 
         Args:
             by_push: how an acceleration that is held over the sample moves the states (..., states, accelerations).
@@ -212,18 +225,50 @@ class StochasticModel:
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
         spread = (by_push * (white**2 / self.dt)[..., None, :]) @ xp.swapaxes(by_push, -1, -2) + self._floor(n)
         gusts, drifts = (_diagonal(row**2 * self.dt, xp) for row in (gust, drift))
-        return _blocks([[spread, None, None], [None, gusts, None], [None, None, drifts]], (n, g, d), xp)
+        rms = xp.stack([noise.line_angle, noise.line_angle, noise.line_height, noise.line_height], axis=-1)
+        line = _diagonal((1.0 - self._line_kept(noise, xp) ** 2)[..., None] * rms[..., : self.n_line] ** 2, xp)
+        rows = [[spread, None, None, None], [None, gusts, None, None], [None, None, drifts, None], [None] * 3 + [line]]
+        return _blocks(rows, (n, g, d, self.n_line), xp)
 
     def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
-        n, g = x.shape[0], self.n_gusts
         K, S = kalman_gain(*self.linear(x, u, parameters, voltage, noise, nuisance))
-        return FilterGain(K[:n], K[n : n + g], K[n + g :], S)
+        return self.gain_of(K, S)
+
+    def gain_of(self, K: Any, S: Any) -> FilterGain:
+        """The parts of a joined gain (..., joined, outputs)."""
+        n, d = len(self.vehicle.state_names), len(self.vehicle.state_names) + self.n_gusts
+        k = d + N_DISTURBANCES
+        line = K[..., k:, :] if self.lined else ()
+        return FilterGain(K[..., :n, :], K[..., n:d, :], K[..., d:k, :], S, line)
 
     def fade(self, noise: Noise, xp: Any = jnp) -> Any:
         """What is left of each gust after one sample."""
         taus = [*on_axes(*_shared_or_own(noise, "tau_gust", xp)), noise.tau_wind, noise.tau_wind]
         return xp.exp(-self.dt / xp.stack(taus[: self.n_gusts], axis=-1))
+
+    def lasting(self, noise: Noise, xp: Any = jnp) -> Any:
+        """How gusts, drifts and the line together go on for one sample (..., all three, all three)."""
+        fade, turn = _diagonal(self.fade(noise, xp), xp), self.line_turn(noise, xp)
+        rows = [[fade, None, None], [None, np.eye(N_DISTURBANCES), None], [None, None, turn]]
+        return _blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line), xp)
+
+    def line_turn(self, noise: Noise, xp: Any = jnp) -> Any:
+        """The line one sample later (..., n_line, n_line): pairs that turn by its frequency, and forget their phase."""
+        angle, quarter = 2.0 * np.pi * self.dt * noise.line_hertz, [[0.0, -1.0], [1.0, 0.0]]
+        along, across = (self._line_kept(noise, xp) * part for part in (xp.cos(angle), xp.sin(angle)))
+        over = np.kron(np.eye(self.n_line // 2), quarter)
+        return along[..., None, None] * np.eye(self.n_line) + across[..., None, None] * over
+
+    def _line_kept(self, noise: Noise, xp: Any) -> Any:
+        return xp.exp(-self.dt / xp.asarray(noise.line_time))
+
+    @property
+    def line_seen(self) -> Any:
+        """What the line adds to the measured channels (outputs, n_line): roll + i pitch turns, height swings."""
+        pairs = np.eye(2 * len(_LINE))
+        shaken = {"phi": pairs[0], "theta": pairs[1], "z": pairs[2]}
+        return np.stack([shaken.get(name, 0.0 * pairs[0]) for name in self.output_names])[:, : self.n_line]
 
     def _floor(self, n: int) -> Any:
         """A little noise on the states that no disturbance reaches: rotor speeds [rad/s] and angles [rad]."""
@@ -233,6 +278,7 @@ class StochasticModel:
     def sensor_variances(self, noise: Noise, xp: Any = jnp) -> Any:
         """Variances of the measured channels."""
         sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
+        sigma["psi"] = xp.where(noise.sensor_heading > 0.0, noise.sensor_heading, noise.sensor_angle)
         return xp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
 
     @property
@@ -242,10 +288,13 @@ class StochasticModel:
     def correct(self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance) -> tuple[FilterState, Any]:
         """The state after a measurement, and the innovation with its horizontal part in heading axes."""
         psi = state.x[self.vehicle.index("psi")]
-        innovation = _turn(y - self.measure(state.x, nuisance), self.output_names, -psi)
+        expected = self.measure(state.x, nuisance)
+        expected = expected + self.line_seen @ state.line if self.lined else expected
+        innovation = _turn(y - expected, self.output_names, -psi)
         x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
         x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
-        return FilterState(state.x + x, state.gust + gust, state.drift + drift), innovation
+        line = state.line + gain.line @ innovation if self.lined else ()
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line), innovation
 
     def acting(self, state: FilterState) -> Any:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
@@ -253,7 +302,8 @@ class StochasticModel:
 
     def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
         """The state one sample later."""
-        return FilterState(advance(state.x, self.acting(state), now), self.fade(noise) * state.gust, state.drift)
+        line = self.line_turn(noise) @ state.line if self.lined else ()
+        return FilterState(advance(state.x, self.acting(state), now), self.fade(noise) * state.gust, state.drift, line)
 
     def run(
         self,
@@ -311,6 +361,9 @@ def _shared_or_own(noise: Noise, kind: str, xp: Any = jnp) -> tuple[Any, Any, An
     return force, xp.where(down > 0.0, down, force), moment, xp.where(yaw > 0.0, yaw, moment)
 
 
+_LINE = ("roll and pitch", "height")
+"""What a rotor's line shakes, each by a pair of states."""
+
 _GUST_NAMES = (*DISTURBED, "x", "y")
 """The gusts, the wind by the axes that it blows along."""
 
@@ -329,37 +382,12 @@ def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
 
 
 def stochastic_model(
-    vehicle: Vehicle, output_names: tuple[str, ...], dt: float, *, windy: bool = False
+    vehicle: Vehicle, output_names: tuple[str, ...], dt: float, *, noise: Noise | None = None
 ) -> StochasticModel:
-    """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds."""
-    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9), windy)
+    """The stochastic model of a vehicle whose `output_names` are sampled every `dt` seconds.
 
-
-def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> Any:
-    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged (n, n_inputs).
-
-    A smooth curve through the samples; before the first and after the last sample the nearest one holds.
+    With a wind and a rotor's line where the noise has them; their numbers may change, not whether there are any.
     """
-    return commands_moved(vehicle, dt, inputs, nuisance, jnp)[0]
-
-
-def commands_moved(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, xp: Any) -> tuple[Any, Any]:
-    """`commands`, and their slopes by each input's delay [1/s], both (n, n_inputs); `xp` is `numpy` or `jax.numpy`."""
-    n = inputs.shape[0]
-    trims = xp.stack([xp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names])
-    delay = xp.where(xp.asarray(motors(vehicle)), nuisance.delay_motor, nuisance.delay_servo)
-    trimmed = inputs + trims
-    wanted = xp.arange(n)[:, None] - delay[None, :] / dt
-    place = xp.clip(wanted, 0.0, n - 1.0)
-    below = xp.clip(xp.floor(place), 0, n - 2).astype(int)
-    a, b, c, d = (xp.take_along_axis(trimmed, xp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
-    t = place - below
-    # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
-    first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
-    slope = 0.5 * (first + t * (2.0 * second + t * (3.0 * third)))
-    return b + 0.5 * t * (first + t * (second + t * third)), xp.where(wanted == place, -slope / dt, 0.0)
-
-
-def motors(vehicle: Vehicle) -> list[bool]:
-    """Which inputs are motors; the others come by way of servos, with a delay of their own."""
-    return [name.startswith("motor") for name in vehicle.input_names]
+    noise = noise or Noise()
+    windy, lined = float(noise.wind) > 0.0, float(noise.line_hertz) != 0.0
+    return StochasticModel(equations_of(vehicle), output_names, round(dt, 9), windy, lined)

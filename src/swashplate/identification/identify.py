@@ -31,6 +31,8 @@ def identify(
     iterations: int | None = None,
     keep_unexcited: bool = False,
     wind: bool = False,
+    rotor_line: float | None = None,
+    leave_out: Sequence[tuple[float, float]] = (),
     environment: Environment | None = None,
     shifts: bool | None = None,
     biases: Sequence[str] = (),
@@ -60,6 +62,10 @@ def identify(
         keep_unexcited: True also frees parameters of axes that the flights do not move independently.
         wind: True estimates a horizontal wind that acts through the equations (prediction error only): for flights
             outdoors or in strong gusts.
+        rotor_line: signed frequency [Hz] of a rotor's line in what is measured, as `rotor_speed` tells it: its
+            oscillation, of wandering phase, is then part of the sensors' noise (prediction error only).
+        leave_out: stamps (start, stop) [s] of stretches that the filter passes and nothing is learnt from, as where the
+            aircraft was touched (`Contact.intervals`; prediction error only).
         environment: wind, density and gravity, for equations of your own.
         shifts: constants in the states' rates, per record (None: for state-space models alone).
         biases: outputs with a constant of their own, per record.
@@ -94,6 +100,8 @@ def identify(
         iterations=iterations,
         keep_unexcited=keep_unexcited,
         wind=wind,
+        rotor_line=rotor_line,
+        leave_out=tuple((float(start), float(stop)) for start, stop in leave_out),
         environment=environment,
         shifts=shifts,
         biases=tuple(biases),

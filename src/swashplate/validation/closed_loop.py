@@ -20,8 +20,9 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.filtering.arriving_commands import motors
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, motors
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import FilterNumbers
 from swashplate.identification.time.kinematics import PREDICTED

@@ -42,7 +42,7 @@ class Floor:
         seen: fit [%] of the black box whether it was refused or not; past: without the inputs after the start, which
             cannot leak.
         refused: why there is no ceiling, in words; empty where there is one.
-        blocks: 4 s blocks that the starts span.
+        blocks: blocks that the starts span (`block_bootstrap.block_of`).
     """
 
     channel: str
@@ -177,7 +177,7 @@ def floors(
         )
         for r in range(len(times))
     ]
-    sums, draws = np.concatenate(stacked).sum(axis=0), block_bootstrap.drawn(times, stacked)
+    sums, draws = np.concatenate(stacked).sum(axis=0), block_bootstrap.drawn(times, stacked, horizon=horizon)
     count = sum(t.size for t in times)
     fits = {name: _fit(sums[2 * i], sums[2 * i + 1]) for i, name in enumerate(names)}
     drawn = {
@@ -226,7 +226,7 @@ def floors(
                 seen=float(of_boxes[best][c]) if best is not None else NAN,
                 past=max((float(fit[c]) for fit in of_past), default=NAN),
                 refused="" if told else _refused(ceilings, leaks, best),
-                blocks=block_bootstrap.blocks_of(times),
+                blocks=block_bootstrap.blocks_of(times, horizon),
             )
         )
     return tuple(made)

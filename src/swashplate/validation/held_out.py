@@ -86,7 +86,7 @@ def gains(narrow: PredictionErrors, wide: PredictionErrors) -> tuple[Gain, ...]:
         np.stack([*four], axis=-1) for four in zip(narrow.errors, narrow.moved, wide.errors, wide.moved, strict=True)
     ]
     points = _lead(sum(rows.sum(axis=0) for rows in stacked))
-    draws = block_bootstrap.drawn(narrow.times, stacked)
+    draws = block_bootstrap.drawn(narrow.times, stacked, horizon=AHEAD)
     made = []
     for k, channel in enumerate(CHANNELS):
         low, high = block_bootstrap.interval(None if draws is None else _lead(draws[:, k]))

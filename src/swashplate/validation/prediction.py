@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.arrays import Array
+from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, commands_moved, stochastic_model
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
@@ -75,7 +76,7 @@ def predict(
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
     are predicted again with their controller, as the seconds before tell it, in the place of their recorded command.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
+    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
     n, ahead = record.time.size, round(horizon / record.dt)
     starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
     inputs, voltage = (lengthened(rows, n + ahead) for rows in (record.inputs, record.voltage))
@@ -123,7 +124,7 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
 
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt, windy=float(noise.wind) > 0.0)
+    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
     rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
     A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
     predicted = steady_gain(A, C, Q, R)[2]

@@ -1,4 +1,4 @@
-"""The vehicle in disturbed air: its step, its sensors, its linearisation, its filter, and commands that come late."""
+"""The vehicle in disturbed air: its step, its sensors, its linearisation and its filter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from swashplate.filtering.disturbances import DISTURBED, Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import POSE
 from swashplate.identification.time.start_states import steady_flight
@@ -120,7 +120,8 @@ def test_the_joined_system_is_the_slope_of_one_sample() -> None:
 
 def test_wind_acts_through_the_equations_with_the_slope_of_the_speeds_flown() -> None:
     """Against central differences of the step with the wind in its surroundings, averaged over many drawn speeds."""
-    model, noise = stochastic_model(COAX, POSE, DT, windy=True), Noise(wind=0.4, tau_wind=0.5, speed=0.1)
+    noise = Noise(wind=0.4, tau_wind=0.5, speed=0.1)
+    model = stochastic_model(COAX, POSE, DT, noise=noise)
     x, u = steady_flight(COAX, COAX.values(), jnp.asarray(VOLTAGE))
     A, C, Q, _ = jax.jit(model.linear)(x, u, COAX.values(), jnp.asarray(VOLTAGE), noise, TILTED)
     n = x.size
@@ -216,47 +217,3 @@ def test_without_a_surprise_the_filter_is_the_simulation_and_a_steady_push_becom
     believed = np.asarray(states.gust + states.drift)[-1]
     assert believed[0] == pytest.approx(0.3, rel=0.2)
     assert np.abs(believed[[1, 2, 5]]).max() < 0.02  # a push sideways is not taken for one in yaw, east or height
-
-
-# ---- commands ------------------------------------------------------------------------------------------------------
-INPUTS = np.random.default_rng(5).standard_normal((40, 4))
-
-
-def _commands(nuisance: Nuisance, inputs: np.ndarray = INPUTS) -> np.ndarray:
-    return np.asarray(commands(COAX, DT, jnp.asarray(inputs), nuisance))
-
-
-def test_commands_on_time_are_the_logged_ones() -> None:
-    np.testing.assert_allclose(_commands(Nuisance()), INPUTS, atol=1e-14)
-
-
-def test_whole_samples_of_delay_shift_servos_and_motors_each_by_their_own() -> None:
-    late = _commands(Nuisance(delay_servo=3 * DT, delay_motor=5 * DT))
-    np.testing.assert_allclose(late[5:, :2], INPUTS[:-5, :2], atol=1e-12)
-    np.testing.assert_allclose(late[3:, 2:], INPUTS[:-3, 2:], atol=1e-12)
-    np.testing.assert_allclose(late[:5, :2], np.tile(INPUTS[0, :2], (5, 1)), atol=1e-12)  # before the log: its first
-
-
-def test_a_delay_between_samples_follows_a_smooth_command() -> None:
-    time = DT * np.arange(40)
-    smooth = np.sin(2 * np.pi * 3.0 * time)[:, None] * np.ones(4)
-    late = _commands(Nuisance(delay_servo=0.0234), smooth)
-    np.testing.assert_allclose(late[5:-3, 2], np.sin(2 * np.pi * 3.0 * (time - 0.0234))[5:-3], atol=2e-3)
-
-
-def test_the_cost_of_a_delay_has_no_kink() -> None:
-    """The slope of a late command by its delay is continuous across a whole sample."""
-
-    def late(delay: Any) -> Any:
-        return commands(COAX, DT, jnp.asarray(INPUTS), Nuisance(delay_servo=delay))[:, 2]
-
-    before, after = (np.asarray(jax.jacfwd(late)(2 * DT + side)) for side in (-1e-9, 1e-9))
-    np.testing.assert_allclose(before[3:], after[3:], atol=1e-3)
-    assert np.abs(before).max() > 100.0
-
-
-def test_trims_are_added_to_their_own_command() -> None:
-    names = COAX.input_names
-    for i, name in enumerate(names):
-        trimmed = _commands(Nuisance(**{f"trim_{name}": 0.03}))
-        np.testing.assert_allclose(trimmed - INPUTS, np.tile(0.03 * np.eye(4)[i], (40, 1)), atol=1e-15)

@@ -184,7 +184,7 @@ def test_the_interval_holds_the_truth_about_as_often_as_it_says() -> None:
     for seed in range(60):
         rng = np.random.default_rng(seed)
         error, moved = 0.5 * _correlated(rng, 400, 0.5), _correlated(rng, 400, 0.5)
-        draws = block_bootstrap.drawn(times, [np.stack([error, moved], axis=1) ** 2])
+        draws = block_bootstrap.drawn(times, [np.stack([error, moved], axis=1) ** 2], horizon=0.5)
         assert draws is not None
         low, high = block_bootstrap.interval(100.0 * (1.0 - np.sqrt(draws[:, 0] / draws[:, 1])))
         inside += low < 50.0 < high
@@ -198,19 +198,38 @@ def test_differences_are_judged_on_the_same_blocks() -> None:
     rng = np.random.default_rng(1)
     error = _correlated(rng, 400, 1.0) * (1.0 + np.arange(400) / 100.0)
     rows = np.stack([error, 1.1 * error], axis=1) ** 2
-    draws = block_bootstrap.drawn([np.arange(400) * 0.1], [rows])
+    draws = block_bootstrap.drawn([np.arange(400) * 0.1], [rows], horizon=0.5)
     assert draws is not None
     size = np.sqrt(draws)
     assert np.std(size[:, 1] - size[:, 0]) < 0.15 * np.std(size[:, 0])
-    again = block_bootstrap.drawn([np.arange(400) * 0.1], [rows])
+    again = block_bootstrap.drawn([np.arange(400) * 0.1], [rows], horizon=0.5)
     np.testing.assert_array_equal(draws, again)
+
+
+def test_a_short_flight_has_shorter_blocks_but_not_below_two_horizons() -> None:
+    """Three blocks of 4 s hold the truth in 72 % of the cases, six of 2 s in 85 % (300 seeds of this)."""
+    times = [np.arange(119) * 0.1]
+    assert block_bootstrap.block_of(times, 1.0) == pytest.approx(2.0)
+    assert block_bootstrap.block_of(times, 1.5) == pytest.approx(3.0)
+    assert block_bootstrap.block_of([np.arange(400) * 0.1], 1.0) == block_bootstrap.BLOCK
+    inside = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        error, moved = 0.5 * _correlated(rng, 119, 0.5), _correlated(rng, 119, 0.5)
+        draws = block_bootstrap.drawn(times, [np.stack([error, moved], axis=1) ** 2], horizon=1.0)
+        assert draws is not None
+        low, high = block_bootstrap.interval(100.0 * (1.0 - np.sqrt(draws[:, 0] / draws[:, 1])))
+        inside += low < 50.0 < high
+    assert inside >= 47  # 80 %; blocks of 4 s: 43
 
 
 def test_too_few_blocks_tell_no_scatter() -> None:
     rows = np.ones((100, 1))
-    assert block_bootstrap.drawn([np.arange(100) * 0.1], [rows]) is None
+    assert block_bootstrap.drawn([np.arange(100) * 0.1], [rows], horizon=2.0) is None
     assert np.isnan(block_bootstrap.interval(None)).all()
-    assert block_bootstrap.drawn([np.arange(100) * 0.1, np.arange(50) * 0.1], [rows, rows[:50]]) is not None
+    assert block_bootstrap.drawn([np.arange(100) * 0.1], [rows], horizon=1.0) is not None
+    both = [np.arange(100) * 0.1, np.arange(50) * 0.1]
+    assert block_bootstrap.drawn(both, [rows, rows[:50]], horizon=2.0) is not None
 
 
 def _beside(fit: float, reach: float) -> Floor:

@@ -125,7 +125,15 @@ class MultiStepErrors:
         dt = pieces[0].dt
         steps = horizon.samples(dt)
         first = round(settling / dt)
-        starts = tuple(tuple(range(first, piece.time.size - steps[-1], steps[0])) for piece in pieces)
+        starts = tuple(
+            tuple(
+                start
+                for counts in (piece.counts,)
+                for start in range(first, piece.time.size - steps[-1], steps[0])
+                if counts[start : start + steps[-1] + 1].all()
+            )
+            for piece in pieces
+        )
         self.horizon, self.ahead, self._base, self._found = horizon, Ahead(starts, steps), base, np.array(row)
         if not any(starts):
             longest = max(piece.time[-1] - piece.time[0] for piece in pieces)

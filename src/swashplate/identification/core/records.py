@@ -36,6 +36,7 @@ class Record:
         output_names: names of the measured channels.
         voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
         log: the flight it is a piece of; the pieces of one log share their delays, trims and lever arm.
+        left_out: stamps (start, stop) [s] that a filter passes and no criterion counts.
     """
 
     name: str
@@ -46,10 +47,19 @@ class Record:
     output_names: tuple[str, ...]
     voltage_known: bool
     log: str = ""
+    left_out: tuple[tuple[float, float], ...] = ()
 
     @property
     def dt(self) -> float:
         return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
+
+    @property
+    def counts(self) -> NDArray[np.bool_]:
+        """Samples (n,) that are not left out."""
+        counted = np.ones(self.time.size, dtype=bool)
+        for first, last in self.left_out:
+            counted &= (self.time < first) | (self.time > last)
+        return counted
 
 
 def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Sequence[str] = POSE) -> list[Record]:

@@ -106,7 +106,7 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
     """The gain and the start of a run."""
     rows = FilterNumbers(*(np.asarray(row)[None] for row in numbers))
     K, S, _ = steady_gain(*(part[0] for part in joined_at(model, rows, seen)))
-    return Begun(_split(model, K, S), _starts(model, rows, seen)[0])
+    return Begun(model.gain_of(K, S), _starts(model, rows, seen)[0])
 
 
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
@@ -126,7 +126,7 @@ def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotio
     here = A, C, Q, R = tuple(part[0] for part in matrices)
     P = steady_gain(A, C, Q, R)[2]
     dK, dS = steady_gain_moved(here, P, tuple(map(moved, matrices)))  # type: ignore[arg-type]
-    return Begun(_split(model, dK, dS), moved(_starts(model, rows, seen)))
+    return Begun(model.gain_of(dK, dS), moved(_starts(model, rows, seen)))
 
 
 def traced_begin(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> Begun:
@@ -162,11 +162,6 @@ def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) ->
     taken = [_slopes(model, place, u, rows.parameters[own], mean) for place in places]
     by_x, by_gust = (np.mean(parts, axis=0)[which] for parts in zip(*taken, strict=True))
     return model.joined(by_x, by_gust, _measured_slopes(model, x[which], nuisance), noise, np)
-
-
-def _split(model: StochasticModel, K: Array, S: Array) -> FilterGain:
-    n, g = len(model.vehicle.state_names), model.n_gusts
-    return FilterGain(K[..., :n, :], K[..., n : n + g, :], K[..., n + g :, :], S)
 
 
 def _numbers(vehicle: Vehicle, parameters: Array) -> Array:

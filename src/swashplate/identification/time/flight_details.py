@@ -1,9 +1,16 @@
-"""What only an identification from flights under a controller has: whether each axis was moved independently."""
+"""What only an identification from flights has: whether each axis was moved by itself, and whether the air moved."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
+
+from swashplate.filtering.disturbances import Noise
+
+MOVING = 0.2
+"""Root mean square [rad/s^2] of gusts in roll and pitch from which they may be moving air. A CoaX simulated in still
+air comes out at 0.003, in wind of 0.1 m/s at 0.7; its real flights indoors at 1.9."""
 
 
 @dataclass(frozen=True)
@@ -46,3 +53,15 @@ class FlightDetails:
 
     kind: ClassVar[str] = "flight"
     excitation: tuple[AxisExcitation, ...] = ()
+
+
+def moving_air(noise: Noise) -> str:
+    """What a fit without a wind is to say of the gusts that it found; "" where there are none."""
+    rms = float(noise.gust_tilt) * math.sqrt(0.5 * float(noise.tau_gust_moment))
+    if float(noise.wind) > 0.0 or not rms > MOVING:
+        return ""
+    return (
+        f"gusts of {rms:.2g} rad/s^2 (rms) in roll and pitch that fade in {float(noise.tau_gust_moment):.2g} s. If the "
+        "air moved, outdoors or in the rotors' own wake in a room, it acted through the rotors: without --wind "
+        "(wind=True) the bounds of terms of speed, rotor lags and linkages are then too narrow. Fit again with it."
+    )

@@ -216,10 +216,12 @@ def _corrected(
     numbers: FilterNumbers,
 ) -> tuple[FilterState, Any, Any, Any]:
     """State and covariance after a reading, the innovation and its covariance."""
-    n, g = state.x.shape[0], model.n_gusts
+    n, d, k = np.cumsum([state.x.shape[0], model.n_gusts, N_DISTURBANCES])
     noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
-    nu = y - model.measure(state.x, nuisance)
-    C = jnp.pad(jax.jacfwd(lambda x: model.measure(x, nuisance))(state.x), ((0, 0), (0, P.shape[0] - n)))
+    expected = model.measure(state.x, nuisance)
+    nu = y - (expected + model.line_seen @ state.line if model.lined else expected)
+    by_state = jax.jacfwd(lambda x: model.measure(x, nuisance))(state.x)
+    C = jnp.concatenate([by_state, np.zeros((len(y), k - n)), model.line_seen], axis=1)
     R = jnp.diag(model.sensor_variances(noise))
     seen = C @ P
     S = seen @ C.T + R
@@ -230,7 +232,8 @@ def _corrected(
         left = left[1:, 1:] - row[1 : len(y) - i, None] * row[1:]
     told = jnp.stack(rows)
     move = told[:, :-1].T @ told[:, -1]
-    corrected = FilterState(state.x + move[:n], state.gust + move[n : n + g], state.drift + move[n + g :])
+    line = state.line + move[k:] if model.lined else ()
+    corrected = FilterState(state.x + move[:n], state.gust + move[n:d], state.drift + move[d:k], line)
     return corrected, P - told[:, :-1].T @ told[:, :-1], nu, S
 
 
@@ -260,15 +263,16 @@ def _predicted(
     by_x, by_gust = (jnp.mean(part, axis=0) for part in slopes)
     by_x, held = held_series(by_x, model.dt, jnp.eye(n))
     by_gust = model.dt * held @ by_gust
-    fade = model.fade(noise)
     every = jnp.concatenate([places, state.x[None]])
     rates = jax.vmap(lambda x: model.rates(x, acting, u=u, parameters=parameters, voltage=volts))(every)
     apart = jnp.mean(rates[:-1], axis=0) - rates[-1]  # what the spread of the air speed does on average
     after = model.step(state.x, acting, u, parameters, volts) + model.dt * apart
-    # Disturbances only fade: F is full in the states' rows alone.
-    rows, kept = jnp.concatenate([by_x, by_gust, by_gust[:, :d]], axis=1), jnp.concatenate([fade, jnp.ones(d)])
+    # Disturbances and the line go on by themselves: F is full in the states' rows alone.
+    rows = jnp.concatenate([by_x, by_gust, by_gust[:, :d], np.zeros((n, model.n_line))], axis=1)
+    kept = model.lasting(noise)
     led = rows @ P
-    across = led[:, n:] * kept
-    moved = jnp.block([[led @ rows.T, across], [across.T, kept[:, None] * P[n:, n:] * kept]])
+    across = led[:, n:] @ kept.T
+    moved = jnp.block([[led @ rows.T, across], [across.T, kept @ P[n:, n:] @ kept.T]])
     moved = moved + model.process_noise(by_gust[:, :d], noise)
-    return FilterState(after, fade * state.gust, state.drift), 0.5 * (moved + moved.T)
+    line = model.line_turn(noise) @ state.line if model.lined else ()
+    return FilterState(after, model.fade(noise) * state.gust, state.drift, line), 0.5 * (moved + moved.T)

@@ -26,11 +26,11 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.identification.time import feedback, nelder_mead
 from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
-from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails
+from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind
+from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind, with_line
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -81,6 +81,7 @@ def identify_flight(
         prior_card=question.prior_card,
     )
     pieces = _long_enough(records(flights, vehicle, outputs=outputs))
+    pieces = _without(pieces, question.leave_out) if question.leave_out else pieces
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
     )
@@ -101,6 +102,8 @@ def identify_flight(
     if noise is not None:  # else residuals are weighed by their own size: nothing to compare
         apart = unrelated(lambda others: by.likelihood_of(table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
+        air = moving_air(noise)
+        notes += [air] if air else []
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters
@@ -148,6 +151,8 @@ def identify_flight(
             **told_horizon(horizon),
             "outputs": list(outputs),
             "wind": question.wind,
+            **({} if question.rotor_line is None else {"rotor line": question.rotor_line}),
+            **({"left out": [list(part) for part in question.leave_out]} if question.leave_out else {}),
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
             "voltage": "logged" if all(piece.voltage_known for piece in pieces) else "not logged: card's nominal",
@@ -187,7 +192,9 @@ class FlightEstimator(Generic[L]):
 
 
 def _prediction_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> PredictionError:
-    return FollowingError(table, pieces, noise=in_wind(pieces)) if question.wind else PredictionError(table, pieces)
+    noise = in_wind(pieces) if question.wind else Noise()
+    noise = noise if question.rotor_line is None else with_line(noise, question.rotor_line, pieces)
+    return FollowingError(table, pieces, noise=noise) if question.wind else PredictionError(table, pieces, noise=noise)
 
 
 def _output_error(table: Parameterization, pieces: Sequence[Record], question: Question) -> OutputError:
@@ -256,7 +263,11 @@ def _found_ahead(
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
 PREDICTION_ERROR = FlightEstimator(
-    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon"}, _prediction_error, _scoring, _found_ahead
+    "prediction-error",
+    _TAKES | {"keep_unexcited", "wind", "rotor_line", "leave_out", "horizon"},
+    _prediction_error,
+    _scoring,
+    _found_ahead,
 )
 OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together, _found)
 NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex, _found)
@@ -275,6 +286,24 @@ def _long_enough(pieces: list[Record]) -> list[Record]:
             hint="Bridge longer gaps with a larger max_gap, or fly longer.",
         )
     return kept
+
+
+def _without(pieces: list[Record], left_out: Sequence[tuple[float, float]]) -> list[Record]:
+    """The pieces with the stretches that lie in them left out."""
+    for first, last in left_out:
+        if not any(first < last and first < piece.time[-1] and last > piece.time[0] for piece in pieces):
+            raise IdentificationError(
+                f"{first:g} to {last:g} s lies in none of the records ({', '.join(piece.name for piece in pieces)}).",
+                channel="leave_out",
+                hint="Give the start and the stop [s] on the flight's own clock.",
+            )
+    pieces = [replace(piece, left_out=tuple(left_out)) for piece in pieces]
+    kept = max(float(piece.counts.sum()) * piece.dt for piece in pieces)
+    if kept < SHORTEST:
+        raise IdentificationError(
+            f"leaves {kept:.1f} s of the longest record, expected at least {SHORTEST:g} s.", channel="leave_out"
+        )
+    return pieces
 
 
 _UNJUDGED = "the model names no axes: whether the flights move each by itself was not judged"

@@ -15,8 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.filtering.arriving_commands import commands, commands_moved, motors
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, StochasticModel, commands, commands_moved, motors
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.core.robust import losses

@@ -13,8 +13,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import FilterState, commands
+from swashplate.filtering.disturbed_model import FilterState
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.time.beginning import FirstMotion
 from swashplate.identification.time.innovations import FilterPlan, traced_run, unpack

@@ -19,8 +19,9 @@ from jaxtyping import Float, Int
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
+from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, commands, stochastic_model
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison

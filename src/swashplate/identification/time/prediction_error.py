@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import SEPARATE, Noise
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
@@ -44,8 +45,9 @@ _NOISE_SPREAD = {
 """Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
 
 _WIND = ("wind", "tau_wind")
+_LINE = ("line_angle", "line_height", "line_time")
 
-_ADDED = ("white", "gust", "wind", "sensor")
+_ADDED = ("white", "gust", "wind", "sensor", "line_angle", "line_height")
 """How the noise numbers begin whose squares add to the innovations' variance; drifts and times act by ratios."""
 
 _NUISANCE = {
@@ -92,6 +94,25 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
 def in_wind(pieces: Sequence[Record]) -> Noise:
     """First guesses of the noise for flights in horizontal wind, with the speed that the records were flown at."""
     return Noise(wind=0.1, speed=_typical_speed(pieces))
+
+
+def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
+    """First guesses of the noise with a rotor's line at a signed frequency [Hz].
+
+    The heading, which the line does not shake, then has a white noise of its own.
+
+    Raises:
+        IdentificationError: where the records' rate cannot show it.
+    """
+    half = 0.5 / pieces[0].dt
+    if not 0.0 < abs(hertz) < half:
+        raise IdentificationError(
+            f"a line at {hertz:g} Hz, expected between 0 and {half:g} Hz, half the sample rate.",
+            where=pieces[0].name,
+            channel="rotor_line",
+            hint="Take what `swash rotor-speed` says of the flight, and condition to a higher rate where it needs one.",
+        )
+    return noise._replace(line_hertz=float(hertz), sensor_heading=SEPARATE["sensor_heading"][1])
 
 
 def _typical_speed(pieces: Sequence[Record]) -> float:
@@ -141,9 +162,8 @@ class PredictionError:
         self.table = table
         self.pieces = tuple(pieces)
         self.noise = _with_first_guesses(noise or Noise(), table.noises)
-        windy = float(self.noise.wind) > 0.0
         self.estimate_noise = estimate_noise
-        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, windy=windy)
+        self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, noise=self.noise)
         self.logs, self._log = logs(pieces)
         entries = parameter_entries(table)
         nuisances = {**_NUISANCE, **{free.name: _of_record(free) for free in table.of_records}}
@@ -179,7 +199,7 @@ class PredictionError:
         self._kept: dict[bytes, list[Filtered]] = {}
         self._last: tuple[bytes, _Accumulated] | None = None
         settled = round(SETTLING / self.model.dt)
-        self.counted = tuple(np.arange(piece.time.size) >= settled for piece in pieces)
+        self.counted = tuple(piece.counts & (np.arange(piece.time.size) >= settled) for piece in pieces)
 
     def widened(self, added: Sequence[str]) -> PredictionError:
         """The same likelihood with more of the vehicle's numbers free, under a constant gain."""
@@ -277,21 +297,21 @@ class PredictionError:
         moved: list[tuple[Array, Array]] = []
         gradient, information = np.zeros(p), np.zeros((p, p))
         for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
-            first, S = int(np.argmax(counted)), np.asarray(run.begin.gain.covariance)
-            nu = run.innovations[first:]
+            S = np.asarray(run.begin.gain.covariance)
+            nu = run.innovations[counted]
             if not np.isfinite(nu).all():
                 return gradient, information, runs, moved
             d_nu, dS = self._moved(mine, run, row)
             Li = np.linalg.inv(np.linalg.cholesky(S))
             white = nu @ Li.T
             weight = robust.weights(white)
-            d_white = (d_nu[:, first:].reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
+            d_white = (d_nu[:, counted].reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             dM = Li @ dS @ Li.T
             gradient += d_white.reshape(p, -1) @ (white * weight).ravel()
             gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
             # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
             gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
-            told = (self._foreseen(d_nu[:, first:], nu, mine.log).reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
+            told = (self._foreseen(d_nu[:, counted], nu, mine.log).reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             moved.append((told, dM))
             weighted = told.reshape(p, -1) * np.sqrt(weight).ravel()
             information += weighted @ weighted.T
@@ -385,8 +405,9 @@ def _by_covariance(dM: Array, n: int) -> Array:
 
 
 def _estimated(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
-    """The noise numbers that are estimated: the speed is given, the wind's and the separate ones only where wanted."""
-    left = {"speed", *(() if model.windy else _WIND), *(name for name in SEPARATE if not getattr(guess, name) > 0.0)}
+    """The noise numbers that are estimated: speed and a line's frequency are given, others only where wanted."""
+    left = {"speed", "line_hertz", *(() if model.windy else _WIND), *(() if model.lined else _LINE)}
+    left |= {name for name in SEPARATE if not getattr(guess, name) > 0.0}
     return tuple(name for name in Noise._fields if name not in left)
 
 

@@ -286,7 +286,8 @@ def whole(parts: Any, n: int) -> Any:
 def first_state(model: StochasticModel, x: Any) -> FilterState:
     """State rows with nothing known of the air yet."""
     front = x.shape[:-1]
-    return FilterState(x, np.zeros((*front, model.n_gusts)), np.zeros((*front, N_DISTURBANCES)))
+    line = np.zeros((*front, model.n_line)) if model.lined else ()
+    return FilterState(x, np.zeros((*front, model.n_gusts)), np.zeros((*front, N_DISTURBANCES)), line)
 
 
 def _acting(model: StochasticModel, states: FilterState) -> Array:

@@ -123,3 +123,20 @@ def test_an_unknown_method_and_a_short_flight_are_refused() -> None:
         sp.identify(coax, _flight(), method="magic")
     with pytest.raises(IdentificationError, match=r"longest unbroken piece has 5\.0 s, expected at least"):
         sp.identify(coax, _flight().between(0.0, 5.0), free=FREE)
+
+
+def test_a_stretch_that_is_nowhere_and_one_that_leaves_nothing_are_refused() -> None:
+    coax = sp.vehicle("coax")
+    for out in ((50.0, 60.0), (3.0, 2.0)):
+        with pytest.raises(IdentificationError, match=r"lies in none of the records \(simulated coax"):
+            sp.identify(coax, _flight(), free=FREE, leave_out=[out])
+    with pytest.raises(IdentificationError, match=r"leaves [0-4]\.\d s of the longest record, expected at least 6 s"):
+        sp.identify(coax, _flight(), free=FREE, leave_out=[(1.0, 7.0)])
+    with pytest.raises(IdentificationError, match="'output-error' does not know it"):
+        sp.identify(coax, _flight(), free=FREE, method="output-error", leave_out=[(1.0, 2.0)])
+
+
+def test_a_line_that_the_rate_cannot_show_is_refused() -> None:
+    for hertz in (0.0, 60.0, float("nan")):
+        with pytest.raises(IdentificationError, match="expected between 0 and 50 Hz, half the sample rate"):
+            sp.identify(sp.vehicle("coax"), _flight(), free=FREE, rotor_line=hertz)

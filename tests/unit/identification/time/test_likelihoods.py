@@ -5,6 +5,7 @@ The flight is the one of the end-to-end test: the same shapes, so that output er
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import jax
@@ -15,7 +16,8 @@ import pytest
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
 from swashplate.errors import IdentificationError
-from swashplate.filtering.disturbed_model import FilterGain, FilterState, commands, commands_moved
+from swashplate.filtering.arriving_commands import commands, commands_moved
+from swashplate.filtering.disturbed_model import FilterGain, FilterState
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import parameterize
@@ -290,3 +292,18 @@ def test_innovations_turn_back_into_the_room() -> None:
     np.testing.assert_allclose(
         likelihood.unturned(ahead, east), np.tile([0.0, 1.0, 0.3, 0.1, 0.2, 0.3], (record.time.size, 1)), atol=1e-15
     )
+
+
+def test_what_is_left_out_passes_the_filter_and_counts_for_nothing() -> None:
+    """The same run; cost, information and whitened innovations are those of the samples that are left."""
+    whole = _prediction_error()
+    row, piece = _somewhere(whole), whole.pieces[0]
+    first, last = piece.time[0] + 2.0, piece.time[0] + 3.0
+    parts = [
+        PredictionError(whole.table, [replace(piece, left_out=out)])
+        for out in (((first, last),), ((-1.0, first - 0.005), (last + 0.005, 99.0)))
+    ]
+    for told, halves in zip(whole.scores(row), zip(*(part.scores(row) for part in parts), strict=True), strict=True):
+        np.testing.assert_allclose(sum(halves), told, rtol=1e-9, atol=1e-6 * np.abs(told).max())
+    white = parts[0].whitened(row)[0][0]
+    assert len(white) == len(whole.whitened(row)[0][0]) - int(np.sum((piece.time >= first) & (piece.time <= last)))

@@ -1,0 +1,40 @@
+"""Logged commands as they reach the vehicle: later, and trimmed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.models.vehicle import Vehicle
+
+
+def commands(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance) -> Any:
+    """What reaches the vehicle at each sample, to be held there: trimmed, and later than logged (n, n_inputs).
+
+    A smooth curve through the samples; before the first and after the last sample the nearest one holds.
+    """
+    return commands_moved(vehicle, dt, inputs, nuisance, jnp)[0]
+
+
+def commands_moved(vehicle: Vehicle, dt: float, inputs: Any, nuisance: Nuisance, xp: Any) -> tuple[Any, Any]:
+    """`commands`, and their slopes by each input's delay [1/s], both (n, n_inputs); `xp` is `numpy` or `jax.numpy`."""
+    n = inputs.shape[0]
+    trims = xp.stack([xp.asarray(getattr(nuisance, f"trim_{name}", 0.0), dtype=float) for name in vehicle.input_names])
+    delay = xp.where(xp.asarray(motors(vehicle)), nuisance.delay_motor, nuisance.delay_servo)
+    trimmed = inputs + trims
+    wanted = xp.arange(n)[:, None] - delay[None, :] / dt
+    place = xp.clip(wanted, 0.0, n - 1.0)
+    below = xp.clip(xp.floor(place), 0, n - 2).astype(int)
+    a, b, c, d = (xp.take_along_axis(trimmed, xp.clip(below + k, 0, n - 1), axis=0) for k in (-1, 0, 1, 2))
+    t = place - below
+    # Catmull and Rom (1974): smooth in the delay, where straight lines would give the cost a kink at every sample.
+    first, second, third = c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a
+    slope = 0.5 * (first + t * (2.0 * second + t * (3.0 * third)))
+    return b + 0.5 * t * (first + t * (second + t * third)), xp.where(wanted == place, -slope / dt, 0.0)
+
+
+def motors(vehicle: Vehicle) -> list[bool]:
+    """Which inputs are motors; the others come by way of servos, with a delay of their own."""
+    return [name.startswith("motor") for name in vehicle.input_names]
