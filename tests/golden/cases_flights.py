@@ -163,8 +163,9 @@ def unstable_aircraft(folder: Path) -> Values:
         one = extract.of_time_fit(fit_in_time(model, flight, shifts=False, method=method))
         found |= {f"{method}.{name}": value for name, value in one.items()}
     banded = fit_in_frequency(model, flight, band=(0.05, 2.0))
-    for p in banded.parameters:
-        found |= apart(f"frequency.{p.name}", (p.value, p.cramer_rao))
+    for e in banded.estimates:
+        if not e.fixed:
+            found |= apart(f"frequency.{e.name}", (e.value, e.sigma))
     errors = equation_error(az, np.column_stack([w, q, elevator]), ["w", "q", "de"], dt=0.05, band=(0.05, 2.0))
     found |= apart("equation.values", (errors[n] for n in ("w", "q", "de")))
     return found | apart("equation.sigmas", errors.sigmas)
