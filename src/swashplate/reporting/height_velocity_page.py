@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from swashplate.arrays import Array
@@ -32,9 +30,9 @@ def compose_height_velocity(found: HeightVelocity, *, title: str | None = None) 
 
 
 def hover_words(found: HeightVelocity) -> str:
-    """Both hover heights in words."""
-    high = f"and from {found.high_hover:.3g} m" if math.isfinite(found.high_hover) else "and from no height shown here"
-    return f"an engine failure can be landed up to {found.low_hover:.3g} m {high}"
+    """The heights that a hover avoids, in words."""
+    spans = ", ".join(f"{low:.2g} to {high:.3g} m" for low, high in found.hover_to_avoid)
+    return f"an engine failure cannot be landed from {spans}" if spans else "an engine failure can always be landed"
 
 
 def section_of_height_velocity(found: HeightVelocity) -> Section:
@@ -62,10 +60,12 @@ def _diagram(found: HeightVelocity) -> Figure:
         y += [low, low, high, high, low, None]
     avoid = line(x, y, name="avoid", color=VERMILION, width=0.0)
     traces = [avoid | {"fill": "toself", "fillcolor": _AVOID, "hoverinfo": "skip", "hovertemplate": None}]
-    for height, words in ((found.low_hover, "low hover"), (found.high_hover, "high hover")):
-        if math.isfinite(height) and height > 0.0:
-            told = f"{words}: {height:.3g} m"
-            traces.append(line([v[0], v[-1]], [height] * 2, name=words, color=GREY, dash="dash", width=1.0, hover=told))
+    for edges in found.hover_to_avoid:
+        for height in edges:
+            told = f"hover: {height:.3g} m"
+            traces.append(
+                line([v[0], v[-1]], [height] * 2, name="hover", color=GREY, dash="dash", width=1.0, hover=told)
+            )
     layout = base_layout(420) | {
         "xaxis": axis("speed [m/s]", range=[float(v[0]), float(v[-1])]),
         "yaxis": axis("height [m]", type="log", range=[float(np.log10(h[0])), float(np.log10(h[-1]))]),
@@ -75,7 +75,7 @@ def _diagram(found: HeightVelocity) -> Figure:
         {"data": traces, "layout": layout},
         420,
         f"From the coloured heights and speeds no way to land that was tried ended within the limits, with a pilot who "
-        f"acts {found.delay:g} s after the engine has stopped. Dashed: the two hover heights.",
+        f"acts {found.delay:g} s after the engine has stopped. Dashed: the ends of what a hover avoids.",
         f"Height over speed; {hover_words(found)}.",
         (Key("avoid", VERMILION, "band"), Key("hover heights", GREY, "dash")),
     )

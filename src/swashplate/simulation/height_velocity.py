@@ -77,6 +77,24 @@ class HeightVelocity(Shown):
         return self.margin <= 0.0
 
     @property
+    def hover_to_avoid(self) -> tuple[tuple[float, float], ...]:
+        """Heights [m] between which a hover ends in no landing, ascending; an end may be that of the diagram."""
+        margin, h = self.margin[:, 0], np.log(self.heights)
+        beyond = np.concatenate([[False], margin > 0.0, [False]])
+        firsts, afters = np.flatnonzero(~beyond[:-1] & beyond[1:]), np.flatnonzero(beyond[:-1] & ~beyond[1:])
+
+        def edge(out: int, within: int) -> float:
+            if not (0 <= within < h.size and np.isfinite(margin[out])):
+                return float(self.heights[out])
+            share = margin[out] / (margin[out] - margin[within])
+            return float(np.exp(h[out] + share * (h[within] - h[out])))
+
+        return tuple(
+            (edge(first, first - 1), edge(after - 1, after))
+            for first, after in zip(firsts.tolist(), afters.tolist(), strict=True)
+        )
+
+    @property
     def low_hover(self) -> float:
         """Height [m] up to which every hover ends in a landing; 0 where none does."""
         return self._crossing(self.margin[:, 0], rising=True)
@@ -132,6 +150,7 @@ class HeightVelocity(Shown):
             "speeds": self.speeds.tolist(),
             "heights": self.heights.tolist(),
             "margin": self.margin.tolist(),
+            "hover_to_avoid": self.hover_to_avoid,
             "low_hover": self.low_hover,
             "high_hover": self.high_hover,
             "knee": self.knee,
@@ -146,7 +165,7 @@ class HeightVelocity(Shown):
         return "\n".join(
             (
                 f"Height-velocity diagram of {self.vehicle.card.title}",
-                f"hover is safe up to {told(self.low_hover, 'm')} and from {told(self.high_hover, 'm')}",
+                f"hover to avoid: {', '.join(f'{a:.2g} to {b:.3g} m' for a, b in self.hover_to_avoid) or 'none'}",
                 f"speed from which all heights are safe: {told(self.knee, 'm/s')}",
                 *(f"* {words}" for words in self.assumptions),
             )

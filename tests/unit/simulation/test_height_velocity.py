@@ -74,6 +74,8 @@ def test_height_speed_and_rotor_pay_for_what_the_air_takes(p: PointMass) -> None
 
 def test_inertia_shrinks_the_avoided_region_and_weight_grows_it(usual: HeightVelocity) -> None:
     assert usual.low_hover < usual.high_hover
+    assert usual.hover_to_avoid[0][0] == pytest.approx(usual.low_hover)
+    assert usual.hover_to_avoid[-1][1] == pytest.approx(usual.high_hover)
     assert not usual.safe[4, 0]  # some metres up, at rest
     assert usual.safe[-1].all()
     numbers = RAPTOR.card.values()
@@ -102,6 +104,8 @@ def test_no_landing_with_no_sink_and_every_landing_without_limits(usual: HeightV
     free = height_velocity(RAPTOR, sink=60.0, run=60.0, delay=0.0, speeds=SPEEDS, heights=HEIGHTS)
     assert free.safe.all()
     assert free.low_hover == pytest.approx(HEIGHTS[-1])
+    assert free.hover_to_avoid == ()
+    assert none.hover_to_avoid == ((HEIGHTS[0], HEIGHTS[1]),)
 
 
 def test_it_tells_shows_and_refuses(usual: HeightVelocity) -> None:
