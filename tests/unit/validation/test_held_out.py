@@ -29,6 +29,6 @@ def test_alike_models_are_not_told_apart_nor_models_on_short_flights() -> None:
     alike = gains(made(0.5), made(0.5, seed=2))
     assert sum(bool(one.verdict) for one in alike) <= 1  # each interval is of 95 %
     assert {one.verdict for one in gains(made(0.5), made(0.5))} == {""}
-    short = gains(made(0.6, seconds=8.0), made(0.3, seconds=8.0))
+    short = gains(made(0.6, seconds=5.0), made(0.3, seconds=5.0))
     assert all(one.points > 20.0 and math.isnan(one.low) and not one.verdict for one in short)
     assert isinstance(short[0], Gain)

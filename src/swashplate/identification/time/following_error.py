@@ -246,13 +246,13 @@ def _predicted(
     numbers: FilterNumbers,
 ) -> tuple[FilterState, Any]:
     """State and covariance one sample later, averaged over what is not known of the air speed."""
-    n, g, d = state.x.shape[0], model.n_gusts, N_DISTURBANCES
+    n, d = state.x.shape[0], N_DISTURBANCES
     parameters, noise = model.vehicle.parameters(*numbers.parameters), Noise(*numbers.noise)
     names = model.vehicle.state_names
     psi = state.x[names.index("psi")]
     c, s = jnp.cos(psi), jnp.sin(psi)
     speeds = np.eye(n)[[names.index("u"), names.index("v")]]
-    wind = jnp.zeros((2, g + d))
+    wind = jnp.zeros((2, P.shape[0] - n))
     if model.windy:
         wind = wind.at[:, d : d + 2].set(-jnp.stack([jnp.stack([c, s]), jnp.stack([-s, c])]))
     air = jnp.concatenate([jnp.asarray(speeds), wind], axis=1)  # of the state and the disturbances

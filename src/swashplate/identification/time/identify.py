@@ -14,7 +14,12 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
-from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
+from swashplate.identification.core.low_passed import (
+    coloured_by_resampling,
+    noise_too_small,
+    refuse_lowpassed,
+    smoothed_outputs,
+)
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
 from swashplate.identification.core.records import POSE, Record, records
@@ -104,6 +109,7 @@ def identify_flight(
         problems += [apart] if apart else []
         air = moving_air(noise)
         notes += [air] if air else []
+        notes += [] if question.rotor_line is None else coloured_by_resampling(flights)
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
         for e in parameters

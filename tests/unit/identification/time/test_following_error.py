@@ -24,7 +24,7 @@ from swashplate.validation.calibration import first_part
 @lru_cache(maxsize=1)
 def _likelihood() -> FollowingError:
     (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), sp.vehicle("coax"))
-    noise = Noise(wind=0.1, speed=0.2)
+    noise = Noise(wind=0.1, speed=0.2, line_hertz=-34.4, sensor_heading=1e-3)
     return FollowingError(parameterize(sp.vehicle("coax"), FREE, ties=[TIE]), [first_part(record, 2.5)], noise=noise)
 
 
@@ -35,9 +35,10 @@ def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
     run = likelihood._runs[0]
     numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
     rng = np.random.default_rng(3)
-    n, g, d = len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES
+    n, d, k = np.cumsum([len(model.vehicle.state_names), model.n_gusts, N_DISTURBANCES])
+    joined = int(k) + model.n_line
     x = likelihood.constant.runs(likelihood.row.starts())[0].states.x[100]
-    whole = jnp.concatenate([jnp.asarray(x), jnp.asarray(0.3 * rng.standard_normal(g + d))])
+    whole = jnp.concatenate([jnp.asarray(x), jnp.asarray(0.3 * rng.standard_normal(joined - n))])
     u, volts = run.inputs[100], run.voltage[100]
     parameters = model.vehicle.parameters(*numbers.parameters)
     noise = Noise(*numbers.noise)
@@ -47,14 +48,16 @@ def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
         return _predicted(model, state, P, u, volts, numbers)
 
     def step(z: jax.Array) -> jax.Array:
-        state = FilterState(z[:n], z[n : n + g], z[n + g :])
+        state = FilterState(z[:n], z[n:d], z[d:k], z[k:])
         after = model.step(state.x, model.acting(state), u, parameters, volts)
-        return jnp.concatenate([after, model.fade(noise) * state.gust, state.drift])
+        return jnp.concatenate(
+            [after, model.fade(noise) * state.gust, state.drift, model.line_turn(noise) @ state.line]
+        )
 
-    root = 1e-6 * rng.standard_normal((n + g + d, n + g + d))
-    state = FilterState(whole[:n], whole[n : n + g], whole[n + g :])
+    root = 1e-6 * rng.standard_normal((joined, joined))
+    state = FilterState(whole[:n], whole[n:d], whole[d:k], whole[k:])
     after, P = predicted(jnp.asarray(root @ root.T))
-    _, still = predicted(jnp.zeros((n + g + d, n + g + d)))
+    _, still = predicted(jnp.zeros((joined, joined)))
     F = jax.jit(jax.jacfwd(step), compiler_options=QUICK_TO_COMPILE)(whole)
     np.testing.assert_allclose(np.concatenate(after), step(whole), rtol=1e-8, atol=1e-10)
     expected = F @ root @ root.T @ F.T
@@ -67,7 +70,7 @@ def test_the_gradient_is_the_slope_of_the_cost() -> None:
     cost, gradient, information = likelihood.scores(row)
     assert cost == pytest.approx(likelihood.cost(row), rel=1e-12)
     size = np.sqrt(np.diag(information))
-    for name in ("tau_f_upper", "wind"):
+    for name in ("tau_f_upper", "wind", "line_angle"):
         step = np.zeros(row.size)
         place = likelihood.row.names.index(name)
         step[place] = 1e-2 / max(size[place], 1.0)
