@@ -105,7 +105,7 @@ def identify_flight(
     found, row = _found(table, likelihood, optimum, horizon, most, question.progress)
     optimum, parameters, problems = found.optimum, *estimates_of(found, vehicle)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(likelihood.noise_of(row), flights)]
-    if isinstance(likelihood, PredictionError):  # output error weighs residuals by their own size: nothing to compare
+    if isinstance(likelihood, PredictionError):  # output error fits starts to its commands: others lose
         apart = unrelated(lambda others: _quick(likelihood_of(table, others, question)).cost(row), pieces)
         problems += [apart] if apart else []
     notes += [
