@@ -8,6 +8,7 @@ from pathlib import Path
 from swashplate.compiled import can_compile
 from swashplate.export.stepping_c import CompiledEngine
 from swashplate.links.ardupilot.session import ArduPilotSession
+from swashplate.links.estimating import Estimating
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
 from swashplate.links.recorder import Recorder
@@ -51,6 +52,7 @@ def bench(
     record: Path | None = None,
     record_rate: float = 200.0,
     engine: MakeEngine | None = None,
+    estimating: Estimating | None = None,
 ) -> Bench:
     made = standing(vehicle(name))
     around = Surroundings(environment or Environment(), sag)
@@ -58,7 +60,15 @@ def bench(
     recorder = None
     if record is not None:
         recorder = Recorder(record, like=unflown(made, record_rate=record_rate), say=said.append)
-    plant = Plant(made, servo_mapping(name, made), around, recorder=recorder, record_rate=record_rate, engine=engine)
+    plant = Plant(
+        made,
+        servo_mapping(name, made),
+        around,
+        recorder=recorder,
+        record_rate=record_rate,
+        engine=engine,
+        estimating=estimating,
+    )
     return Bench(
         ArduPilotSession(plant, Sensing(plant, unit=unit, seed=seed), Notices(said.append)), plant, said, recorder
     )

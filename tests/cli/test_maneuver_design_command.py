@@ -69,6 +69,16 @@ def test_the_command_is_the_call(asked: dict[str, Any], tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["d.csv", "d.txt"]
 
 
+def test_a_script_is_written_where_the_design_can_be_flown_as_angles(asked: dict[str, Any], tmp_path: Path) -> None:
+    outcome = swash(*ASKED, "--script", tmp_path / "d.lua")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "d.lua" in outcome.out
+    assert "local LINES" in (tmp_path / "d.lua").read_text(encoding="utf-8")
+    asked["best"] = "sweep"
+    assert "the best offer is the sweep" in one_message(swash(*ASKED, "--script", tmp_path / "e.lua"))
+    assert not (tmp_path / "e.lua").exists()
+
+
 def test_a_sweep_that_is_best_comes_with_ardupilots_parameters(asked: dict[str, Any], tmp_path: Path) -> None:
     asked["best"] = "sweep"
     assert swash(*ASKED, "--out", tmp_path / "d.csv").code == 0
@@ -83,6 +93,7 @@ def test_a_sweep_that_is_best_comes_with_ardupilots_parameters(asked: dict[str, 
         (("--limits", "attitude=steep"), "is 'attitude=steep', expected NAME=VALUE"),
         (("--band", "fast"), "is 'fast', expected LOW-HIGH"),
         (("--out", "design.txt"), "expected .csv"),
+        (("--script", "design.txt"), "expected .lua"),
     ],
 )
 def test_what_cannot_be_read_is_refused(asked: dict[str, Any], more: tuple[str, ...], words: str) -> None:

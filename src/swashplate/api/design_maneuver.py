@@ -115,9 +115,9 @@ def design_maneuver(
     models = _draws(vehicle, unknown, spread, draws, seed)
     values = np.array([abs(vehicle.card.parameters[n].value) or 1.0 for n in unknown])
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
-    wanted = None if aim is None else aim_of(aim, models, unknown, controller or _hold)
+    wanted = None if aim is None else aim_of(aim, models, unknown, controller or usual_hold)
     seen = [sensed(one, unknown) for one in models]
-    told = DesignDraws(models, seen, unknown, noise, rate, controller or _hold, wanted, values, known)
+    told = DesignDraws(models, seen, unknown, noise, rate, controller or usual_hold, wanted, values, known)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
@@ -253,5 +253,6 @@ def _draws(vehicle: Vehicle, unknown: Sequence[str], spread: float, draws: int, 
     return made
 
 
-def _hold(vehicle: Vehicle, about: Trim) -> Controller:
+def usual_hold(vehicle: Vehicle, about: Trim) -> Controller:
+    """The hold of the kind of vehicle, which flies a design unless another controller is given."""
     return hover_hold(vehicle, about) if vehicle.traits.coaxial else state_hold(vehicle, about)

@@ -119,8 +119,8 @@ def identify_and_validate(
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
         iterations, keep_unexcited, wind, rotor_line, leave_out, horizon: as of `identify`.
         close_loop: as of `validate`.
-        posterior: "laplace" or "nuts" for draws of what the fit does not know (`swashplate.posterior`). One that did
-            not converge is left out, and `refused` says why.
+        posterior: "laplace", "metropolis" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
+            One that did not converge is left out, and `refused` says why.
         names: what the user calls the flights and the hold-outs, for messages.
         say: told what is being done.
 
@@ -135,9 +135,9 @@ def identify_and_validate(
     check_method(method)
     if posterior is not None:
         check_posterior(posterior)
-        if posterior == "nuts" and horizon is not None:
+        if posterior != "laplace" and horizon is not None:
             raise IdentificationError(
-                "errors ahead are no likelihood, and NUTS draws from one.",
+                f"errors ahead are no likelihood, and {posterior} draws from one.",
                 channel="posterior",
                 hint="Leave --horizon away, or take 'laplace'.",
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from swashplate.control.analysis.cascade_gains import cascade_gains
 from swashplate.errors import ControllerError, SwashError
 from swashplate.links.ardupilot.gains import ASSUMED_DELAY, ardupilot_law, written_gains
 from swashplate.links.ardupilot.parameters import Parameters, parameter_file, parameters
+from swashplate.links.estimating import Estimating, KnownNow
 from swashplate.links.notices import Notices
 from swashplate.links.plant import Plant, Surroundings, unflown
 from swashplate.links.recorder import Recorder, recover
@@ -34,6 +35,8 @@ from swashplate.simulation.stepping import MakeEngine, SteppingEngine, XlaEngine
 from swashplate.simulation.trim import Trim
 
 Say = Callable[[str], None]
+_ESTIMATED = 100.0
+"""Samples a second of what estimates in flight [Hz]."""
 
 
 def _silent(_: str) -> None:
@@ -49,15 +52,19 @@ class Linked:
         time: seconds since the vehicle was last put on the ground.
         noted: what was odd about the autopilot's messages, with counts.
         saved: recordings.
+        estimates: what was asked to be estimated, as it was known at the end.
     """
 
     exchanges: int
     time: float
     noted: str
     saved: tuple[Path, ...]
+    estimates: tuple[KnownNow, ...] = ()
 
     def __repr__(self) -> str:
         told = f"{self.exchanges} exchanges; {self.time:.1f} s since the vehicle was last put on the ground."
+        if self.estimates:
+            told += f"\nEstimated in flight: {'; '.join(map(str, self.estimates))}."
         return f"{told}\nNoted: {self.noted}." if self.noted else told
 
 
@@ -116,6 +123,8 @@ def link_ardupilot(
     record: str | Path | None = None,
     record_rate: float = 200.0,
     idle_exit: float | None = None,
+    estimate: Sequence[str] = (),
+    truth: Mapping[str, float] | None = None,
     notice: Say = print,
     say: Say = _silent,
 ) -> Linked:
@@ -134,6 +143,9 @@ def link_ardupilot(
         noisy: gyros and accelerometers with noise and bias. seed: of it.
         record: keep the true flights on disk while they are flown (.nc or .csv). record_rate: samples per second kept.
         idle_exit: end after so many seconds without an autopilot.
+        estimate: parameters and equations that recursive estimators follow while it is in the air
+            (`links.estimating`); `notice` is told every few seconds.
+        truth: numbers of the card that what flies has instead, which the estimators have to find.
         notice: told what the user must know. say: told what is going on.
 
     Raises:
@@ -142,7 +154,8 @@ def link_ardupilot(
     from swashplate.links.ardupilot.runner import serve
     from swashplate.links.ardupilot.session import ArduPilotSession
 
-    plant, recorder = _plant(vehicle, servos, environment, name, "", voltage, sag, record, record_rate, notice)
+    made = _Asked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
+    plant, recorder = _plant(made, "", notice)
     notices = Notices(notice)
     with listen_udp(listen, port) as bound:
         _tell_where("UDP", bound.getsockname(), listen, plant, notice=notice, say=say)
@@ -154,7 +167,7 @@ def link_ardupilot(
             pass
         finally:
             saved = _finish(plant, recorder, session.progress.exchanges, notices.summary(), say)
-    return Linked(session.progress.exchanges, plant.time, notices.summary(), saved)
+    return Linked(session.progress.exchanges, plant.time, notices.summary(), saved, _known(plant))
 
 
 def link_px4(
@@ -172,6 +185,8 @@ def link_px4(
     record: str | Path | None = None,
     record_rate: float = 200.0,
     idle_exit: float | None = None,
+    estimate: Sequence[str] = (),
+    truth: Mapping[str, float] | None = None,
     notice: Say = print,
     say: Say = _silent,
 ) -> Linked:
@@ -183,7 +198,8 @@ def link_px4(
     from swashplate.links.px4.runner import serve
     from swashplate.links.px4.session import Px4Session
 
-    plant, recorder = _plant(vehicle, servos, environment, name, "_px4", voltage, sag, record, record_rate, notice)
+    made = _Asked(vehicle, servos, environment, name, voltage, sag, record, record_rate, estimate, truth, seed)
+    plant, recorder = _plant(made, "_px4", notice)
     notices = Notices(notice)
     session = Px4Session(plant, _sensing(plant, noisy=noisy, seed=seed), notices, seed=seed)
     with listen_tcp(listen, port) as listening:
@@ -195,7 +211,7 @@ def link_px4(
             pass
         finally:
             saved = _finish(plant, recorder, session.exchanges, notices.summary(), say)
-    return Linked(session.exchanges, plant.time, notices.summary(), saved)
+    return Linked(session.exchanges, plant.time, notices.summary(), saved, _known(plant))
 
 
 def write_ardupilot_parameters(
@@ -238,39 +254,55 @@ def gains_to_write(mapping: ServoMapping, vehicle: Vehicle, trim: Trim, *, notic
         return {}
 
 
-def _plant(
-    vehicle: Vehicle,
-    servos: str | Path | None,
-    environment: Environment | None,
-    name: str | None,
-    suffix: Literal["", "_px4"],
-    voltage: float | None,
-    sag: float,
-    record: str | Path | None,
-    rate: float,
-    notice: Say,
-) -> tuple[Plant, Recorder | None]:
-    file = None if record is None else Path(record)
+@dataclass(frozen=True)
+class _Asked:
+    """What both links are asked for alike; see `link_ardupilot`."""
+
+    vehicle: Vehicle
+    servos: str | Path | None
+    environment: Environment | None
+    name: str | None
+    voltage: float | None
+    sag: float
+    record: str | Path | None
+    rate: float
+    estimate: Sequence[str]
+    truth: Mapping[str, float] | None
+    seed: int
+
+
+def _plant(asked: _Asked, suffix: Literal["", "_px4"], notice: Say) -> tuple[Plant, Recorder | None]:
+    file = None if asked.record is None else Path(asked.record)
     check_record(file)
     _own_process()
-    around = environment_of(vehicle, environment)
-    if voltage is not None:
-        if not 0.0 < voltage < 1000.0:
-            raise SwashError(f"is {voltage:g} V, expected 0 to 1000.", channel="--voltage")
-        around = around._replace(voltage=voltage)
-    aircraft = standing(vehicle)
-    mapping = mapping_of(aircraft, servos, name=name, suffix=suffix)
+    around = environment_of(asked.vehicle, asked.environment)
+    if asked.voltage is not None:
+        if not 0.0 < asked.voltage < 1000.0:
+            raise SwashError(f"is {asked.voltage:g} V, expected 0 to 1000.", channel="--voltage")
+        around = around._replace(voltage=asked.voltage)
+    aircraft = standing(asked.vehicle.with_values(asked.truth) if asked.truth else asked.vehicle)
+    mapping = mapping_of(aircraft, asked.servos, name=asked.name, suffix=suffix)
     recorder = None
     if file is not None:
         recover(file, notice)
         recorder = Recorder(
             file,
-            like=unflown(aircraft, record_rate=rate),
+            like=unflown(aircraft, record_rate=asked.rate),
             say=notice,
             judge=partial(monitored, vehicle=aircraft),
         )
-    made = Surroundings(around, sag)
-    plant = Plant(aircraft, mapping, made, recorder=recorder, record_rate=rate, engine=link_engine(notice))
+    estimating = None
+    if asked.estimate:
+        estimating = Estimating(asked.vehicle, asked.estimate, rate=_ESTIMATED, seed=asked.seed, say=notice)
+    plant = Plant(
+        aircraft,
+        mapping,
+        Surroundings(around, asked.sag),
+        recorder=recorder,
+        record_rate=asked.rate,
+        engine=link_engine(notice),
+        estimating=estimating,
+    )
     plant.prepare()
     return plant, recorder
 
@@ -301,8 +333,12 @@ def _tell_where(kind: str, at: tuple[str, int], listen: str, plant: Plant, *, no
     say(f"{plant.vehicle.card.title}: waiting for an autopilot on {kind} {at[0]}:{at[1]}. Ctrl-C ends.")
 
 
+def _known(plant: Plant) -> tuple[KnownNow, ...]:
+    return () if plant.estimating is None else plant.estimating.known
+
+
 def _finish(plant: Plant, recorder: Recorder | None, exchanges: int, counts: str, say: Say) -> tuple[Path, ...]:
-    say(repr(Linked(exchanges, plant.time, counts, ())))
+    say(repr(Linked(exchanges, plant.time, counts, (), _known(plant))))
     saved = () if recorder is None else recorder.finish()
     if recorder is not None:
         say(f"written: {', '.join(map(str, saved))}" if saved else "nothing was flown, nothing is written.")

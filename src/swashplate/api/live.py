@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from swashplate.api.saying import announce
@@ -22,6 +22,8 @@ def live(
     vehicle: Vehicle,
     *,
     controller: Controller | str | Path | None = None,
+    estimate: Sequence[str] = (),
+    truth: Mapping[str, float] | None = None,
     folder: str | Path = "live",
     host: str = "127.0.0.1",
     port: int = 8017,
@@ -36,6 +38,9 @@ def live(
         vehicle: what flies.
         controller: one, or its file. An autopilot (`swash decouple`) flies in all modes; any other in "position", on
             its own sensors where it has some, with its commands as late as it takes them to be.
+        estimate: parameters ("mass") and equations ("q_dot = Mq*q + Md*servo_pitch + bias") that recursive estimators
+            follow while you fly; the page shows each with two standard errors (`links.estimating`).
+        truth: numbers of the card that what flies has instead, which the estimators have to find.
         folder: for recordings and reports; made with the first one.
         host, port: where the page is; port 0 takes any free one.
         allow_remote: let other machines open the page and fly.
@@ -60,7 +65,8 @@ def live(
     check_page()
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
-        session = LiveSession(vehicle, controller=chosen, folder=place)
+        flown = vehicle.with_values(truth) if truth else vehicle
+        session = LiveSession(flown, controller=chosen, folder=place, estimate=estimate, model=vehicle)
         session.clock.start()
         try:
             announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)

@@ -146,6 +146,7 @@ def _document(one: Tracked) -> dict[str, Any]:
     if isinstance(one.plan, RegressionPlan):
         plan, e = one.plan, one.plan.equation
         document |= {"rate": 1.0 / plan.dt, "hertz": plan.hertz, "memory": plan.memory, "held": plan.held}
+        document["instruments"] = plan.instruments
         document["delays"] = dict(e.delays)
     return document
 
@@ -176,6 +177,7 @@ def recursive_estimator(
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),
+    instruments: Sequence[str] = (),
     delays: Mapping[str, float] | None = None,
 ) -> RecursiveRegression:
     """An estimator for a stream: feed it with `.step(elapsed, sample)`, ask `.estimate()` at any time.
@@ -187,13 +189,15 @@ def recursive_estimator(
         spacing: of the frequencies [Hz]; a 25th of the band's upper end where None.
         memory: time constant of forgetting [s]; None: nothing is forgotten.
         held: channels that keep their value between samples, such as commands.
+        instruments: channels that gusts do not move, such as commands that no controller gives: with them strong gusts
+            do not bias the coefficients.
         delays: seconds by channel of the right side.
 
     Raises:
         IdentificationError: an equation that is none, or settings that cannot work.
     """
     e = regression_equation(equation, delays=delays) if isinstance(equation, str) else equation
-    return RecursiveRegression(_plan(e, rate, band, spacing, memory, held))
+    return RecursiveRegression(_plan(e, rate, band, spacing, memory, held, instruments))
 
 
 def _plan(
@@ -203,8 +207,9 @@ def _plan(
     spacing: float | None,
     memory: float | None,
     held: Sequence[str],
+    instruments: Sequence[str],
 ) -> RegressionPlan:
-    return regression_plan(e, rate=rate, band=band, spacing=spacing, memory=memory, held=held)
+    return regression_plan(e, rate=rate, band=band, spacing=spacing, memory=memory, held=held, instruments=instruments)
 
 
 def track(
@@ -216,6 +221,7 @@ def track(
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),
+    instruments: Sequence[str] = (),
     delays: Mapping[str, float] | None = None,
     unknown: Sequence[str] = (),
     spread: float = 0.2,
@@ -236,6 +242,7 @@ def track(
             inputs are held; with `unknown` a vehicle.
         rate: samples per second [Hz]; the left side's usual rate where None.
         band, spacing, memory, held: as of `recursive_estimator`.
+        instruments: as of it; each goes to the equations that have the channel on the right.
         delays: seconds by channel; each goes to the equations that have the channel.
         unknown: parameters of the vehicle.
         spread: standard deviation of each at the start, as a share of the card's value.
@@ -259,16 +266,18 @@ def track(
     given = linear(equations) if isinstance(equations, Vehicle) else equations
     texts, notes = _equations(given, renamed, dict(delays or {}))
     own = given.inputs if isinstance(given, StateSpaceModel) else ()
-    strange = [name for name in held if not any(name in e.channels for e in texts)]
-    if strange:
-        raise IdentificationError("stands in no equation.", channel=f"held {strange[0]}")
+    for what, names_given in (("held", held), ("instrument", instruments)):
+        strange = [name for name in names_given if not any(name in e.channels for e in texts)]
+        if strange:
+            raise IdentificationError("stands in no equation.", channel=f"{what} {strange[0]}")
     found = []
     for e in texts:
         say("estimating", note=e.text)
         time, samples = stream_of(renamed, e.channels)
         usual = _rate(time, source)
         wanted = [name for name in dict.fromkeys((*held, *own)) if name in e.channels]
-        plan = _plan(e, rate or usual, band, spacing, memory, wanted)
+        told = [name for name in instruments if name in e.channels and name != e.left]
+        plan = _plan(e, rate or usual, band, spacing, memory, wanted, told)
         units = {name: str(renamed[name].attrs.get("units", "")) for name in e.channels}
         found.append(tracked(plan, time, samples, every=every, units=units))
     return Tracking(source, simulated, tuple(found), notes)

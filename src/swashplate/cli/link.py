@@ -76,6 +76,8 @@ def ardupilot(
     record: Record = None,
     record_rate: RecordRate = 200.0,
     idle_exit: IdleExit = None,
+    estimate: options.Estimate = None,
+    truth: options.Truth = None,
     write_parameters: Annotated[
         Path | None,
         typer.Option(
@@ -128,6 +130,8 @@ def ardupilot(
         record=record,
         record_rate=record_rate,
         idle_exit=idle_exit,
+        estimate=estimate or (),
+        truth=options.numbers_by_name(truth, option="--truth"),
         notice=_say,
         say=_silent if quiet else _say,
     )
@@ -150,6 +154,8 @@ def px4(
     record: Record = None,
     record_rate: RecordRate = 200.0,
     idle_exit: IdleExit = None,
+    estimate: options.Estimate = None,
+    truth: options.Truth = None,
     check: Check = False,
     mavlink: MavlinkAddress = None,
     timeout: Timeout = 10.0,
@@ -185,6 +191,8 @@ def px4(
         record=record,
         record_rate=record_rate,
         idle_exit=idle_exit,
+        estimate=estimate or (),
+        truth=options.numbers_by_name(truth, option="--truth"),
         notice=_say,
         say=_silent if quiet else _say,
     )

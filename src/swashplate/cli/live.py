@@ -37,6 +37,8 @@ def live(
         typer.Option("--out", "-o", metavar="DIR", help="Folder for recordings and reports; made with the first one."),
     ] = Path("live"),
     switched: given.Switch = None,
+    estimate: options.Estimate = None,
+    truth: options.Truth = None,
     port: Port = 8017,
     host: Host = "127.0.0.1",
     allow_remote: Remote = False,
@@ -56,6 +58,8 @@ def live(
         verbs.live(
             vehicle,
             controller=controller,
+            estimate=estimate or (),
+            truth=options.numbers_by_name(truth, option="--truth"),
             folder=out,
             host=host,
             port=port,

@@ -140,6 +140,10 @@ def design(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="The series as .csv, the flight card beside it as .txt."),
     ] = None,
+    script: Annotated[
+        Path | None,
+        typer.Option("--script", metavar="FILE.lua", help="Write a script with which ArduPilot flies it as angles."),
+    ] = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -155,6 +159,8 @@ def design(
 
     if out is not None and out.suffix.lower() != ".csv":
         raise SwashError(f"ends in '{out.suffix}', expected .csv.", where=out, channel="--out")
+    if script is not None and script.suffix.lower() != ".lua":
+        raise SwashError(f"ends in '{script.suffix}', expected .lua.", where=script, channel="--script")
     asked = dict(_limit(item) for item in limits.split(",") if item.strip())
     with progress(quiet=quiet or json) as line:
         made = sp.design_maneuver(
@@ -174,6 +180,11 @@ def design(
             say=line.say,
         )
     written = () if out is None else made.save(out)
+    if script is not None:
+        from swashplate.api.maneuver_script import maneuver_script
+        from swashplate.atomic import write_text
+
+        written = (*written, write_text(script, maneuver_script(made)))
     if json:
         typer.echo(as_json(made.to_document() | {"written": [str(path) for path in written]}))
     elif not quiet:

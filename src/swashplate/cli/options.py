@@ -84,11 +84,33 @@ Units = Annotated[
 BadStamps = Annotated[
     bool, typer.Option("--drop-bad-stamps", help="Leave out samples whose time repeats or goes backwards.")
 ]
+Estimate = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--estimate",
+        metavar="NAMES|EQUATION",
+        help="Estimate while it flies: parameters of the model (mass), or an equation as of `swash track`. Repeatable.",
+    ),
+]
+Truth = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--truth",
+        metavar="NAME=VALUE",
+        help="What flies has this number instead of the card's: for --estimate to find. Repeatable.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON instead of tables.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no tables: files and exit code only.")]
 
 
-_EXAMPLES = {"--unit": "phi=deg", "--option": "bar=true", "--vary": "mass=5%", "--prior": "tau_f_upper=1.6,0.3"}
+_EXAMPLES = {
+    "--unit": "phi=deg",
+    "--option": "bar=true",
+    "--vary": "mass=5%",
+    "--truth": "mass=0.36",
+    "--prior": "tau_f_upper=1.6,0.3",
+}
 
 
 def split_assignment(text: str, *, option: str) -> tuple[str, str]:

@@ -40,6 +40,13 @@ def track(
         str | None,
         typer.Option("--held", help="Channels that are constant between samples (commands), separated by commas."),
     ] = None,
+    instrument: Annotated[
+        str | None,
+        typer.Option(
+            "--instrument",
+            help="Commands that no controller gives, by commas: with them strong gusts do not bias the coefficients.",
+        ),
+    ] = None,
     delay: Annotated[
         list[str] | None, typer.Option("--delay", metavar="NAME=SECONDS", help="A channel acts this late. Repeatable.")
     ] = None,
@@ -99,6 +106,7 @@ def track(
             spacing=spacing,
             memory=memory,
             held=flying.names(held),
+            instruments=flying.names(instrument),
             delays=options.numbers_by_name(delay, option="--delay"),
             unknown=names,
             spread=spread,

@@ -11,6 +11,7 @@ from importlib import resources
 
 import numpy as np
 
+from swashplate.errors import ExportError
 from swashplate.export.c_text import REAL, Precision, identifier, literal, words
 from swashplate.identification.recursive import fourier_regression
 from swashplate.identification.recursive.equation import BIAS
@@ -66,8 +67,10 @@ def regression_code(
         precision: of every number in it.
 
     Raises:
-        ExportError: a name or a number that C cannot hold.
+        ExportError: a name or a number that C cannot hold; a plan with instruments.
     """
+    if plan.instruments:
+        raise ExportError("are for Python only: its C is plain least squares.", channel="instruments")
     e, called, real = plan.equation, identifier(name), REAL[precision]
     channels, unknowns, lines = len(e.channels), len(e.names), plan.last - plan.first + 1
     sizes = {

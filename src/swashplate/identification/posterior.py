@@ -11,15 +11,18 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.extras import library
-from swashplate.identification.core import accuracy
+from swashplate.identification.core import accuracy, metropolis
 from swashplate.identification.core.draws import normal_within
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.posterior_draws import LEAST_ESS, SPLIT_RHAT, Posterior
 from swashplate.identification.core.result import Fitted, Result, bounds_of
+from swashplate.identification.core.whitened import Chains, effective, split_rhat
 
-METHODS = ("laplace", "nuts")
+METHODS = ("laplace", "metropolis", "nuts")
 WARMUP = 80
-"""Draws of one chain in which the step of all is found."""
+"""Draws of one chain of NUTS in which the step of all is found."""
+LEARNING = 300
+"""Steps of each chain of Metropolis between two looks at the reference that it learns."""
 BLOCK = 50
 """Draws of each chain between two looks at whether they are enough."""
 _LEAST = 100
@@ -28,28 +31,32 @@ _LEAST = 100
 def posterior(
     result: Result[Any, Any],
     *,
-    method: Literal["laplace", "nuts"] | str = "laplace",
+    method: Literal["laplace", "metropolis", "nuts"] | str = "laplace",
     draws: int = 1000,
     chains: int = 4,
-    warmup: int = WARMUP,
+    warmup: int | None = None,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result[Any, Any]:
     """A fit with draws of what it does not know, which `draw`, Monte Carlo and the control check then take.
 
-    "laplace" is free: normal about the estimates from the covariance of the likelihood. "nuts" draws from the
-    likelihood and the priors themselves, with every start state, delay, bias and noise that the fit moved (No-U-Turn
-    sampler, Hoffman and Gelman 2014): from the fit, on exact gradients, in the metric of the Fisher information. It
-    sees skewed and bounded parameters as they are, and ends when every number has a split-R-hat below 1.01 and every
-    parameter 400 effective draws. Residuals count as the likelihood has them (white): where the fit corrects its bounds
-    for coloured ones, `draw` widens the draws by the same matrices.
+    "laplace" is free: normal about the estimates from the covariance of the likelihood. The others draw from the
+    likelihood and the priors themselves, with every start state, delay, bias and noise that the fit moved, from the fit
+    and in the metric of the Fisher information. "metropolis" needs values of the likelihood only, and so takes every
+    likelihood of records in time (preconditioned Crank-Nicolson proposals about a normal distribution that it learns:
+    Cotter et al. 2013; Rudolf and Sprungk 2018); each draw that is kept is its twentieth step. "nuts" goes along exact
+    gradients (No-U-Turn sampler, Hoffman and Gelman 2014). Both see skewed and bounded parameters as they are, and end
+    when every number has a split-R-hat below 1.01 and every parameter 400 effective draws. Residuals count as the
+    likelihood has them (white): where the fit corrects its bounds for coloured ones, `draw` widens the draws by the
+    same matrices.
 
     Args:
-        result: of a fit in this program (NUTS), or any with a covariance ("laplace").
-        method: "laplace" or "nuts".
+        result: of a fit in this program, or any with a covariance ("laplace").
+        method: "laplace", "metropolis" or "nuts".
         draws: of each chain at most.
         chains: how many.
-        warmup: draws of one chain in which the step of all is found.
+        warmup: draws of one chain in which the step of all is found ("nuts"), or steps of each chain between two looks
+            at the reference ("metropolis", five times); None: `WARMUP`, `LEARNING`.
         seed: of all that is random.
         progress: told draws of a chain so far, and at most.
 
@@ -60,7 +67,9 @@ def posterior(
     """
     where = f"the fit of {result.name}"
     check_posterior(method)
-    for name, value, least in (("draws", draws, _LEAST), ("chains", chains, 2), ("warmup", warmup, 0)):
+    warming = (WARMUP if method == "nuts" else LEARNING) if warmup is None else warmup
+    least_warm = 10 if method == "metropolis" else 0
+    for name, value, least in (("draws", draws, _LEAST), ("chains", chains, 2), ("warmup", warming, least_warm)):
         if value < least:
             raise IdentificationError(f"is {value}, expected at least {least}.", channel=name)
     if result.failed:
@@ -68,19 +77,20 @@ def posterior(
     if method == "laplace":
         return replace(result, posterior=_laplace(result, draws=draws, chains=chains, seed=seed, where=where))
     fitted = result.fitted
-    if fitted is None or not hasattr(fitted.likelihood, "traced"):
+    called = "NUTS" if method == "nuts" else "Metropolis"
+    if fitted is None or (method == "nuts" and not hasattr(fitted.likelihood, "traced")):
         told = "comes from a file" if fitted is None else f"is by {result.method}"
         raise IdentificationError(
-            f"{told}, and NUTS needs the likelihood of records in time itself.",
+            f"{told}, and {called} needs the likelihood of records in time itself.",
             where=where,
             channel="posterior",
-            hint="Fit the flights again with --posterior nuts (without a horizon), or take 'laplace'.",
+            hint=f"Fit the flights again with --posterior {method} (without a horizon), or take 'laplace'.",
         )
     if not result.converged:
         raise IdentificationError(
             "did not converge: chains would start from nowhere.", where=where, hint="Allow more iterations."
         )
-    made = _nuts(result, fitted, draws=draws, chains=chains, warmup=warmup, seed=seed, progress=progress)
+    made = _drawn(result, fitted, method, draws=draws, chains=chains, warmup=warming, seed=seed, progress=progress)
     made.check(where=where)
     return replace(result, posterior=made)
 
@@ -116,9 +126,10 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
     )
 
 
-def _nuts(
+def _drawn(
     result: Result[Any, Any],
     fitted: Fitted,
+    method: str,
     *,
     draws: int,
     chains: int,
@@ -126,41 +137,55 @@ def _nuts(
     seed: int,
     progress: Callable[[int, int], None] | None,
 ) -> Posterior:
-    from swashplate.identification.core import nuts
-
     likelihood, row = fitted.likelihood, fitted.likelihood.row
     likelihood.refresh(fitted.row)
     information = likelihood.scores(fitted.row)[2]
     covariance = accuracy.covariance(row, information, row.prior(fitted.row)[2])
     k = len(result.names)
 
-    def enough(found: nuts.Chains) -> bool:
+    def enough(found: Chains) -> bool:
         if found.rows.shape[1] < min(draws, _LEAST):
             return False
-        good = np.all(nuts.effective(found.rows[:, :, :k]) >= LEAST_ESS)
-        return bool(good and np.all(nuts.split_rhat(found.rows) < SPLIT_RHAT))
+        good = np.all(effective(found.rows[:, :, :k]) >= LEAST_ESS)
+        return bool(good and np.all(split_rhat(found.rows) < SPLIT_RHAT))
 
-    found = nuts.sample(
-        likelihood.traced(),
-        row,
-        fitted.row,
-        covariance,
-        chains=chains,
-        warmup=warmup,
-        block=BLOCK,
-        most=draws,
-        enough=enough,
-        seed=seed,
-        progress=progress,
-    )
+    if method == "nuts":
+        from swashplate.identification.core import nuts
+
+        found = nuts.sample(
+            likelihood.traced(),
+            row,
+            fitted.row,
+            covariance,
+            chains=chains,
+            warmup=warmup,
+            block=BLOCK,
+            most=draws,
+            enough=enough,
+            seed=seed,
+            progress=progress,
+        )
+    else:
+        found = metropolis.sample(
+            likelihood,
+            fitted.row,
+            covariance,
+            chains=chains,
+            warmup=warmup,
+            block=BLOCK,
+            most=draws,
+            enough=enough,
+            seed=seed,
+            progress=progress,
+        )
     return Posterior(
-        "nuts",
+        method,
         row.names,
         k,
         tuple(result[name].unit for name in result.names),
         _plain_numbers(row, found.rows),
-        nuts.split_rhat(found.rows),
-        nuts.effective(found.rows),
+        split_rhat(found.rows),
+        effective(found.rows),
         found.stats,
         found.step,
         seed,

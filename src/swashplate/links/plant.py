@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from swashplate.arrays import Array
 from swashplate.errors import DivergenceError
 from swashplate.flights.flight import Flight
+from swashplate.links.estimating import Estimating
 from swashplate.links.recorder import Recorder
 from swashplate.links.servos import ServoMapping
 from swashplate.models.surroundings import environment_of
@@ -20,6 +22,8 @@ from swashplate.simulation.standing import at_rest
 from swashplate.simulation.stepping import MakeEngine, Motion, Stepping, at_standstill
 
 _SPEEDS = ("u", "v", "w", "p", "q", "r")
+_ALOFT = 0.02
+"""m above where it stands: what estimates in flight counts from here."""
 _FASTEST = 500.0
 """m/s and rad/s: nothing of ours moves so fast in one piece."""
 
@@ -53,6 +57,7 @@ class Plant:
         recorder: keeps the flights; None keeps none.
         record_rate: samples per second that it gets [Hz].
         engine: makes what moves it; None for XLA.
+        estimating: estimates numbers while the vehicle is in the air; None for nothing.
 
     Attributes:
         vehicle, mapping: as given.
@@ -72,8 +77,10 @@ class Plant:
         recorder: Recorder | None = None,
         record_rate: float = 200.0,
         engine: MakeEngine | None = None,
+        estimating: Estimating | None = None,
     ) -> None:
         self.vehicle, self.mapping = vehicle, mapping
+        self.estimating, self._estimated = estimating, 0.0
         self._around = replace(around, environment=environment_of(vehicle, around.environment))
         self._rest = at_rest(vehicle, self.environment)
         self.standing_depth = -float(self._rest[vehicle.index("z")])
@@ -106,13 +113,17 @@ class Plant:
         self._stepping.place(self._rest)
         self._surround(float(self.environment.voltage))
         self._held = at_standstill(self._rest, float(self.environment.gravity))
-        self._next = 0.0
+        self._next, self._estimated = 0.0, 0.0
+        if self.estimating is not None:
+            self.estimating.pause()
         if self._recorder is not None:
             self._recorder.restart()
 
     def advance(self, pulses: Sequence[float], duration: float) -> Motion:
         """Hold outputs [us] for `duration` [s]; a vehicle that broke stays where it is. Never anything but numbers."""
         inputs = self.mapping.inputs(pulses, duration)
+        if self.estimating is not None and self.time >= self._estimated + self.estimating.dt - 1e-9:
+            self._estimate(self.estimating, inputs)
         if not self.broken:
             try:
                 moved = self._stepping.advance(inputs, duration)
@@ -133,6 +144,14 @@ class Plant:
             if self._recorder is not None:
                 self._recorder.add(self.time, [*self._held.states, *inputs, *self._stepping.surroundings])
         return self._held
+
+    def _estimate(self, estimating: Estimating, inputs: Array) -> None:
+        elapsed, self._estimated = self.time - self._estimated, self.time
+        if self.broken or -self._held.body.z < self.standing_depth + _ALOFT:
+            estimating.pause()
+            return
+        states = self._held.states[: len(estimating.model.state_names)]
+        estimating.step(elapsed, states, inputs, self.voltage)
 
     def _surround(self, voltage: float) -> None:
         self.voltage = voltage

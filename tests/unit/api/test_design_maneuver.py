@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import pytest
 
 import swashplate as sp
 from swashplate.api.designed_maneuver import DesignedManeuver
+from swashplate.api.maneuver_script import maneuver_script
 from swashplate.errors import IdentificationError, ManeuverError
 from swashplate.flights.maneuvers.composed import ComposedMultisine, composed
 
@@ -39,6 +42,35 @@ def test_it_tells_more_than_a_sweep_of_the_same_length_and_keeps_the_limits() ->
     (piece,) = made.best.pieces
     again = sp.simulate_maneuver(made.vehicle, piece, controller=sp.hover_hold, rate=100.0)
     assert np.degrees(np.ptp(again.values("phi"))) <= 2.0 * LIMITS["attitude"]
+
+
+def test_the_script_for_an_autopilot_asks_for_the_designs_motion() -> None:
+    made = designed()
+    (piece,) = made.best.pieces
+    assert isinstance(piece, ComposedMultisine)
+    slow = {axis: tuple(line for line in own if line[0] <= 25) for axis, own in piece.lines.items()}
+    pieces = (replace(piece, lines=slow),)
+    text = maneuver_script(replace(made, offers=(replace(made.best, pieces=pieces),)))
+    flight = sp.simulate_maneuver(made.vehicle, pieces[0], controller=sp.hover_hold, tail=0.0)
+    rolled = flight.values("phi")[-1001:-1]
+    number, amplitude, phase = map(float, re.findall(r"roll = \{\{(\d+), (\S+), ([^}]+)\}", text)[0])
+    time = np.arange(1000) / 100.0
+    line = 2.0 * np.mean(np.degrees(rolled) * np.exp(-2j * np.pi * number * time / 10.0))
+    np.testing.assert_allclose(amplitude * np.exp(1j * phase), line, rtol=1e-4)
+    assert "local ATTITUDE, RATE, PLACE = 15.0, 120.0, 1.0" in text
+
+
+def test_what_a_script_cannot_fly_is_refused() -> None:
+    made = designed()
+    (piece,) = made.best.pieces
+    assert isinstance(piece, ComposedMultisine)
+    fast = {axis: tuple(line for line in own if line[0] > 25) for axis, own in piece.lines.items()}
+    above = replace(made, offers=(replace(made.best, pieces=(replace(piece, lines=fast),)),))
+    with pytest.raises(ManeuverError, match=r"% of the design's power lies above 3 Hz"):
+        maneuver_script(above)
+    sweep = next(offer for offer in made.offers if offer.kind == "sweep")
+    with pytest.raises(ManeuverError, match="the best offer is the sweep"):
+        maneuver_script(replace(made, offers=(sweep,)))
 
 
 def test_more_seconds_buy_less_each() -> None:

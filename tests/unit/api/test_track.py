@@ -10,7 +10,7 @@ import pytest
 
 import swashplate as sp
 from short_period import TRUTH, short_period
-from swashplate.errors import FlightError, IdentificationError
+from swashplate.errors import ExportError, FlightError, IdentificationError
 from swashplate.flights.flight import Flight, stream
 from swashplate.identification.recursive.tracked import stream_of
 
@@ -62,6 +62,11 @@ def test_gusts_that_bias_are_told() -> None:
     assert calm.followed[0].notes == ()
     assert "bias the coefficients" in rough.followed[0].notes[0]
     assert "bias the coefficients" in repr(rough)
+    told = sp.track(flight_of(short_period(900, gust=0.8)), EQUATION, held=["servo_pitch"], instruments=["servo_pitch"])
+    assert told.followed[0].notes == ()
+    assert told.to_document()["followed"][0]["instruments"] == ("servo_pitch",)
+    with pytest.raises(ExportError, match="instruments: are for Python only"):
+        told.code()
 
 
 def test_slower_streams_keep_their_last_value_and_grow_stale() -> None:
@@ -90,6 +95,7 @@ def test_models_give_their_equations_and_renamed_channels_are_found() -> None:
         ("q_dot = Ma*alpha", {}, FlightError),
         ("q_dot = Mq*q", {"delays": {"alpha": 0.1}}, IdentificationError),
         ("q_dot = Mq*q", {"held": ["servo_pich"]}, IdentificationError),
+        ("q_dot = Mq*q", {"instruments": ["servo_pich"]}, IdentificationError),
         ("q_dot = Mq*q", {"rate": 2.0}, IdentificationError),
         ([], {}, IdentificationError),
     ],

@@ -11,6 +11,7 @@ import pytest
 from heli_autopilot import Gains, HeliAutopilot, read_line, servo_packet
 from link_bench import Bench, bench
 from swashplate.errors import SwashError
+from swashplate.links.estimating import Estimating
 from swashplate.models.catalogue import vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.sensors import InertialUnit
@@ -304,13 +305,20 @@ def test_wind_battery_and_noise_are_told() -> None:
 
 
 def test_the_coax_lifts_off_and_lands() -> None:
-    """Motors by a height loop, through the outputs of ArduPilot's coaxial frame; its own damping does the rest."""
-    at = bench("coax")
+    """Motors by a height loop, through the outputs of ArduPilot's coaxial frame; its own damping does the rest.
+
+    What is estimated beside it counts in the air only, and finds the mass from a model that is a tenth too light.
+    """
+    estimating = Estimating(vehicle("coax").with_values({"mass": 0.272}), ["mass"], rate=100.0)
+    at = bench("coax", estimating=estimating)
+    before = estimating.known
     lift, heights = 0.0, []
     for count in range(400 * 6):
         told = json.loads(at.send(servo_packet(400, count, pulses_of(lift))) or b"")
         height, climb, turn = -told["position"][2], -told["velocity"][2], told["imu"]["gyro"][2]
         heights.append(height)
+        if at.plant.time < 0.5:
+            assert estimating.known is before
         wanted = 0.3 if count < 400 * 4 else -0.2
         lift = min(0.9, max(0.0, 0.545 + 0.25 * (wanted - height) - 0.25 * climb)) if count > 200 else 0.0
         if count >= 400 * 5 and height < 0.02:
@@ -319,6 +327,10 @@ def test_the_coax_lifts_off_and_lands() -> None:
         pulses_of.yaw = at_yaw  # type: ignore[attr-defined]
     assert max(heights) > 0.15
     assert abs(heights[-1]) < 0.01
+    (mass,) = estimating.known
+    assert mass.value is not None
+    assert mass.sigma is not None
+    assert abs(mass.value - 0.302) < 3.0 * mass.sigma < 0.03
     assert not at.plant.broken
 
 

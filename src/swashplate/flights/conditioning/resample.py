@@ -76,7 +76,7 @@ def common(one: list[Interval], other: list[Interval]) -> list[Interval]:
     return sorted((start, stop) for start, stop in pieces if stop > start)
 
 
-def _between(time: Array, values: Array, grid: Array, method: str) -> Array:
+def values_at(time: Array, values: Array, grid: Array, method: str) -> Array:
     """Samples of an unbroken run at the times `grid`.
 
     A quintic spline keeps a sine of a third of the sample rate within 0.2 dB (lines: 3 dB; Unser 1999, box 2).
@@ -114,7 +114,7 @@ def _at(data: xr.Dataset, grid: Array, method: str, *, max_gap: float) -> dict[s
             )
         # NED yaw and roll wrap at half a turn; an interpolation across the wrap would invent a fast turn.
         smooth = np.unwrap(samples) if name in ("phi", "psi") else samples
-        out[name] = _between(time, smooth, grid, method)
+        out[name] = values_at(time, smooth, grid, method)
     return out
 
 

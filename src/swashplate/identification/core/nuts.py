@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,20 +17,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from blackjax.adaptation.step_size import dual_averaging_adaptation
-from blackjax.diagnostics import effective_sample_size, potential_scale_reduction
 from blackjax.mcmc.hmc import HMCState
 
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
 from swashplate.identification.core.scoring import TracedCost
+from swashplate.identification.core.whitened import Chains, unbent, whitening
 from swashplate.simulation.dynamics import enable_double_precision
 
 Density = Callable[[Any, Any, Any], Any]
 Target = tuple[Density, Hashable, Mapping[str, Any]]
-_NEAR = 8.0
-"""Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
-_INSIDE = 0.5
-"""Sigmas that the bent scale's middle keeps from a bound on which the optimum lies."""
 _ACCEPTED = 0.8
 """Mean acceptance that the step is chosen for (Stan's)."""
 _FIRST_STEP = 0.4
@@ -39,28 +34,6 @@ _SETTLING = 20
 """Draws that a chain drops which takes the step that another has found."""
 _DOUBLINGS = 8
 _STATS = ("lp", "diverging", "energy", "tree_depth", "n_steps", "acceptance_rate")
-
-
-@dataclass(frozen=True)
-class Chains:
-    """What the sampler found: scaled rows (chains, draws, p), statistics (chains, draws) each, steps (chains,)."""
-
-    rows: Array
-    stats: Mapping[str, Array]
-    step: Array
-
-
-def split_rhat(draws: Array) -> Array:
-    """Split-R-hat of every number, (p,): chains cut in halves, against one another. Draws (chains, draws, p)."""
-    half = draws.shape[1] // 2
-    split = np.concatenate([draws[:, :half], draws[:, -half:]])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(potential_scale_reduction(jnp.asarray(split)), dtype=np.float64)
-
-
-def effective(draws: Array) -> Array:
-    """Effective number of draws of every number, (p,), of draws (chains, draws, p)."""
-    return np.asarray(effective_sample_size(jnp.asarray(draws)), dtype=np.float64)
 
 
 def sample(
@@ -163,58 +136,12 @@ def _drawn(
 def _prepared(traced: TracedCost, row: Row, optimum: Array, covariance: Array) -> dict[str, Any]:
     """The arrays that the density needs, those of the likelihood among them."""
     enable_double_precision()
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    low, high = row.bounds()
-    middle = np.minimum(np.maximum(optimum, low + _INSIDE * sigma), high - _INSIDE * sigma)
-    tight = ~(low < middle) | ~(middle < high)
-    middle = np.where(tight, 0.5 * (np.where(tight, low, 0.0) + np.where(tight, high, 0.0)), middle)
-    below, above = middle - low < _NEAR * sigma, high - middle < _NEAR * sigma
-    values, vectors = np.linalg.eigh(covariance / np.outer(sigma, sigma))
-    root = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    numbers = {
-        "middle": middle,
-        "low": low,
-        "high": high,
-        "gap_low": np.where(below, middle - low, 1.0),
-        "gap_high": np.where(above, high - middle, 1.0),
-        "below": below,
-        "above": above,
-        "root": root,
-        "mean": row.column("mean") / row.scale,
-        "prior": row.prior_information,
-    }
+    numbers = whitening(row, optimum, covariance)
     return {"likelihood": traced.data, **{name: jnp.asarray(value) for name, value in numbers.items()}}
 
 
-def _unbent(data: Mapping[str, Any], z: jax.Array) -> tuple[Any, Any]:
-    """The scaled row of whitened numbers, and the logarithm of what the bent scales stretch.
-
-    A scale with a near bound is bent so that the bound lies at infinity: exponential for one bound, logistic for two;
-    at the middle its slope is one.
-    """
-    away = data["root"] @ z
-    a, b = data["gap_low"], data["gap_high"]
-    up, down = jnp.exp(away / a), jnp.exp(-away / b)
-    both = data["below"] & data["above"]
-    width, share = a + b, a / (a + b)
-    steep = width / (a * b)
-    place = jnp.log(a / b) + steep * away
-    value = jnp.where(
-        both,
-        data["low"] + width * jax.nn.sigmoid(place),
-        jnp.where(
-            data["below"],
-            data["low"] + a * up,
-            jnp.where(data["above"], data["high"] - b * down, data["middle"] + away),
-        ),
-    )
-    logistic = jax.nn.log_sigmoid(place) + jax.nn.log_sigmoid(-place) - jnp.log(share * (1.0 - share))
-    stretch = jnp.where(both, logistic, jnp.where(data["below"], away / a, jnp.where(data["above"], -away / b, 0.0)))
-    return value, stretch.sum()
-
-
 def _density(function: Density, plan: Hashable, data: Mapping[str, Any], z: jax.Array) -> Any:
-    row, stretch = _unbent(data, z)
+    row, stretch = unbent(data, z, jnp)
     away = row - data["mean"]
     total = -function(plan, data["likelihood"], row) - 0.5 * away @ data["prior"] @ away + stretch
     allowed = jnp.all((row >= data["low"]) & (row <= data["high"]))
@@ -248,4 +175,4 @@ def _step(
         info.acceptance_rate,
     )
     stats = jnp.stack([jnp.asarray(value, dtype=following.logdensity.dtype) for value in told])
-    return following, _unbent(data, following.position)[0], stats
+    return following, unbent(data, following.position, jnp)[0], stats

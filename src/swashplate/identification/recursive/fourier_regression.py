@@ -52,6 +52,7 @@ class RegressionPlan:
         first, last: the lines, in multiples of the spacing.
         memory: time constant after which a sample counts e times less [s]; infinite: nothing is forgotten.
         held: channels that stay what they are until the next sample, such as commands; the others are smooth.
+        instruments: channels that gusts do not move (commands without feedback); empty for plain least squares.
     """
 
     equation: RegressionEquation
@@ -61,6 +62,7 @@ class RegressionPlan:
     last: int
     memory: float
     held: tuple[str, ...]
+    instruments: tuple[str, ...] = ()
 
     @property
     def hertz(self) -> Array:
@@ -104,6 +106,7 @@ def regression_plan(
     spacing: float | None = None,
     memory: float | None = None,
     held: Sequence[str] = (),
+    instruments: Sequence[str] = (),
 ) -> RegressionPlan:
     """What a recursive regression works with.
 
@@ -114,6 +117,7 @@ def regression_plan(
         spacing: of the lines [Hz]; a 25th of the band's upper end where None.
         memory: time constant of forgetting [s]; None: nothing is forgotten.
         held: channels that are held between samples.
+        instruments: channels that gusts do not move, for an estimate that strong gusts do not bias.
 
     Raises:
         IdentificationError: a band beyond a fifth of the rate, or too few lines; an unknown channel; no memory.
@@ -135,12 +139,23 @@ def regression_plan(
         )
     if memory is not None and not 10.0 / rate <= memory < np.inf:
         raise IdentificationError(f"is {memory} s, expected {10.0 / rate:g} or more.", channel="memory")
-    strange = [name for name in (*held, *equation.delays) if name not in equation.channels]
+    strange = [name for name in (*held, *instruments, *equation.delays) if name not in equation.channels]
     if strange:
         raise IdentificationError(f"does not stand in '{equation.text}'.", channel=strange[0])
     if equation.left in held and equation.derivative:
         raise IdentificationError("is differentiated: it cannot be held.", channel=equation.left)
-    return RegressionPlan(equation, 1.0 / rate, wide, first, last, np.inf if memory is None else memory, tuple(held))
+    if equation.left in instruments:
+        raise IdentificationError("is what is to be explained: no instrument.", channel=equation.left)
+    return RegressionPlan(
+        equation,
+        1.0 / rate,
+        wide,
+        first,
+        last,
+        np.inf if memory is None else memory,
+        tuple(held),
+        tuple(dict.fromkeys(instruments)),
+    )
 
 
 @dataclass
@@ -210,7 +225,7 @@ class RecursiveRegression:
     def estimate(self) -> EquationError | None:
         """The coefficients as they are known now; None while the stream does not tell them apart."""
         left, right = self.rows()
-        solved = _solved(left, right, self.window, self.plan)
+        solved = _solved(left, right, self.window, self.plan, self._moved_by_instruments(right))
         if solved is None:
             return None
         values, covariance, residual = solved
@@ -224,6 +239,25 @@ class RecursiveRegression:
             float(np.sqrt(power / len(left) / length)),
             covariance=covariance,
         )
+
+    def _moved_by_instruments(self, right: Complex) -> Complex:
+        """What the instruments have moved of the right side's columns: all of them where there are none.
+
+        A column answers an instrument as a transfer function of low order does, and as nothing that gusts have done.
+        """
+        plan, e = self.plan, self.plan.equation
+        if not plan.instruments:
+            return right
+        jw, corner = 2j * np.pi * plan.hertz, 2.0 * np.pi * np.sqrt(plan.hertz[0] * plan.hertz[-1])
+        shapes = np.array([np.ones_like(jw), jw, 1.0 / jw, 1.0 / (jw + corner), 1.0 / (jw + corner) ** 2])
+        places = [e.channels.index(name) for name in plan.instruments]
+        columns = [shape * self.sums[k] * plan.factors[k] for k in places for shape in shapes]
+        basis = np.column_stack([*columns, plan.hold * self.sums[-2]])
+        size = np.linalg.norm(basis, axis=0)
+        stacked = np.vstack([basis.real, basis.imag])[:, size > 0.0] / size[size > 0.0]
+        told = np.vstack([right.real, right.imag])
+        found = stacked @ np.linalg.lstsq(stacked, told, rcond=None)[0]
+        return np.asarray(found[: len(right)] + 1j * found[len(right) :])
 
     def rows(self) -> tuple[Complex, Complex]:
         """Left side (lines) and right side (lines, unknowns) of the complex equations."""
@@ -240,11 +274,14 @@ class RecursiveRegression:
 
 
 def _solved(
-    left: Complex, right: Complex, window: Complex, plan: RegressionPlan
+    left: Complex, right: Complex, window: Complex, plan: RegressionPlan, moved: Complex
 ) -> tuple[Array, Array, Complex] | None:
-    """Coefficients, their covariance and the residuals; None where they cannot be told apart."""
+    """Coefficients, their covariance and the residuals; None where they cannot be told apart.
+
+    In two stages where `moved` is what instruments have moved of the right side (Söderström and Stoica 1983).
+    """
     n, k = right.shape
-    gram = (right.conj().T @ right).real
+    gram = (moved.conj().T @ moved).real
     size = np.sqrt(np.diag(gram))
     length = float(window[0].real)
     if length <= 0.0 or not np.all(size > 0.0):
@@ -255,7 +292,7 @@ def _solved(
         return None
     inverse = np.linalg.inv(lower)
     inverse = inverse.T @ inverse
-    values = inverse @ ((right.conj().T @ left).real / size) / size
+    values = inverse @ ((moved.conj().T @ left).real / size) / size
     residual = left - right @ values
     line = np.arange(n)
     lines = n * n * length * length / float(np.sum(np.abs(window[np.abs(line[:, None] - line)]) ** 2))
@@ -263,7 +300,7 @@ def _solved(
     if freedom <= LEAST_FREEDOM:
         return None
     near = np.maximum(0.0, 1.0 - np.abs(line[:, None] - line) / (plan.around + 1.0))
-    scaled = right / size
+    scaled = moved / size
     # What the coefficients have taken of a line's two numbers, of which neighbours share some.
     taken = np.sum((scaled.conj() @ inverse * scaled).real, axis=1) * n / (2.0 * lines)
     left_over = np.maximum(LEAST_LEFT, 1.0 - taken)

@@ -76,8 +76,9 @@ def slow_plan(
         unknown: parameters to estimate.
         sensors: what is read; delays of sensors are not for this filter.
         rate: samples per second [Hz]; every sensor is read at each.
-        spread: standard deviation of each at the start, as a share of its value.
-        wander: by how much of its value each may wander in a second (standard deviation; grows with the root of time).
+        spread: standard deviation of each at the start, as a share of its value; of a number about zero, such as an
+            angle, of what its fits take for a change that matters.
+        wander: by how much of that each may wander in a second (standard deviation; grows with the root of time).
         delays: of the inputs [s]; the card's where None.
         unrest: what disturbs the vehicle; what the card's identification learnt where None.
         voltage: of the trim [V].
@@ -88,11 +89,7 @@ def slow_plan(
     """
     enable_double_precision()
     values = dict(zip(vehicle.parameter_names, vehicle.values(), strict=True))
-    for name in unknown:
-        if name not in values:
-            raise IdentificationError("is no parameter of it.", where=vehicle.name, channel=name)
-        if float(values[name]) == 0.0:
-            raise IdentificationError("is zero: no share of it can be unknown.", where=vehicle.name, channel=name)
+    size = _sizes(vehicle, unknown, values)
     if not unknown or len(set(unknown)) < len(unknown):
         raise IdentificationError(f"are {list(unknown)}, expected some, each once.", channel="unknown")
     if not (0.0 < spread < np.inf and 0.0 <= wander < np.inf):
@@ -110,11 +107,23 @@ def slow_plan(
     mean, variance = np.zeros((len(plan.names), 1)), observer.start_variance(plan, chosen)
     mean[: plan.n, 0] = about.state
     made = SlowPlan(plan, numbers, ObserverEstimate(mean, np.diag(variance)), about)
-    size = np.abs([float(values[name]) for name in unknown])
     mean[made.places, 0] = [float(values[name]) for name in unknown]
     process[made.places] = (wander * size) ** 2 * plan.dt
     variance[made.places] = (spread * size) ** 2
     return SlowPlan(plan, numbers, ObserverEstimate(mean, np.diag(variance)), about)
+
+
+def _sizes(vehicle: Vehicle, unknown: Sequence[str], values: Mapping[str, Any]) -> Array:
+    """What a share of each parameter is a share of."""
+    scale = {free.name: free.scale for choice in vehicle.choices.values() for free in choice.free}
+    found = []
+    for name in unknown:
+        if name not in values:
+            raise IdentificationError("is no parameter of it.", where=vehicle.name, channel=name)
+        found.append(max(abs(float(values[name])), scale.get(name, 0.0)))
+        if found[-1] == 0.0:
+            raise IdentificationError("is zero: no share of it can be unknown.", where=vehicle.name, channel=name)
+    return np.array(found)
 
 
 @dataclass

@@ -103,10 +103,11 @@ def tracked(
 
     found = _watched(step, regression.estimate, time, plan.dt, len(e.names), every)
     final, notes = found[3], []
-    if final is not None and final.determination < _EXPLAINED:
+    if final is not None and final.determination < _EXPLAINED and not plan.instruments:
         notes.append(
             f"{100.0 * (1.0 - final.determination):.0f} % of the left side's power is left over: gusts this strong, or "
-            "a term that is missing, bias the coefficients, and fewer than nine in ten lie within two standard errors."
+            "a term that is missing, bias the coefficients, and fewer than nine in ten lie within two standard errors. "
+            "Name as instruments the commands that no controller gives: gusts then do not bias."
         )
     return Tracked(e.text, e.names, coefficients, plan, *found, notes=tuple(notes))
 

@@ -104,7 +104,7 @@ def identify_flight(
     parameters, problems = estimates_of(found, vehicle)
     noise = likelihood.noise_of(row)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
-    if noise is not None:  # else residuals are weighed by their own size: nothing to compare
+    if noise is not None:  # output error fits starts to its commands: others lose
         apart = unrelated(lambda others: by.likelihood_of(table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
         air = moving_air(noise)

@@ -60,6 +60,7 @@ SCHEMA: Mapping[str, Mapping[str, Check]] = {
     "record": {"value": _switch},
     "identify": {"recording": _whole(1, 10_000), "how": _one_of(*HOWS)},
     "stop_identifying": {},
+    "learn": {},
 }
 """Fields and their checks by type; a message has exactly these and its `type`."""
 

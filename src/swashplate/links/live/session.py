@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 
 from swashplate.errors import SwashError
 from swashplate.flights.maneuvers.series import Maneuver
+from swashplate.links.estimating import Estimating
 from swashplate.links.live.axes import STICKS
 from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
@@ -48,12 +50,23 @@ class LiveSession:
         vehicle: what flies.
         controller: a designed controller, or None.
         folder: where recordings and results go; made with the first one.
+        estimate: parameters and equations that are estimated in flight (`Estimating`).
+        model: what the pilot's law is made for and estimates begin with; the vehicle where None.
     """
 
-    def __init__(self, vehicle: Vehicle, *, controller: Controller | None, folder: Path) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        *,
+        controller: Controller | None,
+        folder: Path,
+        estimate: Sequence[str] = (),
+        model: Vehicle | None = None,
+    ) -> None:
         self.folder, self._controller = folder, controller
+        self._estimate, self._model = tuple(estimate), model
         self.lock = threading.Lock()
-        self.world, self._pose = self._make(vehicle)
+        self.world, self._pose, self.estimating = self._make(vehicle)
         self.version = 1
         self.speed = 1.0
         self.clock = Clock(self._step, period=self.world.period, lock=self.lock)
@@ -64,14 +77,32 @@ class LiveSession:
         self._wanted_to_run = True
         self._watched = -1, ""
 
-    def _make(self, vehicle: Vehicle) -> tuple[World, Pose]:
-        world = World(vehicle, controller=self._controller)
+    def _make(self, vehicle: Vehicle) -> tuple[World, Pose, Estimating | None]:
+        world = World(vehicle, controller=self._controller, believed=self._believed(vehicle))
         world.step()  # compiles, so that the first second of flight does not
         world.reset()
-        return world, pose_of(vehicle)
+        return world, pose_of(vehicle), self._estimator(vehicle, world) if self._estimate else None
+
+    def _estimator(self, vehicle: Vehicle, world: World) -> Estimating:
+        late = dict(zip(vehicle.input_names, world.delays.tolist(), strict=True))
+        return Estimating(self._believed(vehicle), self._estimate, rate=1.0 / world.period, delays=late)
+
+    def _believed(self, vehicle: Vehicle) -> Vehicle:
+        """The pilot's model of a vehicle, with the options that the page has switched since."""
+        same = self._model is None or self._model.card.options == vehicle.card.options
+        return (self._model or vehicle) if same else from_card(replace(self._model.card, options=vehicle.card.options))
 
     def _step(self) -> None:
-        self.world.step()
+        world, estimating = self.world, self.estimating
+        ticks = world.ticks
+        world.step()
+        if estimating is None or world.ticks == ticks:
+            return
+        if ticks == 0:
+            estimating.pause()
+        n, m = len(world.vehicle.state_names), len(world.vehicle.input_names)
+        row = world.latest
+        estimating.step(world.period, row[:n], row[n : n + m], float(row[-1]))
 
     # ---- life --------------------------------------------------------------------------------------------------
     def watched(self, count: int) -> None:
@@ -111,6 +142,8 @@ class LiveSession:
             self._identify(message["recording"], message["how"])
         elif kind == "stop_identifying":
             self.identifying.stop()
+        elif kind == "learn":
+            await self._learn()
         elif kind == "reset":
             await self._record(False)
             with self.lock:
@@ -122,7 +155,7 @@ class LiveSession:
             self._wanted_to_run = False
             self.clock.go(False)
             with self.lock:
-                self.world.step()
+                self._step()
         elif kind == "speed":
             self.speed = float(message["value"])
             self.clock.period = self.world.period / self.speed
@@ -160,6 +193,18 @@ class LiveSession:
             return Maneuver("sweep", (moved,), _SWEEP_SECONDS, amplitude, _SWEEP_BAND)
         return Maneuver(kind, (moved,), _UNIT_SECONDS * {"doublet": 2, "3211": 7}[kind], amplitude)
 
+    async def _learn(self) -> None:
+        """Fly on by a law for the parameters as they are estimated now."""
+        estimating = self.estimating
+        known = () if estimating is None else estimating.known
+        told = {k.name: k.value for k in known if k.model is not None and k.value is not None}
+        if estimating is None or not told:
+            raise SwashError("No parameter is estimated yet: start with --estimate, and fly.")
+        law = await asyncio.to_thread(self.world.law_for, estimating.model.with_values(told))
+        with self.lock:
+            self.world.pilot = law
+        self.notice = f"The law now takes {', '.join(f'{name} = {value:.4g}' for name, value in told.items())}."
+
     async def _set_bar(self, on: bool) -> None:
         if "bar" not in self.world.vehicle.traits.switches:
             raise SwashError("This model has no bar to put on or off.")
@@ -171,10 +216,10 @@ class LiveSession:
         ran = self.clock.runs
         self.clock.go(False)  # compiling takes seconds in which no step would be on time
         try:
-            world, pose = await asyncio.to_thread(self._make, vehicle)
+            world, pose, estimating = await asyncio.to_thread(self._make, vehicle)
             with self.lock:
                 world.keep_setting(self.world)
-                self.world, self._pose = world, pose
+                self.world, self._pose, self.estimating = world, pose, estimating
             self.version += 1
         finally:
             self.clock.go(ran)
@@ -221,6 +266,8 @@ class LiveSession:
             "voltages": None if world.nominal_voltage is None else _voltages(world.nominal_voltage),
             "rate": 1.0 / world.period,
             "folder": str(self.folder),
+            "estimates": [[k.name, k.unit] for k in self.estimating.known] if self.estimating else [],
+            "learns": any(k.model is not None for k in self.estimating.known) if self.estimating else False,
         }
 
     def _monitor(self) -> str:
@@ -237,6 +284,7 @@ class LiveSession:
             now, setting, left = self.world.moment(), self.world.setting, self.world.maneuver_left
             recorded = None if self.world.rows is None else len(self.world.rows) * self.world.period
             around, pose, vehicle = self.world.environment(), self._pose, self.world.vehicle
+            estimating = self.estimating
             runs = self.clock.runs  # with the time that stands still, where it does
         crafts = {}
         for name, (x, u) in now.crafts.items():
@@ -263,6 +311,8 @@ class LiveSession:
             "recording": None if recorded is None else round(recorded, 1),
             "recordings": [[r.number, round(r.seconds, 1)] for r in self.recordings],
             "job": None if job is None else _told(job),
+            "frozen": "" if estimating is None else estimating.frozen,
+            "estimates": [] if estimating is None else [[k.value, k.sigma, k.model] for k in estimating.known],
             "setting": {
                 "mode": setting.mode,
                 "decoupled": setting.decoupled,

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError, SwashError
 from swashplate.flights.maneuvers.series import Maneuver
-from swashplate.links.live.axes import STICKS
+from swashplate.links.live.flown import Craft, Moment, Setting
 from swashplate.links.live.picture import picture
 from swashplate.links.live.pilots import WANTED, Mode, Pilot, pilot
 from swashplate.links.live.recording import LONGEST
@@ -95,61 +94,24 @@ def advance(
     return rk4_steps(lambda y, w: rates(y, w, p), y, acting, dt, substeps), past, memory, inputs
 
 
-@dataclass
-class Craft:
-    """One flying copy: state row, inputs on their way, controller memory, the inputs it last got."""
-
-    x: Array
-    past: Array
-    memory: Array
-    inputs: Array
-
-
-@dataclass(frozen=True)
-class Moment:
-    """What is flown at one instant; never changed, so that another thread may read it.
-
-    Attributes:
-        time: of the simulation [s].
-        crafts: state and input rows by name ("own", "ghost").
-        around: wind and voltage, the row of `SURROUNDINGS`.
-        target: the place, height and heading that are held (x, y, z, psi).
-        stick_number: number of the last stick message that is in it.
-        trouble: why it stands still, "" where it flies.
-    """
-
-    time: float
-    crafts: dict[str, tuple[Array, Array]]
-    around: Array
-    target: Array
-    stick_number: int
-    trouble: str
-
-
-@dataclass
-class Setting:
-    """What the page's switches and sliders say."""
-
-    mode: Mode = "attitude"
-    decoupled: bool = True
-    ghost: bool = False
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    gusts: float = 0.0
-    voltage: float = 0.0
-    sticks: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STICKS, 0.0))
-    stick_number: int = 0
-
-
 class World:
     """Everything that moves. Not for several threads at once.
 
     Args:
         vehicle: what flies.
         controller: a designed controller, or None for the default ones.
+        believed: what the pilot's law is made for; the vehicle where None.
         seed: of the gusts.
     """
 
-    def __init__(self, vehicle: Vehicle, *, controller: Controller | None = None, seed: int = 0) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        *,
+        controller: Controller | None = None,
+        believed: Vehicle | None = None,
+        seed: int = 0,
+    ) -> None:
         enable_double_precision()
         self.vehicle = vehicle
         self._linear = vehicle.traits.linear
@@ -158,12 +120,13 @@ class World:
         around = environment_of(vehicle)
         self.start_height = max(2.0, 8.0 * picture(vehicle)["size"])
         self.trim: Trim = find_trim(vehicle, height=self.start_height, environment=around)
-        self.pilot: Pilot = pilot(vehicle, self.trim, controller=controller)
+        self._environment, self._seed, self._controller = around, seed, controller
+        self.pilot: Pilot = self.law_for(believed or vehicle)
         self.setting = Setting(voltage=float(around.voltage))
         if self.setting.mode not in self.pilot.modes:
             self.setting.mode = self.pilot.modes[-1]
         self.rows: list[Array] | None = None
-        self._environment, self._seed = around, seed
+        self.latest = np.empty(0)
         # A linear model's angles are small ones, and their rates its own.
         self._equations = equations_of(vehicle if self._linear else tumbling(vehicle))
         self._p = parameter_row(vehicle, around)
@@ -172,9 +135,21 @@ class World:
         self._rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
         self._substeps = round(self._rate / self.pilot.rate)
         self.period = self._substeps / self._rate
-        self._back = _steps_back(vehicle, self._substeps, self.pilot.delays, self._rate)
+        self.delays = _delays(vehicle, self.pilot.delays)
+        waits = np.round(self.delays * self._rate).astype(np.int_)
+        # How many controller steps ago the input was given that acts in a substep, (substeps, n_inputs).
+        self._back = np.maximum(0, -((np.arange(self._substeps)[:, None] - waits) // self._substeps))
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
+
+    def law_for(self, vehicle: Vehicle) -> Pilot:
+        """The pilot's law, made for the numbers of some vehicle of the same kind.
+
+        Raises:
+            SwashError: where it has no hover, or the controller is for another vehicle.
+        """
+        about = find_trim(vehicle, height=self.start_height, environment=self._environment)
+        return pilot(vehicle, about, controller=self._controller)
 
     # ---- what the pilot does -----------------------------------------------------------------------------------
     def reset(self) -> None:
@@ -272,8 +247,9 @@ class World:
         self._check(own, before)
         if self.trouble:
             return
+        self.latest = np.concatenate([before, own.inputs, around])
         if self.rows is not None and len(self.rows) * self.period < LONGEST:
-            self.rows.append(np.concatenate([before, own.inputs, around]))
+            self.rows.append(self.latest)
         ghost = self._crafts.get("ghost")
         if ghost is not None and self._lost(ghost.x):
             self.set_ghost(False)
@@ -383,13 +359,12 @@ class World:
         self.reset()
 
 
-def _steps_back(vehicle: Vehicle, substeps: int, delays: Array | None, rate: float) -> NDArray[np.int_]:
-    """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
-    if delays is None:  # the page's own pilots are tuned without
-        late = input_delays(vehicle) if vehicle.traits.linear else {}
-        delays = np.array([late.get(name, 0.0) for name in vehicle.input_names])
-    waits = np.round(delays * rate).astype(np.int_)
-    return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
+def _delays(vehicle: Vehicle, delays: Array | None) -> Array:
+    """From command to actuator [s], by input."""
+    if delays is not None:
+        return np.asarray(delays, dtype=np.float64)
+    late = input_delays(vehicle) if vehicle.traits.linear else {}  # the page's own pilots are tuned without
+    return np.array([late.get(name, 0.0) for name in vehicle.input_names])
 
 
 def _leans_too_far(x: Array) -> bool:

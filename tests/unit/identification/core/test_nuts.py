@@ -13,6 +13,7 @@ import pytest
 from swashplate.identification.core import nuts
 from swashplate.identification.core.parameter_row import Entry, Row
 from swashplate.identification.core.scoring import TracedCost
+from swashplate.identification.core.whitened import effective, split_rhat, unbent
 
 WALL = 1.5
 """Sigmas from the mean to the lower bound of the second number."""
@@ -52,14 +53,14 @@ def test_the_draws_are_of_the_density_and_keep_its_bounds() -> None:
     exact = random.standard_normal((400_000, 2)) @ np.linalg.cholesky(TIED * np.outer(PLAN, PLAN)).T
     exact = exact[exact[:, 1] > -2.0 * WALL]
     flat = found.rows.reshape(-1, 3)
-    error = 4.0 / np.sqrt(nuts.effective(found.rows))  # four standard errors of a mean
+    error = 4.0 / np.sqrt(effective(found.rows))  # four standard errors of a mean
     assert np.all(np.abs(flat[:, :2].mean(axis=0) - exact.mean(axis=0)) < error[:2] * exact.std(axis=0))
     assert abs(flat[:, 2].mean() - 1.0) < error[2]
     np.testing.assert_allclose(flat.std(axis=0), [*exact.std(axis=0), 1.0], rtol=0.15)
     assert flat[:, 1].min() > -2.0 * WALL
     assert flat[:, 2].min() > 0.0
     assert found.stats["diverging"].mean() < 0.01
-    assert np.all(nuts.split_rhat(found.rows) < 1.02)
+    assert np.all(split_rhat(found.rows) < 1.02)
 
 
 def test_equal_seeds_give_equal_draws_whatever_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,10 +72,10 @@ def test_equal_seeds_give_equal_draws_whatever_the_threads(monkeypatch: pytest.M
 
 def test_chains_that_never_meet_are_told() -> None:
     apart = chains().rows + np.array([0.0, 0.5, 5.0])[:, None, None]
-    assert np.all(nuts.split_rhat(apart) > 1.05)
-    assert np.all(nuts.effective(apart) < nuts.effective(chains().rows))
+    assert np.all(split_rhat(apart) > 1.05)
+    assert np.all(effective(apart) < effective(chains().rows))
     drifting = chains().rows + np.linspace(0.0, 5.0, 800)[None, :, None]
-    assert np.all(nuts.split_rhat(drifting) > 1.05)  # only halves against halves can tell
+    assert np.all(split_rhat(drifting) > 1.05)  # only halves against halves can tell
 
 
 @pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (-1.0, np.inf), (-np.inf, 2.0), (-1.0, 2.0), (-0.1, 0.2)])
@@ -83,7 +84,7 @@ def test_the_stretch_of_a_bent_scale_is_its_slope(bounds: tuple[float, float]) -
     data = nuts._prepared(TracedCost(half_squares, (), {}), row, np.zeros(1), np.eye(1))
     for place in (-2.0, 0.0, 1.3):
         z = jnp.array([place])
-        (value,), stretch = nuts._unbent(data, z)
-        (slope,) = jax.jacfwd(lambda z: nuts._unbent(data, z)[0][0])(z)
+        (value,), stretch = unbent(data, z, jnp)
+        (slope,) = jax.jacfwd(lambda z: unbent(data, z, jnp)[0][0])(z)
         assert bounds[0] < value < bounds[1]
         np.testing.assert_allclose(stretch, np.log(slope), atol=1e-6)  # near one, 1 - sigmoid has few digits left

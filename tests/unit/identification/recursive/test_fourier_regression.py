@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,26 @@ def test_a_known_term_and_a_delay_count() -> None:
     assert found["Md"] == pytest.approx(-10.0, rel=0.03)
     assert abs(other["Md"] + 10.0) > 5.0 * abs(found["Md"] + 10.0)
     assert found.names == ("Mw", "Md", "bias")
+
+
+def test_instruments_take_out_what_gusts_do_to_the_regressors() -> None:
+    """Twelve flights in strong gusts: the damping is biased, unless the elevator is an instrument."""
+    e = regression_equation("q_dot = Mw*w + Mq*q + Md*elevator + bias")
+    asked: dict[str, Any] = {"rate": 100, "band": (0.1, 2.0), "spacing": 0.1, "held": ["elevator"]}
+    plans = [regression_plan(e, **asked), regression_plan(e, **asked, instruments=["elevator"])]
+    found = []
+    for seed in range(12):
+        running = [RecursiveRegression(plan) for plan in plans]
+        for row in short_period(600, gust=1.0, seed=seed):
+            for regression in running:
+                regression.step(0.01, row)
+        told = [regression.estimate() for regression in running]
+        found.append([(one["Mq"] - TRUTH["Mq"]) / one.sigmas[1] for one in told if one is not None])
+    plain, instrumented = np.mean(found, axis=0)
+    assert plain > 1.0
+    assert abs(instrumented) < 0.6
+    with pytest.raises(IdentificationError, match="q: is what is to be explained"):
+        regression_plan(e, **asked, instruments=["q"])
 
 
 def test_gaps_values_that_are_none_and_clocks_freeze_it() -> None:

@@ -53,6 +53,7 @@ VALID: list[dict[str, Any]] = [
     {"type": "record", "value": True},
     {"type": "identify", "recording": 1, "how": "model"},
     {"type": "stop_identifying"},
+    {"type": "learn"},
 ]
 
 
@@ -161,6 +162,30 @@ def test_a_page_is_greeted_and_told_what_flies(running: Running) -> None:
         last = moments(page, lambda m: m["t"] >= first["t"] + 1.0)
         assert last["steps"] > first["steps"]
         assert time.monotonic() - begin < 4.0
+
+
+def test_estimates_follow_the_flight_and_begin_anew_after_a_reset(tmp_path: Path) -> None:
+    model = sp.vehicle("coax")
+    flown = model.with_values({"mass": 0.36})
+    session = LiveSession(flown, controller=None, folder=tmp_path, estimate=["mass"], model=model)
+    assert session.hello()["estimates"] == [["mass", "kg"]]
+    assert session.moment()["estimates"] == [[None, None, 0.302]]
+    for _ in range(300):
+        session._step()
+    ((value, sigma, said),) = session.moment()["estimates"]
+    assert abs(value - 0.36) < 3.0 * sigma < 0.02
+    assert said == 0.302
+    unlearnt = session.world.pilot
+    asyncio.run(session.obey({"type": "learn"}))
+    learnt = session.world.pilot
+    assert session.moment()["notice"].startswith("The law now takes mass = 0.3")
+    assert not np.array_equal(learnt.gains["attitude", True], unlearnt.gains["attitude", True])
+    session.world.reset()
+    session._step()
+    assert session.moment()["frozen"] == "a clock that jumped"
+    session._step()
+    assert session.moment()["frozen"] == ""
+    session.close()
 
 
 def test_sticks_fly_and_a_lost_page_lets_them_go(running: Running) -> None:

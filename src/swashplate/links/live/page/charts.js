@@ -5,11 +5,25 @@ const DEG = 180 / Math.PI;
 const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
 const wrapped = (angle) => DEG * Math.atan2(Math.sin(angle), Math.cos(angle));
 
-export function panels(inputs, angle) {
+// One number that is estimated in flight: value, two standard errors to each side, and what the model says.
+const estimated = ([name, unit], i) => ({
+  title: name, unit: unit || "1", names: ["estimate", "low", "high", "model"], ghost: false, band: true,
+  caption: ([value, , high, model]) => [
+    value === null ? "not told yet" : `${value.toPrecision(4)} ± ${(high - value).toPrecision(2)}`, "", "",
+    model === null ? "" : model.toPrecision(4),
+  ],
+  read: (_, estimates) => {
+    const [value, sigma, model] = estimates[i];
+    return value === null ? [null, null, null, model] : [value, value - 2 * sigma, value + 2 * sigma, model];
+  },
+});
+
+export function panels(inputs, angle, estimates = []) {
   const body = (first, names, unit, shown) => ({
     names, unit, read: (craft) => names.map((_, i) => shown(craft.x[first + i])), ghost: true,
   });
   return [
+    ...estimates.map(estimated),
     { title: "Attitude", ...body(6, ["roll", "pitch", "heading"], "deg", angle) },
     { title: "Rates", ...body(9, ["p", "q", "r"], "deg/s", (v) => DEG * v) },
     { title: "Velocities", ...body(3, ["u", "v", "w"], "m/s", (v) => v) },
@@ -48,8 +62,9 @@ class Chart {
     head.append(title);
     this.values = panel.names.map((name, i) => {
       const label = document.createElement("span"), value = document.createElement("output");
-      label.style.color = COLORS[i];
+      label.style.color = COLORS[panel.band && i < 3 ? 0 : i];
       label.append(name, " ", value);
+      label.hidden = Boolean(panel.caption) && i > 0;
       head.append(label);
       return value;
     });
@@ -57,12 +72,14 @@ class Chart {
     this.box.append(head, this.canvas);
     home.append(this.box);
     const series = [{}], line = (i, dash) => ({ stroke: COLORS[i], width: dash ? 1 : 1.5, dash, points: { show: false } });
-    for (let i = 0; i < n; i++) series.push(line(i));
+    const dash = (i) => (!panel.band || i === 0 ? undefined : i === 3 ? [2, 3] : [6, 3]);
+    for (let i = 0; i < n; i++) series.push(line(panel.band && i < 3 ? 0 : i, dash(i)));
     if (panel.ghost) for (let i = 0; i < n; i++) series.push(line(i, [5, 4]));
     const axis = { stroke: "#444", font: "11px system-ui", grid: { stroke: "#e3e6e8" }, ticks: { show: false } };
     const make = () => new uPlot({
       width: 300, height: 110, legend: { show: false }, cursor: { show: false }, series,
-      scales: { x: { time: false }, y: { range: (_, low, high) => this.fixed ?? spread(low, high) } },
+      bands: panel.band ? [{ series: [3, 2], fill: `${COLORS[0]}2e` }] : [],
+      scales: { x: { time: false }, y: { range: (_, low, high) => this.fixed ?? spread(low, high, panel.band ? 1e-9 : 0.05) } },
       hooks: { draw: [(plot) => this.#mark(plot)] },
       axes: [{ ...axis, size: 22, space: 60 }, { ...axis, size: 46, space: 24 }],
     }, this.data, this.canvas);
@@ -81,25 +98,28 @@ class Chart {
     plot.ctx.fillRect(x, top, 1.5, height);
   }
   told(values) {
-    values.forEach((value, i) => {
-      const text = Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(2);
-      if (this.values[i].textContent !== text) this.values[i].textContent = text;
+    const plain = (value) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toFixed(2));
+    const texts = this.panel.caption?.(values) ?? values.map(plain);
+    texts.forEach((text, i) => {
+      if (this.values[i].textContent === text) return;
+      this.values[i].textContent = text;
+      this.values[i].parentElement.hidden = !text;
     });
   }
 }
 
-function spread(low, high) {
+function spread(low, high, floor = 0.05) {
   if (low === null || high === null || !Number.isFinite(low + high)) return [-1, 1];
-  const least = 0.05 + 0.01 * Math.max(Math.abs(low), Math.abs(high)), middle = (low + high) / 2;
+  const least = floor + 0.01 * Math.max(Math.abs(low), Math.abs(high)), middle = (low + high) / 2;
   const half = Math.max((high - low) * 0.56, least);
   return [middle - half, middle + half];
 }
 
 export class Charts {
-  constructor(home, inputs, { seconds = 20, whole = false, plain = false } = {}) {
+  constructor(home, inputs, { seconds = 20, whole = false, plain = false, estimates = [] } = {}) {
     home.replaceChildren();
     this.seconds = seconds;
-    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped).map((panel) => new Chart(home, panel, plain));
+    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped, estimates).map((panel) => new Chart(home, panel, plain));
     this.pending = false;
     new ResizeObserver(() => this.charts.forEach((chart) => chart.resize())).observe(home);
   }
@@ -107,12 +127,12 @@ export class Charts {
     for (const { data } of this.charts) data.forEach((column) => (column.length = 0));
   }
   // One more sample at time t; drawn when `draw` is called.
-  add(t, own, ghost) {
+  add(t, own, ghost, estimates = []) {
     for (const chart of this.charts) {
       const { data, panel } = chart, n = panel.names.length;
       if (data[0].length && t <= data[0].at(-1)) continue;
       data[0].push(t);
-      panel.read(own).forEach((value, i) => data[1 + i].push(value));
+      panel.read(own, estimates).forEach((value, i) => data[1 + i].push(value));
       if (panel.ghost) {
         const values = ghost ? panel.read(ghost) : Array(n).fill(null);
         values.forEach((value, i) => data[1 + n + i].push(value));

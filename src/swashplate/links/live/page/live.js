@@ -32,7 +32,7 @@ function heard(message) {
     hello = message;
     $("title").textContent = hello.title;
     document.title = `${hello.title} · swash live`;
-    charts = new Charts($("charts"), hello.inputs, { plain: Boolean(scene?.software) });
+    charts = new Charts($("charts"), hello.inputs, { plain: Boolean(scene?.software), estimates: hello.estimates });
     scene?.show(hello.picture);
     panel.hello(hello);
     now = before = null;
@@ -52,7 +52,7 @@ function heard(message) {
     for (const old of underway.keys()) if (old <= now.stick) underway.delete(old);
   }
   if (!before || now.t > before.t) {
-    charts.add(now.t, now.own, now.ghost);
+    charts.add(now.t, now.own, now.ghost, now.estimates);
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
   }
   panel.now = now; // what buttons act on is never older than what was heard

@@ -43,6 +43,7 @@ export class Panel {
     $("faster").onclick = () => this.#faster(1);
     $("record").onclick = () => say("record", { value: this.now?.recording === null });
     $("identify").onclick = () => say("identify", { recording: Number($("which").value), how: $("how").value });
+    $("learn").onclick = () => say("learn");
     $("stop-identifying").onclick = () => say("stop_identifying");
   }
 
@@ -98,6 +99,7 @@ export class Panel {
     for (const name of ["decoupled", "ghost"]) $(name).parentElement.hidden = !hello.decoupling; // both would be alike
     for (const option of $("how").options) option.hidden = option.disabled = !hello.hows.includes(option.value);
     if (!hello.hows.includes($("how").value)) $("how").value = hello.hows[0];
+    $("learn-row").hidden = !hello.learns;
     $("about").hidden = !hello.about;
     $("about").textContent = hello.about;
     if (hello.voltages) [$("voltage").min, $("voltage").max] = hello.voltages;
@@ -138,6 +140,7 @@ export class Panel {
     const share = now.steps ? (100 * now.late) / now.steps : 0;
     const state = [
       `${now.t.toFixed(1)} s`, now.runs ? "" : "paused", `late ${share.toFixed(2)} %`, `busy ${(100 * now.busy).toFixed(0)} %`,
+      now.frozen ? `estimate stands still: ${now.frozen}` : "",
       latency === null ? "" : `stick ${latency.toFixed(0)} ms`,
     ];
     write($("state"), state.filter(Boolean).join(" · "));

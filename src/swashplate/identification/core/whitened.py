@@ -1,0 +1,123 @@
+"""Numbers in which a posterior is nearly a standard normal distribution, and whether chains of draws may be believed.
+
+The numbers of a fit are whitened by the inverse of information and priors at the optimum. A scale with a near bound is
+bent so that the bound lies at infinity: exponential for one bound, logistic for two; at the middle its slope is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.identification.core.parameter_row import Row
+
+_NEAR = 8.0
+"""Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
+_INSIDE = 0.5
+"""Sigmas that the bent scale's middle keeps from a bound on which the optimum lies."""
+
+
+@dataclass(frozen=True)
+class Chains:
+    """What a sampler found: scaled rows (chains, draws, p), statistics (chains, draws) each, steps (chains,)."""
+
+    rows: Array
+    stats: Mapping[str, Array]
+    step: Array
+
+
+def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
+    """The arrays that `unbent` and `log_prior` take.
+
+    Args:
+        row: entries, with bounds and priors. optimum: scaled row (p,).
+        covariance: inverse of information and priors there (p, p).
+    """
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    low, high = row.bounds()
+    middle = np.minimum(np.maximum(optimum, low + _INSIDE * sigma), high - _INSIDE * sigma)
+    tight = ~(low < middle) | ~(middle < high)
+    middle = np.where(tight, 0.5 * (np.where(tight, low, 0.0) + np.where(tight, high, 0.0)), middle)
+    below, above = middle - low < _NEAR * sigma, high - middle < _NEAR * sigma
+    values, vectors = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+    return {
+        "middle": middle,
+        "low": low,
+        "high": high,
+        "gap_low": np.where(below, middle - low, 1.0),
+        "gap_high": np.where(above, high - middle, 1.0),
+        "below": below,
+        "above": above,
+        "root": sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)),
+        "mean": row.column("mean") / row.scale,
+        "prior": row.prior_information,
+    }
+
+
+def unbent(data: Mapping[str, Any], z: Any, xp: Any) -> tuple[Any, Any]:
+    """The scaled row of whitened numbers, and the logarithm of what the bent scales stretch.
+
+    Args:
+        data: from `whitening`. z: whitened numbers (p,). xp: NumPy, or JAX's.
+    """
+    away = data["root"] @ z
+    a, b = data["gap_low"], data["gap_high"]
+    up, down = xp.exp(away / a), xp.exp(-away / b)
+    both = data["below"] & data["above"]
+    width, share = a + b, a / (a + b)
+    steep = width / (a * b)
+    place = xp.log(a / b) + steep * away
+    low, high = -xp.logaddexp(0.0, -place), -xp.logaddexp(0.0, place)  # of the logistic function and its rest
+    value = xp.where(
+        both,
+        data["low"] + width * xp.exp(low),
+        xp.where(
+            data["below"],
+            data["low"] + a * up,
+            xp.where(data["above"], data["high"] - b * down, data["middle"] + away),
+        ),
+    )
+    logistic = low + high - xp.log(share * (1.0 - share))
+    stretch = xp.where(both, logistic, xp.where(data["below"], away / a, xp.where(data["above"], -away / b, 0.0)))
+    return value, stretch.sum()
+
+
+def split_rhat(draws: Array) -> Array:
+    """Split-R-hat of every number, (p,): chains cut in halves, against one another (Gelman et al. 2013, sec. 11.4).
+
+    Args:
+        draws: shape (chains, draws, p).
+    """
+    half = draws.shape[1] // 2
+    split = np.concatenate([draws[:, :half], draws[:, -half:]])
+    within = split.var(axis=1, ddof=1).mean(axis=0)
+    between = half * split.mean(axis=1).var(axis=0, ddof=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt((half - 1.0) / half + between / (half * within)))
+
+
+def effective(draws: Array) -> Array:
+    """Effective number of draws of every number, (p,): Geyer's (1992) initial monotone sequence over all chains.
+
+    Args:
+        draws: shape (chains, draws, p).
+    """
+    m, n, p = draws.shape
+    centred = draws - draws.mean(axis=1, keepdims=True)
+    spectrum = np.fft.rfft(centred, 2 * n, axis=1)
+    lagged = np.fft.irfft(np.abs(spectrum) ** 2, axis=1)[:, :n].mean(axis=0) / n
+    within = lagged[0] * n / (n - 1.0)
+    total = within * (n - 1.0) / n + (draws.mean(axis=1).var(axis=0, ddof=1) if m > 1 else 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rho = 1.0 - (within - lagged * n / (n - 1.0)) / total
+    found = np.full(p, np.nan)
+    for i in np.flatnonzero(total > 0.0):
+        pairs = rho[: 2 * (n // 2), i].reshape(-1, 2).sum(axis=1)
+        positive = int(np.argmax(pairs < 0.0)) if np.any(pairs < 0.0) else pairs.size
+        tau = -1.0 + 2.0 * np.minimum.accumulate(pairs[:positive]).sum() if positive else 1.0
+        found[i] = m * n / max(tau, 1.0 / np.log10(m * n))  # Stan's limit for draws that repel each other
+    return found
