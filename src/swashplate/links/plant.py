@@ -123,7 +123,7 @@ class Plant:
         """Hold outputs [us] for `duration` [s]; a vehicle that broke stays where it is. Never anything but numbers."""
         inputs = self.mapping.inputs(pulses, duration)
         if self.estimating is not None and self.time >= self._estimated + self.estimating.dt - 1e-9:
-            self._estimate(self.estimating, inputs)
+            self._estimate(self.estimating, np.asarray(inputs))
         if not self.broken:
             try:
                 moved = self._stepping.advance(inputs, duration)

@@ -89,8 +89,10 @@ class LiveSession:
 
     def _believed(self, vehicle: Vehicle) -> Vehicle:
         """The pilot's model of a vehicle, with the options that the page has switched since."""
-        same = self._model is None or self._model.card.options == vehicle.card.options
-        return (self._model or vehicle) if same else from_card(replace(self._model.card, options=vehicle.card.options))
+        model, options = self._model, vehicle.card.options
+        if model is None or model.card.options == options:
+            return model or vehicle
+        return from_card(replace(model.card, options=options))
 
     def _step(self) -> None:
         world, estimating = self.world, self.estimating
