@@ -1,4 +1,4 @@
-"""4,096 vehicles at once on all cores, float64 and float32: their own C in lanes, and the same by `vmap` beside it."""
+"""4,096 vehicles at once on all cores, float64 and float32, as users fly them: their own C in lanes, and `vmap`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import time
 import numpy as np
 
 from benchmarks.timing import Result, best_rate
-from swashplate.export.batch_c import fly_in_c
+from swashplate.api.simulate_batch import Engine, simulate_batch
 from swashplate.models.catalogue import vehicle as load_vehicle
-from swashplate.simulation.batch import FlyBatch, fly_batch
-from swashplate.simulation.dynamics import SURROUNDINGS, equations_of, parameter_row
+from swashplate.simulation.batch import Precision
 from swashplate.simulation.trim import trim
 
 TARGETS = {"float64": 12e6, "float32": 25e6}
@@ -19,23 +18,23 @@ BY_JAX = {"float64": 0.8e6, "float32": 2.5e6}
 VEHICLES = 4096
 
 
-def batches(name: str, precision: str, *, steps: int, repeats: int, promised: bool = True) -> list[Result]:
-    """The batch that `simulate_batch` runs, in C and by `vmap`: one card, inputs alike, starts that differ."""
+def batches(name: str, precision: Precision, *, steps: int, repeats: int, promised: bool = True) -> list[Result]:
+    """`simulate_batch`, in C and by `vmap`: one card, inputs alike, starts that differ."""
     vehicle = load_vehicle(name)
     hover = trim(vehicle)
-    x = np.repeat(hover.state[:, None], VEHICLES, axis=1)
-    x[vehicle.index("p")] = np.linspace(-0.1, 0.1, VEHICLES)
-    row = np.array([*hover.inputs, *(getattr(hover.environment, name) for name in SURROUNDINGS)])
-    rows = np.tile(row[:, None], (steps + 1, 1, 1))
-    p = parameter_row(vehicle, hover.environment)[:, None]
-    arguments = tuple(np.asarray(values, precision) for values in (x, rows, p, 0.01))
+    start = {**hover.states(), "p": np.linspace(-0.1, 0.1, VEHICLES)}
+    inputs = {n: np.full(steps + 1, value) for n, value in zip(vehicle.input_names, hover.inputs, strict=True)}
     found = []
-    for fly, how, targets in ((fly_in_c, "own C in lanes", TARGETS), (fly_batch, "vmap", BY_JAX)):
+    engines: dict[Engine, tuple[str, dict[str, float]]] = {"c": ("own C in lanes", TARGETS), "jax": ("vmap", BY_JAX)}
+    for engine, (how, targets) in engines.items():
         seconds: list[float] = []
 
-        def run(fly: FlyBatch = fly, seconds: list[float] = seconds) -> None:
+        def run(engine: Engine = engine, seconds: list[float] = seconds) -> None:
             begin = time.process_time()
-            fly(equations_of(vehicle), *arguments, keep=steps, held=True)
+            simulate_batch(
+                vehicle, inputs, start=start, environment=hover.environment, keep=steps, precision=precision,
+                engine=engine,
+            )  # fmt: skip
             seconds.append(time.process_time() - begin)
 
         rate = best_rate(run, steps * VEHICLES, repeats=repeats)

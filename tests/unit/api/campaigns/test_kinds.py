@@ -236,7 +236,7 @@ def test_the_files_of_the_page_are_ones_that_their_kinds_take(tmp_path: Path) ->
         rows[made.of] = made.rows
     assert rows == {
         "monte-carlo": 100_000, "recovery": 200, "multi-start": 1000, "fleet": 1, "cross-validation": 3,
-        "bootstrap": 200, "sweep": 3 * 5 * 200,
+        "bootstrap": 200, "sweep": 3 * 6 * 200,
     }  # fmt: skip
     assert set(rows) == set(CAMPAIGNS), "every kind is shown"
 

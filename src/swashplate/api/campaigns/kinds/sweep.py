@@ -99,7 +99,8 @@ class SweepKind:
             parts.append(found)
             middles = [_middle(rows[name], unit, factor) for name, (unit, factor) in found.shown.items()]
             values = tuple(str(_plain(choice[name])) for name in names)
-            cells.append((*values, str(int(here.sum())), *(words for _, words, _ in found.summary), *middles))
+            told = (words.partition(" (")[0] for _, words, _ in found.summary)
+            cells.append((*values, str(int(here.sum())), *told, *middles))
             if found.counted in rows:
                 shares.append((choice, int(np.sum(rows[found.counted] == 1)), int(here.sum())))
         if not parts:
