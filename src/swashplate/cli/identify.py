@@ -69,6 +69,14 @@ def identify(
         ),
     ] = False,
     horizon: options.HorizonAhead = None,
+    residual: Annotated[
+        bool,
+        typer.Option(
+            "--residual",
+            help="Also fit accelerations that the equations lack, linear in motion and inputs, as far as blocks of the "
+            "flights that are left out speak for them; with --horizon to the errors ahead (for predictions only).",
+        ),
+    ] = False,
     close_loop: options.CloseLoop = "",
     posterior: Annotated[
         str | None,
@@ -110,6 +118,7 @@ def identify(
             for name, given in (
                 ("--prior CARD", prior_card is not None),
                 ("--horizon", horizon is not None),
+                ("--residual", residual),
                 ("--posterior", posterior is not None),
                 ("--wind", wind),
                 ("--keep-unexcited", keep_unexcited),
@@ -144,6 +153,7 @@ def identify(
             keep_unexcited=keep_unexcited,
             wind=wind,
             horizon=options.seconds_ahead(horizon),
+            residual=residual,
             close_loop=options.names(close_loop),
             posterior=posterior,
             **asked_for,

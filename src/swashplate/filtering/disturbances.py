@@ -26,6 +26,7 @@ class Noise(NamedTuple):
     [m/s^2 per sqrt(Hz)], `tau_*` [s], `sensor_*` per sample [m, rad]. `speed`: root mean square of each horizontal
     velocity that is flown [m/s], for the filter's gain alone. `wind` 0: none, and slopes are those at hover.
     `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces.
+    `sensor_rate` [rad/s]: of a gyroscope's readings, given and not estimated; 0: none is used.
     """
 
     white_tilt: Any = 0.5
@@ -49,7 +50,11 @@ class Noise(NamedTuple):
     drift_yaw: Any = 0.0
     tau_gust_vertical: Any = 0.0
     drift_vertical: Any = 0.0
+    sensor_rate: Any = 0.0
 
+
+GYROSCOPE = 0.04
+"""A gyroscope's noise [rad/s], given: what it shows above 8 Hz on real flights, most of it vibration."""
 
 SEPARATE: Mapping[str, tuple[str, float, float]] = {
     "tau_gust_yaw": ("tau_gust_moment", 0.5, 0.5),

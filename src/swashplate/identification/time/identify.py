@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -16,7 +17,7 @@ from swashplate.identification.core.delay_restarts import minimise_over_valleys
 from swashplate.identification.core.low_passed import noise_too_small, refuse_lowpassed, smoothed_outputs
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
-from swashplate.identification.core.records import POSE, Record, records
+from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Optimum, Progress, minimise
 from swashplate.identification.core.sources import sources_of
@@ -30,6 +31,7 @@ from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind
+from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -74,7 +76,6 @@ def identify_flight(
     """
     horizon = None if question.horizon is None else Horizon.of(question.horizon)
     free = "full" if question.free is None else question.free
-    outputs = POSE if question.outputs is None else question.outputs
     flights = [monitored(flight, vehicle) for flight in flights]
     enable_double_precision()
     enable_compilation_cache()
@@ -88,7 +89,7 @@ def identify_flight(
         priors=question.priors,
         prior_card=question.prior_card,
     )
-    pieces = _long_enough(records(flights, vehicle, outputs=outputs))
+    pieces = _long_enough(records(flights, vehicle, outputs=question.outputs))
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
     )
@@ -116,6 +117,16 @@ def identify_flight(
     identified = _identified(
         found, likelihood.noise_of(row), likelihood.nuisance_of(row), vehicle, parameters, pieces, method
     )
+    settings: dict[str, Any] = {}
+    if question.residual and not problems:
+        assert isinstance(likelihood, PredictionError)  # no other estimator takes a residual
+        nuisances = [Nuisance(*numbers.nuisance.tolist()) for numbers in likelihood.numbers(row)]
+        residual = fit_residual(identified, pieces, nuisances, likelihood.noise_of(row), horizon=horizon)
+        wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}
+        card = residual.vehicle.card
+        identified = residual.vehicle.with_card(replace(card, observer={**card.observer, **wanders}))
+        settings = {"residual": residual.told}
+        notes.append(residual.words)
     told = constants(found)
     if vehicle.traits.balance is not None:
         trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
@@ -155,7 +166,8 @@ def identify_flight(
             **({"constants of every record": [f.name for f in table.of_records]} if table.of_records else {}),
             **({"noise of its own": list(table.noises)} if table.noises else {}),
             **told_horizon(horizon),
-            "outputs": list(outputs),
+            **settings,
+            "outputs": list(pieces[0].output_names),
             "wind": question.wind,
             "rate": 1.0 / pieces[0].dt,
             "records": [piece.name for piece in pieces],
@@ -230,7 +242,7 @@ def _simplex(likelihood: FlightLikelihood, iterations: int, progress: Progress |
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
 PREDICTION_ERROR = FlightEstimator(
-    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon"}, _prediction_error, _scoring
+    "prediction-error", _TAKES | {"keep_unexcited", "wind", "horizon", "residual"}, _prediction_error, _scoring
 )
 OUTPUT_ERROR = FlightEstimator("output-error", _TAKES | {"keep_unexcited"}, _output_error, _scoring_together)
 NELDER_MEAD = FlightEstimator("nelder-mead", _TAKES | {"keep_unexcited"}, _output_error, _simplex)

@@ -15,9 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.filtering.disturbances import SEPARATE, Noise
+from swashplate.filtering.disturbances import GYROSCOPE, SEPARATE, Noise
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance, mean_nuisance
+from swashplate.flights.schema import RATES
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
@@ -134,7 +135,7 @@ class PredictionError:
     ) -> None:
         self.table = table
         self.pieces = tuple(pieces)
-        self.noise = _with_first_guesses(noise or Noise(), table.noises)
+        self.noise = _with_first_guesses(noise or Noise(), table.noises, pieces[0].output_names)
         windy = float(self.noise.wind) > 0.0
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, windy=windy)
@@ -350,13 +351,22 @@ def _by_covariance(dM: Array, n: int) -> Array:
 
 
 def _estimated(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
-    """The noise numbers that are estimated: the speed is given, the wind's and the separate ones only where wanted."""
-    left = {"speed", *(() if model.windy else _WIND), *(name for name in SEPARATE if not getattr(guess, name) > 0.0)}
+    """The noise numbers that are estimated: the speed and a gyroscope's noise are given, the wind's and
+    the separate ones only where wanted.
+
+    Tracked angles err for tenths of a second on end. To the likelihood such errors look like motion, and it would call
+    the gyroscope wrong that does not show them (found on flights of a Crazyflie: 0.17 rad/s instead of 0.04, and delays
+    and inertias to go with it).
+    """
+    left = {"speed", "sensor_rate", *(() if model.windy else _WIND)}
+    left |= {name for name in SEPARATE if not getattr(guess, name) > 0.0}
     return tuple(name for name in Noise._fields if name not in left)
 
 
-def _with_first_guesses(noise: Noise, separate: Sequence[str]) -> Noise:
-    """The noise with first guesses of what yaw or heave are to have for themselves."""
+def _with_first_guesses(noise: Noise, separate: Sequence[str], outputs: Sequence[str]) -> Noise:
+    """The noise with first guesses of what yaw or heave are to have for themselves, and that of a gyroscope in use."""
+    if set(RATES) & set(outputs) and not noise.sensor_rate > 0.0:
+        noise = noise._replace(sensor_rate=GYROSCOPE)
     return noise._replace(**{name: SEPARATE[name][1] for name in separate if not getattr(noise, name) > 0.0})
 
 
