@@ -4,7 +4,7 @@ Physics, noise, filtered states and the records' constants stay where the fit ha
 move, by Gauss-Newton from zero on what the fit itself made small: its innovations, or its errors some time ahead. Each
 is held towards zero (ridge: Hoerl and Kennard 1970), in units in which one makes an acceleration as large as the
 disturbance that the filter saw. How hard, says cross-validation over blocks of the training flights, and no residual is
-kept where its gain on blocks left out is not two standard errors above nothing. Nothing else is looked at.
+kept where its gain on blocks left out may be chance (Student's t, 97.5 %). Nothing else is looked at.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ FEWEST = 4
 STRENGTHS = np.geomspace(1e5, 1e-1, 25)
 """Of the ridge, from strong to weak."""
 
-_SURE = 2.0
-"""Standard errors by which the gain on blocks left out must exceed nothing."""
+_SURE = 0.975
+"""Quantile of Student's t that the gain on blocks left out must exceed, in standard errors: a few blocks tell these
+badly."""
 
 _FASTER = (1.0, 3.0, 10.0, 30.0)
 """By what the drifts' wandering is multiplied to make errors ahead small."""
@@ -333,6 +334,8 @@ def shrunk(told: Sequence[LeftOutBlock], strength: float) -> tuple[Array, Array]
 
 def chosen_strength(told: Sequence[LeftOutBlock]) -> tuple[float, float, float]:
     """Strength by blocks left out, what they gain, and its standard error; infinite where that is nothing."""
+    from scipy.stats import t as student
+
     gains = np.array(
         [
             [block.gain(shrunk([*told[:i], *told[i + 1 :]], strength)[0]) for i, block in enumerate(told)]
@@ -341,6 +344,6 @@ def chosen_strength(told: Sequence[LeftOutBlock]) -> tuple[float, float, float]:
     )
     total, error = gains.sum(axis=1), np.std(gains, axis=1, ddof=1) * np.sqrt(len(told))
     best = int(np.argmax(total))
-    if total[best] <= _SURE * error[best]:
+    if total[best] <= student.ppf(_SURE, len(told) - 1) * error[best]:
         return np.inf, float(total[best]), float(error[best])
     return float(STRENGTHS[best]), float(total[best]), float(error[best])

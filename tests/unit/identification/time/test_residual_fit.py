@@ -75,7 +75,7 @@ def test_gains_on_the_blocks_that_were_learnt_from_would_keep_chance(monkeypatch
         told = blocks(np.zeros(K), seed=seed)
         monkeypatch.setattr(residual_fit, "shrunk", lambda _, strength, told=told: shrunk(told, strength))
         kept += np.isfinite(chosen_strength(told)[0])
-    assert kept >= 8
+    assert kept >= 5  # against one in twenty
 
 
 def test_words_say_what_was_gained_and_where() -> None:
