@@ -1,22 +1,26 @@
-"""Open-loop predictions of multirotor flights that no fit saw, beside predictors without a fit: one table.
+"""Open-loop predictions of multirotor flights that no fit saw, beside rivals trained on the flights of the fit.
 
-    python scripts/multirotor_scores.py MODEL.toml FLIGHT [FLIGHT ...]
+    python scripts/multirotor_scores.py --model LABEL=MODEL.toml ... --fit FLIGHT ... --on FLIGHT ...
 
 MODEL.toml is what `swash identify --vehicle crazyflie ... --out FOLDER` wrote; a flight may have a window (FILE@8-30).
-Predictions start every 0.1 s from measured motion, run 0.5 s at 100 Hz on the logged commands and voltage, and are
-scored by mean absolute errors over the axes. The first five seconds of each flight tell a model that flight's delay,
-lever arm and heading of the tracked body; nothing is scored there. "Textbook" is the card before the identification.
+Predictions start every 0.1 s, run 0.5 s at 100 Hz on the logged commands and voltage, and are scored by mean absolute
+errors over the axes. A model starts from its own observer, which has seen the flight up to the start; everything else
+from measured motion. The first five seconds of each flight tell a model that flight's constants; nothing is scored
+there. "Textbook" is the card before the identification.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from multirotor_rivals import RIVALS, Motion, Rival, motion
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
@@ -25,12 +29,14 @@ import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbed_model import Nuisance, stochastic_model
+from swashplate.filtering.nuisance import PUSHES
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
+from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.validation.calibration import CALIBRATION, calibrate
 from swashplate.validation.prediction import naive, predict
@@ -38,7 +44,7 @@ from swashplate.validation.validate import observer_of, started_from
 
 AHEAD, EVERY = 50, 10
 """Samples of 10 ms."""
-SHOWN = (1, 10, 25, 50)
+SHOWN = (10, 50)
 GROUPS = {
     "position m": slice(0, 3),
     "velocity m/s": slice(3, 6),
@@ -48,17 +54,21 @@ GROUPS = {
 SLOW = 3.0
 """Hz below which the acceleration along body z is compared."""
 BODY = len(PREDICTED)
+EDGE = 10
+"""Samples at a record's end whose measured motion has too few samples around it."""
 Places = NDArray[np.intp]
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def flown(model: Any, vehicle_of: Any, body: Any, inner: Any, inputs: Any, voltage: Any, par: Any, starts: Any) -> Any:
-    """Inner states along the measured motion (n, m), states after each start (s, AHEAD, 12), specific force (n, 3)."""
-    calm, vehicle = jnp.zeros(model.n_gusts), vehicle_of.vehicle
+def flown(
+    model: Any, of: Any, body: Any, inner: Any, inputs: Any, voltage: Any, par: Any, push: Any, starts: Any
+) -> Any:
+    """States after each start (s, AHEAD, 12) from measured motion, and the specific force along it (n, 3)."""
+    vehicle = of.vehicle
 
     def along(inside: Any, here: Any) -> Any:
         row, u, volts = here
-        after = model.step(jnp.concatenate([row, inside]), calm, u, par, volts)
+        after = model.step(jnp.concatenate([row, inside]), push, u, par, volts)
         return after[BODY:], inside
 
     _, inside = jax.lax.scan(along, inner, (body, inputs, voltage))
@@ -67,21 +77,22 @@ def flown(model: Any, vehicle_of: Any, body: Any, inner: Any, inputs: Any, volta
         x = jnp.concatenate([row, inside])
         nested = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
         told = vehicle.inputs(*(u[i] for i in range(len(vehicle.input_names))))
-        return jnp.stack(vehicle.specific_force(nested, told, par, Environment(voltage=volts), jax_backend()))
+        force = vehicle.specific_force(nested, told, par, Environment(voltage=volts, air_density=1.2), jax_backend())
+        return jnp.stack(force) + push[:3]
 
     def run(start: Any) -> Any:
         def sample(x: Any, k: Any) -> Any:
-            x = model.step(x, calm, inputs[k], par, voltage[k])
+            x = model.step(x, push, inputs[k], par, voltage[k])
             return x, x[:BODY]
 
         first = jnp.concatenate([body[start], inside[start]])
         return jax.lax.scan(sample, first, start + jnp.arange(AHEAD))[1]
 
-    return inside, jax.vmap(run)(starts), jax.vmap(felt)(body, inside, inputs, voltage)
+    return jax.vmap(run)(starts), jax.vmap(felt)(body, inside, inputs, voltage)
 
 
-def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Places) -> tuple[Array, Array, Array]:
-    """Measured body states (n, 12), predictions (s, AHEAD, 12) and the specific force (n, 3) of a vehicle."""
+def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Places) -> tuple[Array, Array]:
+    """Predictions (s, AHEAD, 12) from measured motion and the specific force (n, 3) of a vehicle."""
     model = stochastic_model(vehicle, record.output_names, record.dt)
     body, par = measured_states(record, nuisance), jax.tree.map(jnp.asarray, vehicle.values())
     reaching = commands(vehicle, record.dt, jnp.asarray(record.inputs), nuisance)
@@ -90,9 +101,10 @@ def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Plac
     assert settled is not None
     inside = settled(told, vehicle.values(), record.voltage[0], None)
     inner = jnp.stack([jnp.asarray(inside[name]) for name in vehicle.state_names[BODY:]])
+    push = jnp.array([float(getattr(nuisance, name)) for name in PUSHES])
     voltage = jnp.asarray(record.voltage)
-    _, states, force = flown(model, model.equations, jnp.asarray(body), inner, reaching, voltage, par, starts)
-    return body, np.asarray(states), np.asarray(force)
+    found = flown(model, model.equations, jnp.asarray(body), inner, reaching, voltage, par, push, starts)
+    return np.asarray(found[0]), np.asarray(found[1])
 
 
 def in_the_room(states: Array) -> Array:
@@ -119,55 +131,76 @@ def measured_force(body: Array, dt: float) -> Array:
     return np.asarray(np.gradient(w, dt) + p * v - q * u - LABORATORY_GRAVITY * np.cos(phi) * np.cos(theta))
 
 
-def share(found: Array, truth: Array, dt: float, after: int) -> tuple[float, float]:
-    """R^2 below `SLOW`, with constant errors counted and without."""
+def share(found: Array, truth: Array, dt: float, after: int) -> tuple[float, float, float]:
+    """R^2 below `SLOW`, the same without what is constant in the flight, and the spread of the truth [m/s^2]."""
     sos = butter(4, SLOW, fs=1.0 / dt, output="sos")
-    a, b = (sosfiltfilt(sos, row)[after : -round(0.2 / dt)] for row in (found, truth))
-    spread = float(np.sum((b - b.mean()) ** 2))
-    off = a - b
-    return 1.0 - float(np.sum(off**2)) / spread, 1.0 - float(np.sum((off - off.mean()) ** 2)) / spread
+    a, b = (sosfiltfilt(sos, row)[after : -round(0.3 / dt)] for row in (found, truth))
+    spread, off = float(np.sum((b - b.mean()) ** 2)), a - b
+    return 1.0 - float(np.sum(off**2)) / spread, 1.0 - float(np.sum((off - off.mean()) ** 2)) / spread, float(b.std())
 
 
-def main(model: str, names: list[str]) -> None:
+def of_files(names: Sequence[str], vehicle: Vehicle) -> list[Record]:
+    """Records of at least calibration and a prediction."""
+    flights = [read(name).condition(rate=100.0, cutoff=0.0) for name in names]
+    shortest = CALIBRATION + 2.0 * AHEAD * 0.01
+    return [r for flight in flights for r in records(flight, vehicle) if r.time[-1] - r.time[0] > shortest]
+
+
+def seen(record: Record) -> Motion:
+    """A record as the rivals see it."""
+    body = measured_states(record, Nuisance())
+    return motion(body, record.inputs, record.voltage, record.dt, calibration=CALIBRATION)
+
+
+def main(models: dict[str, Vehicle], fitted: Sequence[str], held_out: Sequence[str]) -> None:
     enable_double_precision()
-    vehicle = sp.vehicle(model)
-    rivals = {"textbook quadrotor": started_from(vehicle), "identified": vehicle}
+    enable_compilation_cache()
+    first = next(iter(models.values()))
+    training = [seen(record) for record in of_files(fitted, first)]
+    rivals: dict[str, Rival] = {}
+    for label, make in RIVALS.items():
+        began = time.process_time()
+        rivals[label] = make(training)
+        print(f"{label}: trained in {time.process_time() - began:.0f} s of processor time")
+    textbook = {"textbook quadrotor (the card)": started_from(first)}
     found: dict[str, list[Array]] = {}
-    for name in names:
-        flight = read(name).condition(rate=100.0, cutoff=0.0)
-        for record in records(flight, vehicle):
-            starts = np.arange(round(CALIBRATION / record.dt), record.time.size - AHEAD - 10, EVERY)
-            plain = measured_states(record, Nuisance())
-            for kind, label in (("hold", "hold"), ("rates", "constant velocity, rates")):
-                ahead = [naive(plain, starts, k, record.dt, kind=kind) for k in range(1, AHEAD + 1)]
-                found.setdefault(label, []).append(errors(np.stack(ahead, axis=1), plain, starts))
-            for label, rival in rivals.items():
-                noise, prior = observer_of(rival)
-                nuisance = calibrate(rival, record, noise=noise, prior=prior)
-                body, states, force = open_loop(rival, record, nuisance, starts)
-                found.setdefault(label, []).append(errors(states, body, starts))
-                whole, moved = share(force[:, 2], measured_force(body, record.dt), record.dt, int(starts[0]))
+    for record in of_files(held_out, first):
+        starts = np.arange(round(CALIBRATION / record.dt), record.time.size - AHEAD - EDGE, EVERY)
+        plain = measured_states(record, Nuisance())
+        for kind, label in (("hold", "hold"), ("rates", "constant velocity and rates")):
+            ahead = [naive(plain, starts, k, record.dt, kind=kind) for k in range(1, AHEAD + 1)]
+            found.setdefault(label, []).append(errors(np.stack(ahead, axis=1), plain, starts))
+        for label, vehicle in (textbook | models).items():
+            noise, prior = observer_of(vehicle)
+            nuisance = calibrate(vehicle, record, noise=noise, prior=prior)
+            body = measured_states(record, nuisance)
+            states, force = open_loop(vehicle, record, nuisance, starts)
+            if label in models:
+                told = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD * record.dt,
+                               every=EVERY * record.dt, settling=CALIBRATION)  # fmt: skip
+                states = told.states[np.isin(told.starts, starts)]
+                whole, moved, spread = share(force[:, 2], measured_force(body, record.dt), record.dt, int(starts[0]))
                 print(
-                    f"{record.name}: {label}: delay {1e3 * float(nuisance.delay_motor):.0f} ms, heading of the tracked "
-                    f"body {np.degrees(float(nuisance.level_psi)):+.1f} deg, R^2 of acceleration along body z below "
-                    f"{SLOW:g} Hz {whole:.3f} ({moved:.3f} without its constant error)"
+                    f"{record.name}: {label}: delay {1e3 * float(nuisance.delay_motor):.0f} ms; acceleration along z "
+                    f"below {SLOW:g} Hz ({spread:.2f} m/s^2): R^2 {whole:.2f}, {moved:.2f} without its constant error"
                 )
-                if rival is vehicle:
-                    seen = predict(rival, record, noise=noise, nuisance=nuisance, horizon=AHEAD * record.dt,
-                                   every=EVERY * record.dt, settling=CALIBRATION)  # fmt: skip
-                    kept = np.isin(seen.starts, starts)
-                    found.setdefault("identified, own observer", []).append(errors(seen.states[kept], body, starts))
-    heads = [f"{group} {h}" for group in GROUPS for h in SHOWN]
-    print("\nmean absolute error after h samples of 10 ms, and in the last columns the mean over h = 1..50")
-    print(f"{'predictor':26}" + "".join(f"{head:>16}" for head in (*heads, *GROUPS)))
+            found.setdefault(label, []).append(errors(states, body, starts))
+        for label, rival in rivals.items():
+            found.setdefault(label, []).append(errors(rival(seen(record), starts, AHEAD), plain, starts))
+    print(f"\nmean absolute error after {' and '.join(f'{h / 100:g} s' for h in SHOWN)}")
+    heads = [group.split()[0] + f" {h / 100:g}" for group in GROUPS for h in SHOWN]
+    print("| predictor | " + " | ".join(heads) + " |\n|---" * 1 + "|---" * len(heads) + "|")
     for label, parts in found.items():
         mean = np.concatenate(parts).mean(axis=0)
-        cells = [mean[h - 1, g] for g in range(len(GROUPS)) for h in SHOWN] + list(mean.mean(axis=0))
-        print(f"{label:26}" + "".join(f"{value:16.4f}" for value in cells))
-    print(f"{sum(len(part) for part in found['hold'])} starts in {len(names)} flights")
+        cells = [f"{mean[h - 1, g]:.3g}" for g in range(len(GROUPS)) for h in SHOWN]
+        print(f"| {label} | " + " | ".join(cells) + " |")
+    print(f"{sum(len(part) for part in found['hold'])} starts")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    main(sys.argv[1], sys.argv[2:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", action="append", required=True, metavar="LABEL=MODEL.toml")
+    parser.add_argument("--fit", nargs="+", required=True, metavar="FLIGHT")
+    parser.add_argument("--on", nargs="+", required=True, metavar="FLIGHT")
+    given = parser.parse_args()
+    main({m.split("=", 1)[0]: sp.vehicle(m.split("=", 1)[1]) for m in given.model}, given.fit, given.on)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,10 @@ from scipy.signal import butter, sosfiltfilt
 import swashplate as sp
 from swashplate.flights import datasets
 from swashplate.flights.flight import Flight
+from swashplate.identification.core.parameters import Parameterization
+from swashplate.identification.core.records import Record, records
+from swashplate.identification.time.belonging import unrelated
+from swashplate.identification.time.prediction_error import PredictionError
 
 NAME = "nanobench/B2_circle_fast_rep2"
 
@@ -52,3 +58,20 @@ def test_motors_and_voltage_explain_the_accelerations(flight: Flight) -> None:
     assert np.array_equal(np.sign(found[:, 0]), (-1, -1, 1, 1))  # 1 and 2 are on the right
     assert np.array_equal(np.sign(found[:, 1]), (1, -1, -1, 1))  # 1 and 4 are ahead
     assert np.array_equal(np.sign(found[:, 2]), (1, -1, 1, -1))  # 1 and 3 turn counter-clockwise from above
+
+
+@pytest.mark.proof
+def test_commands_of_another_time_are_told_from_those_of_the_flight(shared_data: Path) -> None:
+    """Of a quadrotor too, before anything is fitted."""
+    vehicle = sp.vehicle("crazyflie")
+    read = sp.read(f"{NAME}@8-20").condition(rate=100.0, cutoff=0.0)
+    pieces = [piece for piece in records(read, vehicle) if piece.time[-1] - piece.time[0] > 6.0]
+    assert pieces[0].output_names[-3:] == ("p", "q", "r")  # its gyroscope is read
+
+    def cost(asked: Sequence[Record]) -> float:
+        likelihood = PredictionError(Parameterization(vehicle, ()), asked)
+        return likelihood.cost(likelihood.row.starts())
+
+    assert unrelated(cost, pieces) == ""
+    late = [replace(piece, inputs=np.roll(piece.inputs, 437, axis=0)) for piece in pieces]
+    assert "does not follow the commands" in unrelated(cost, late)

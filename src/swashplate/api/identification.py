@@ -14,7 +14,7 @@ from swashplate.flights.flight import Flight, as_flights
 from swashplate.flights.overlap import check_disjoint
 from swashplate.identification.core import stopping
 from swashplate.identification.core.parameters import parameterize
-from swashplate.identification.core.records import POSE, records
+from swashplate.identification.core.records import records
 from swashplate.identification.core.result import Result
 from swashplate.identification.estimators import check_method
 from swashplate.identification.identify import identify
@@ -105,6 +105,7 @@ def identify_and_validate(
     rotor_line: float | None = None,
     leave_out: Sequence[tuple[float, float]] = (),
     horizon: Sequence[float] | None = None,
+    residual: bool = False,
     close_loop: Sequence[str] = (),
     posterior: str | None = None,
     names: Sequence[str] | None = None,
@@ -117,7 +118,7 @@ def identify_and_validate(
         flights: conditioned, with their pose tracked.
         hold_out: conditioned flights that the fit never sees.
         free, method, outputs, ties, fixed, priors, prior_card: as of `identify`.
-        iterations, keep_unexcited, wind, rotor_line, leave_out, horizon: as of `identify`.
+        iterations, keep_unexcited, wind, rotor_line, leave_out, horizon, residual: as of `identify`.
         close_loop: as of `validate`.
         posterior: "laplace", "metropolis" or "nuts" for draws of what the fit does not know (`swashplate.posterior`).
             One that did not converge is left out, and `refused` says why.
@@ -146,7 +147,7 @@ def identify_and_validate(
     if vehicle.structure is None or method in TRACKED:
         parameterize(vehicle, free, ties=ties, fixed=fixed, priors=priors, prior_card=prior_card)
     if method in TRACKED:
-        records([*seen, *unseen], vehicle, outputs=outputs or POSE)
+        records([*seen, *unseen], vehicle, outputs=outputs)
     say("preparing the fit (compiling takes longest the first time)")
     with stopping.kept():
         fit = identify(
@@ -165,6 +166,7 @@ def identify_and_validate(
             rotor_line=rotor_line,
             leave_out=leave_out,
             horizon=horizon,
+            residual=residual,
             progress=lambda i, cost: say("fitting", done=i, total=iterations, note=f"iteration {i}, cost {cost:.6g}"),
         )
     fit, refused = stopping.told(fit), ""

@@ -85,6 +85,14 @@ def identify(
         ),
     ] = False,
     horizon: options.HorizonAhead = None,
+    residual: Annotated[
+        bool,
+        typer.Option(
+            "--residual",
+            help="Also fit accelerations that the equations lack, linear in motion and inputs, as far as blocks of the "
+            "flights that are left out speak for them; with --horizon to the errors ahead (for predictions only).",
+        ),
+    ] = False,
     close_loop: options.CloseLoop = "",
     posterior: Annotated[
         str | None,
@@ -126,6 +134,7 @@ def identify(
             for name, given in (
                 ("--prior CARD", prior_card is not None),
                 ("--horizon", horizon is not None),
+                ("--residual", residual),
                 ("--posterior", posterior is not None),
                 ("--wind", wind),
                 ("--rotor-line", rotor_line is not None),
@@ -164,6 +173,7 @@ def identify(
             rotor_line=rotor_line,
             leave_out=[(a, b) for a, b in (options.numbers(t, option="--leave-out", count=2) for t in leave_out or ())],
             horizon=options.seconds_ahead(horizon),
+            residual=residual,
             close_loop=options.names(close_loop),
             posterior=posterior,
             **asked_for,

@@ -13,6 +13,7 @@ from swashplate.export.linear import Linear, logged_delays, of_state_space, of_v
 from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import structure_of
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.residual import refuse_predictor
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry
 from swashplate.simulation.trim import Trim
@@ -108,12 +109,15 @@ def export_model(
 
     Raises:
         ExportError: where the format cannot hold the model, CasADi is missing, or the compiler refuses the sources.
+        CardError: for a model whose residual is for predictions only.
         TrimError: where a vehicle has no hover.
     """
     if form not in FORMATS:
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
+    if isinstance(model, Vehicle):
+        refuse_predictor(model, "exports")
     flying = model if isinstance(model, Vehicle) and model.structure is None else None
     late, left_out, about = None, "", trim
     if flying is None:

@@ -30,6 +30,7 @@ class Noise(NamedTuple):
     its phase lasts [s].
     `tau_gust_yaw`, `drift_yaw`, `tau_gust_vertical`, `drift_vertical` 0: those of all moments and of all forces;
     `sensor_heading` 0: that of all angles.
+    `sensor_rate` [rad/s]: of a gyroscope's readings, given and not estimated; 0: none is used.
     """
 
     white_tilt: Any = 0.5
@@ -58,7 +59,11 @@ class Noise(NamedTuple):
     line_height: Any = 2e-4
     line_time: Any = 0.3
     sensor_heading: Any = 0.0
+    sensor_rate: Any = 0.0
 
+
+GYROSCOPE = 0.04
+"""A gyroscope's noise [rad/s], given: what it shows above 8 Hz on real flights, most of it vibration."""
 
 SEPARATE: Mapping[str, tuple[str, float, float]] = {
     "tau_gust_yaw": ("tau_gust_moment", 0.5, 0.5),

@@ -23,6 +23,7 @@ from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import kalman_gain
+from swashplate.flights.schema import POSITION, RATES
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import Backend
@@ -277,7 +278,8 @@ class StochasticModel:
 
     def sensor_variances(self, noise: Noise, xp: Any = jnp) -> Any:
         """Variances of the measured channels."""
-        sigma = {"x": noise.sensor_position, "y": noise.sensor_position, "z": noise.sensor_position}
+        sigma = dict.fromkeys(POSITION, noise.sensor_position)
+        sigma |= dict.fromkeys(RATES, xp.where(noise.sensor_rate > 0.0, noise.sensor_rate, noise.sensor_angle))
         sigma["psi"] = xp.where(noise.sensor_heading > 0.0, noise.sensor_heading, noise.sensor_angle)
         return xp.stack([sigma.get(name, noise.sensor_angle) ** 2 for name in self.output_names], axis=-1)
 

@@ -38,6 +38,7 @@ class Question:
         shifts: constants in the states' rates, per record. biases: outputs with a constant per record.
         band: lowest and highest frequency [Hz], for methods that fit lines of a transform.
         horizon: seconds ahead, first and last, of the errors that are made small after maximum likelihood.
+        residual: also a linear residual, of what the fit itself made small.
         progress: told the iteration and the cost.
     """
 
@@ -57,6 +58,7 @@ class Question:
     biases: Sequence[str] = ()
     band: tuple[float, float] | None = None
     horizon: Sequence[float] | None = None
+    residual: bool = False
     progress: Callable[[int, float], None] | None = None
 
     @property

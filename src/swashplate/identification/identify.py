@@ -38,6 +38,7 @@ def identify(
     biases: Sequence[str] = (),
     band: tuple[float, float] | None = None,
     horizon: Sequence[float] | None = None,
+    residual: bool = False,
     progress: Callable[[int, float], None] | None = None,
 ) -> Result[Any, Any]:
     """Identify a model's parameters from one or more conditioned flights, or from frequency responses.
@@ -73,6 +74,9 @@ def identify(
         horizon: (FIRST, LAST) in seconds: after maximum likelihood, make errors FIRST, 2 FIRST, ... LAST seconds ahead
             small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
             of this criterion, corrected for predictions that overlap.
+        residual: also fit accelerations that the equations lack, linear in motion and inputs (`models.residual`), as
+            far as blocks of these flights, left out, speak for them; to the innovations, or with `horizon` to the
+            errors ahead. `result.problems` says what it gained and its part of each acceleration.
         progress: called with the iteration's number and cost.
 
     Returns:
@@ -107,6 +111,7 @@ def identify(
         biases=tuple(biases),
         band=band,
         horizon=None if horizon is None else tuple(horizon),
+        residual=residual,
         progress=progress,
     )
     name, estimator = _suited(model, data, method)

@@ -14,6 +14,7 @@ from swashplate.models.card import Card, packaged_cards, read_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.composition import is_composed
 from swashplate.models.linear.linear_vehicle import linear_vehicle
+from swashplate.models.residual import carrying, has_residual, without_residual
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import Registry, nearest
 
@@ -47,7 +48,8 @@ def from_card(card: Card) -> Vehicle:
             hint=nearest(card.vehicle, EQUATIONS)
             or "Equations of your own are found by an entry point of the group swashplate.models (docs/extending.md).",
         )
-    return EQUATIONS[card.vehicle](card)
+    vehicle = EQUATIONS[card.vehicle](without_residual(card))
+    return carrying(vehicle, card) if has_residual(card) else vehicle
 
 
 def vehicle(name_or_file: str | Path, **options: bool | str) -> Vehicle:

@@ -65,6 +65,14 @@ EFFECTS = (
 )
 """What nested structures may leave out."""
 
+PUSHES = {
+    **dict.fromkeys(("push_u", "push_v", "push_w"), 0.5),
+    **dict.fromkeys(("push_p", "push_q", "push_r"), 5.0),
+}
+"""Of every flight: accelerations that the equations lack all the time [m/s^2, rad/s^2], and how large they are."""
+
+_BETWEEN = "between flights of one Crazyflie: where the battery lies, warm motors"
+
 _VOLTAGE_SECONDS = 0.15
 """Averaging of a logged voltage: it is under load and follows the commands, which are shares of it."""
 
@@ -202,8 +210,12 @@ def choices(card: Card) -> Mapping[str, Choice]:
         near("thrust_damping", 2.0 * at["thrust_damping"], "the card, twice its value"),
         near("flap_back", 3.0 * at["flap_back"], "the card, three times its value"),
         near("rotor_drag", at["rotor_drag"], "the card, as much again"),
+        *(Free(name, 0.4 * sigma, 0.0, sigma, source=_BETWEEN) for name, sigma in PUSHES.items()),
     )
-    told = "what a flight with logged voltage can tell: thrust, torque, rotors' differences, drive, damping, inertia"
+    told = (
+        "what a flight with logged voltage can tell: thrust, torque, rotors' differences, drive, damping, inertia; and "
+        "of each flight the accelerations that it has of its own"
+    )
     return {"full": Choice("full", told, free)}
 
 
@@ -289,6 +301,7 @@ def multirotor(card: Card) -> Vehicle:
         traits=Traits(
             axes=axes(par, senses),
             observed=True,
+            gyroscope=True,
             no_link="a multirotor's motors have no servo mapping; ArduPilot's and PX4's own multirotor simulators "
             "fly such a frame",
             choices=choices,

@@ -73,6 +73,8 @@ class Traits:
         rotorcraft: it is a single-rotor helicopter's equations: derivatives by contributor, the forms of papers.
         coaxial: two rotors on drive trains, as the autopilot with the decoupling inverts them.
         observed: the observer of validation (tracked pose, gusts, delays of servos and motors) is made for it.
+        gyroscope: fits and predictions also read the logged body rates: for bodies so small and quick that a tracked
+            attitude says little of them.
         published: name of the packaged card of just these equations, "" where cards differ by aircraft.
         servos: name of its packaged servo mapping, "" where that is its card's.
         servo_layout: what an autopilot's outputs drive: "swashplate" (with tail and throttle), "two swashplates" (with
@@ -110,6 +112,7 @@ class Traits:
     rotorcraft: bool = False
     coaxial: bool = False
     observed: bool = False
+    gyroscope: bool = False
     published: str = ""
     servos: str = ""
     servo_layout: str = ""

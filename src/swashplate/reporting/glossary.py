@@ -71,6 +71,12 @@ PARAMETERS: dict[str, str] = {
     "level_phi": "roll error of the tracked body's level",
     "level_theta": "pitch error of the tracked body's level",
     "level_psi": "heading of the tracked body against the helicopter's nose",
+    "push_u": "acceleration ahead that the equations lack in this flight",
+    "push_v": "acceleration to the right that the equations lack in this flight",
+    "push_w": "acceleration downward that the equations lack in this flight",
+    "push_p": "roll acceleration that the equations lack in this flight",
+    "push_q": "pitch acceleration that the equations lack in this flight",
+    "push_r": "yaw acceleration that the equations lack in this flight",
 }
 
 

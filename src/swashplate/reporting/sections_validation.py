@@ -9,7 +9,7 @@ import numpy as np
 
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.schema import channel
-from swashplate.identification.time.estimates import RECORD_UNITS
+from swashplate.identification.time.estimates import record_unit
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.reporting.figures_time import Prediction, Series, flight_name, time_figures
 from swashplate.reporting.figures_validation import JUDGED, fit_over_horizon, horizons
@@ -87,7 +87,7 @@ def _told(validation: Validation) -> tuple[Block, ...]:
                 (
                     Cell(name),
                     Cell(meaning(name)),
-                    Cell(unit_words(RECORD_UNITS[name.split("_")[0]])),
+                    Cell(unit_words(record_unit(name))),
                     *(_cell(f"{float(getattr(one, name)):.3f}", False) for one in told),
                 )
                 for name in names

@@ -17,6 +17,7 @@ from swashplate.models.linear import python_control
 from swashplate.models.linear.matrices_file import state_space_of_matrices
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
+from swashplate.models.residual import refuse_predictor
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
 from swashplate.simulation.dynamics import (
@@ -195,7 +196,12 @@ def linearize(vehicle: Vehicle, trim: Trim | None = None) -> LinearModel:
     """The linear model of a vehicle about a trim (hover where none is given), by exact forward differentiation.
 
     Quadratic terms such as u |u| have no slope at hover; about a trim in forward flight they have.
+
+    Raises:
+        CardError: for a model whose residual is for predictions only.
+        TrimError: where no trim is given and it has no hover.
     """
+    refuse_predictor(vehicle, "linear models and controllers")
     enable_double_precision()
     about = trim if trim is not None else find_trim(vehicle)
     surroundings = [getattr(about.environment, name) for name in SURROUNDINGS]

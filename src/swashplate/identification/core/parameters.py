@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.errors import CardError, ExpressionError, IdentificationError
 from swashplate.filtering.disturbances import SEPARATE
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import PUSHES, USUAL_PUSH, Nuisance
 from swashplate.models.card import Card
 from swashplate.models.choices import Free as Free
 from swashplate.models.linear.expressions import Expression, parse_tie
@@ -303,14 +303,15 @@ def _as_free(vehicle: Vehicle, item: str | Free) -> Free:
     return Free(item, abs(vehicle.card.parameters[item].value) or 0.01)
 
 
-def trim_of_record(name: str, sigma: float = 0.05) -> Free:
-    """A trim that every record has of its own, about zero."""
-    return Free(name, 0.02, 0.0, sigma, source="usual of a trim")
+def trim_of_record(name: str, sigma: float | None = None) -> Free:
+    """A trim or push that every record has of its own, about zero."""
+    sigma = USUAL_PUSH.get(name, 0.05) if sigma is None else sigma
+    return Free(name, 0.4 * sigma, 0.0, sigma, source="usual of a trim")
 
 
 def _trims(vehicle: Vehicle) -> tuple[str, ...]:
-    """Trims of the vehicle's inputs that a record can have."""
-    return tuple(name for name in (f"trim_{i}" for i in vehicle.input_names) if name in Nuisance._fields)
+    """Trims of the vehicle's inputs that a record can have, and pushes."""
+    return (*(name for name in (f"trim_{i}" for i in vehicle.input_names) if name in Nuisance._fields), *PUSHES)
 
 
 def _beside(vehicle: Vehicle) -> frozenset[str]:

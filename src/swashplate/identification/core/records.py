@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight, did_you_mean
-from swashplate.flights.schema import ATTITUDE, POSITION
+from swashplate.flights.schema import ATTITUDE, POSITION, RATES
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
@@ -62,14 +62,29 @@ class Record:
         return counted
 
 
-def records(flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Sequence[str] = POSE) -> list[Record]:
+def seen_of(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[str, ...]:
+    """What a vehicle's motion is told by: the tracked pose, and the gyroscope where its kind reads one and all logs
+    have one (rates that were derived from the pose say nothing new)."""
+    derived = {name for flight in flights for step in flight.history for name in step.details.get("derived", ())}
+    read = vehicle.traits.gyroscope and not derived & set(RATES)
+    return (*POSE, *RATES) if read and all(name in f for f in flights for name in RATES) else POSE
+
+
+def records(
+    flights: Flight | Iterable[Flight], vehicle: Vehicle, *, outputs: Sequence[str] | None = None
+) -> list[Record]:
     """The unbroken pieces of one or more conditioned flights.
+
+    Args:
+        outputs: measured channels (None: `seen_of`).
 
     Raises:
         FlightError: where a flight lacks a channel, is not on a uniform grid or holds NaN, or where no input moves.
     """
     pieces: list[Record] = []
-    for flight in [flights] if isinstance(flights, Flight) else list(flights):
+    given = [flights] if isinstance(flights, Flight) else list(flights)
+    outputs = seen_of(vehicle, given) if outputs is None else outputs
+    for flight in given:
         source = flight.provenance.source or "flight"
         again = sum(1 for name in logs(pieces)[0] if name.split(" #")[0] == source)
         log = f"{source} #{again + 1}" if again else source

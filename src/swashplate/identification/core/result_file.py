@@ -24,6 +24,7 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.transfer_function import TransferFunction, TransferFunctions
+from swashplate.models.residual import carrying
 from swashplate.models.vehicle import Vehicle
 
 KIND, SCHEMA = "result", 1
@@ -146,7 +147,7 @@ def model_from(found: Any, *, where: str, at: str, equations: Vehicle | None) ->
         card = card_from({k: v for k, v in found.items() if k != "path"}, path=where)
         card = replace(card, path=path if isinstance(path, str) else "")
         if equations is not None and equations.name == card.vehicle:
-            return equations.with_card(card)
+            return carrying(equations, card)
         return from_card(card)
     if kind == "state-space":
         try:

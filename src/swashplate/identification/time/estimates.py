@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.filtering.nuisance import PUSHES
 from swashplate.identification.core import accuracy
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.result import Constant, Estimate
@@ -17,8 +18,14 @@ from swashplate.models.vehicle import Vehicle
 LAGS = 1.0
 """Seconds of residual correlation that the corrected bound allows for."""
 
-RECORD_UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad"}
-"""Units of what belongs to a record, by the first word of its name."""
+_UNITS = {"delay": "s", "trim": "1", "lever": "m", "level": "rad", **dict.fromkeys(PUSHES[:3], "m/s^2")}
+_UNITS |= dict.fromkeys(PUSHES[3:], "rad/s^2")
+"""Units of what belongs to a record, by its name or the first word of that."""
+
+
+def record_unit(name: str) -> str:
+    """Unit of a constant that belongs to a record."""
+    return _UNITS.get(name) or _UNITS[name.split("_")[0]]
 
 
 @dataclass(frozen=True)
@@ -175,7 +182,7 @@ def constants(found: Found) -> tuple[Constant, ...]:
     estimates = []
     for i in row.places("nuisance"):
         name, _, number = row.names[i].partition("[")
-        unit = RECORD_UNITS[name.split("_")[0]]
+        unit = record_unit(name)
         record = found.logs[int(number[:-1])]
         estimates.append(Constant(record, name, unit, float(found.numbers[i]), float(sigma[i])))
     return tuple(estimates)

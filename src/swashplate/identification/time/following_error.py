@@ -181,7 +181,7 @@ def _begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) ->
         around, held = steady_flight(model.vehicle, parameters, seen.voltage[1], seen.velocity)
         noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
         linear = model.linear(around, held, parameters, seen.voltage[1], noise, nuisance)
-        return first_state(model, traced_begin(model, numbers, seen).x), predicted_covariance(*linear)
+        return first_state(model, traced_begin(model, numbers, seen).x, numbers.nuisance), predicted_covariance(*linear)
 
     return jax.vmap(one)(numbers)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import Nuisance, mean_nuisance
 from swashplate.flights.flight import Flight
 from swashplate.identification.core import accuracy, stopping
 from swashplate.identification.core.delay_restarts import minimise_over_valleys
@@ -22,7 +24,7 @@ from swashplate.identification.core.low_passed import (
 )
 from swashplate.identification.core.multi_step import TWICE, Horizon, MultiStepErrors, told_horizon
 from swashplate.identification.core.parameters import FROM_CARD, Parameterization, parameterize
-from swashplate.identification.core.records import POSE, Record, records
+from swashplate.identification.core.records import Record, records
 from swashplate.identification.core.result import APART, Estimate, Fitted, Result, correlation_of
 from swashplate.identification.core.scoring import Optimum, Progress, minimise
 from swashplate.identification.core.sources import sources_of
@@ -36,6 +38,7 @@ from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind, with_line
+from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
@@ -71,7 +74,6 @@ def identify_flight(
     """
     horizon = _horizon(question)
     free = "full" if question.free is None else question.free
-    outputs = POSE if question.outputs is None else question.outputs
     flights = [monitored(flight, vehicle) for flight in flights]
     enable_double_precision()
     enable_compilation_cache()
@@ -85,7 +87,7 @@ def identify_flight(
         priors=question.priors,
         prior_card=question.prior_card,
     )
-    pieces = _long_enough(records(flights, vehicle, outputs=outputs))
+    pieces = _long_enough(records(flights, vehicle, outputs=question.outputs))
     pieces = _without(pieces, question.leave_out) if question.leave_out else pieces
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
@@ -115,7 +117,18 @@ def identify_flight(
         for e in parameters
         if e.prior_source.startswith(FROM_CARD) and abs(e.disagreement) > APART
     ]
-    identified = _identified(found, noise, likelihood.nuisance_of(row), vehicle, parameters, pieces, by.method)
+    nuisances = likelihood.nuisances_of(row)
+    nuisance = mean_nuisance(nuisances)
+    identified = _identified(found, noise, nuisance, vehicle, parameters, pieces, by.method)
+    settings: dict[str, Any] = {}
+    if question.residual and noise is not None and not problems:
+        each = [Nuisance(*numbers) for numbers in np.array(nuisances).T.tolist()]
+        residual = fit_residual(identified, pieces, each, noise, horizon=_horizon(question))
+        wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}
+        card = residual.vehicle.card
+        identified = residual.vehicle.with_card(replace(card, observer={**card.observer, **wanders}))
+        settings = {"residual": residual.told}
+        notes.append(residual.words)
     told = constants(found)
     if vehicle.traits.balance is not None:
         trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
@@ -129,7 +142,7 @@ def identify_flight(
         estimates=parameters,
         constants=told,
         noise=noise,
-        nuisance=likelihood.nuisance_of(row),
+        nuisance=nuisance,
         names=table.names,
         covariance=found.scaled(found.plain),
         covariance_corrected=found.scaled(found.corrected),
@@ -155,7 +168,8 @@ def identify_flight(
             **({"constants of every record": [f.name for f in table.of_records]} if table.of_records else {}),
             **({"noise of its own": list(table.noises)} if table.noises else {}),
             **told_horizon(horizon),
-            "outputs": list(outputs),
+            **settings,
+            "outputs": list(pieces[0].output_names),
             "wind": question.wind,
             **({} if question.rotor_line is None else {"rotor line": question.rotor_line}),
             **({"left out": [list(part) for part in question.leave_out]} if question.leave_out else {}),
@@ -270,7 +284,7 @@ def _found_ahead(
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
 PREDICTION_ERROR = FlightEstimator(
     "prediction-error",
-    _TAKES | {"keep_unexcited", "wind", "rotor_line", "leave_out", "horizon"},
+    _TAKES | {"keep_unexcited", "wind", "rotor_line", "leave_out", "horizon", "residual"},
     _prediction_error,
     _scoring,
     _found_ahead,

@@ -190,7 +190,8 @@ def traced_run(
         commanded, volts = now
         return model.step(x, acting, commanded, parameters, volts)
 
-    _, (found, states) = model.run(first_state(model, x), y, advance, (reaching, voltage), noise, nuisance, gain)
+    first = first_state(model, x, jnp.stack([jnp.asarray(value, dtype=float) for value in nuisance]))
+    _, (found, states) = model.run(first, y, advance, (reaching, voltage), noise, nuisance, gain)
     return found, gain.covariance, states
 
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
+from swashplate.flights.schema import RATES
 from swashplate.identification.core.records import Record
 
 PREDICTED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
@@ -18,6 +19,7 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13)
 
     Rates and velocities are slopes of a cubic fitted to the samples within `window` seconds (Savitzky and Golay 1964),
     so each uses samples after its own time too: this is what predictions are held against, never what they start from.
+    Rates are a gyroscope's where the record has them, smoothed over five samples.
     """
     from scipy.signal import savgol_filter
 
@@ -46,4 +48,7 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13)
         ],
         axis=1,
     )
+    if set(RATES) <= set(names):
+        gyro = record.outputs[:, [names.index(name) for name in RATES]]
+        rates = savgol_filter(gyro, 5, 2, axis=0)
     return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)

@@ -22,7 +22,7 @@ from swashplate.errors import IdentificationError
 from swashplate.filtering.arriving_commands import commands
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, StochasticModel, stochastic_model
-from swashplate.filtering.nuisance import Nuisance, mean_nuisance
+from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameter_row import Entry, Row
@@ -232,9 +232,9 @@ class OutputError:
         """It knows of no process noise."""
         return None
 
-    def nuisance_of(self, row: Array) -> Nuisance:
-        """The records' mean nuisance at a row."""
-        return mean_nuisance(self.unpack(row[: self._shared])[1])
+    def nuisances_of(self, row: Array) -> Nuisance:
+        """Constants at a row, one array entry per record."""
+        return self.unpack(row[: self._shared])[1]
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its simulated windows."""

@@ -16,9 +16,10 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
-from swashplate.filtering.disturbances import SEPARATE, Noise
+from swashplate.filtering.disturbances import GYROSCOPE, SEPARATE, Noise
 from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
-from swashplate.filtering.nuisance import Nuisance, mean_nuisance
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.flights.schema import RATES
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
@@ -161,7 +162,7 @@ class PredictionError:
     ) -> None:
         self.table = table
         self.pieces = tuple(pieces)
-        self.noise = _with_first_guesses(noise or Noise(), table.noises)
+        self.noise = _with_first_guesses(noise or Noise(), table.noises, pieces[0].output_names)
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, noise=self.noise)
         self.logs, self._log = logs(pieces)
@@ -332,9 +333,10 @@ class PredictionError:
         if not {"x", "y", "psi"} <= set(names):
             return d_nu
         i, j, k = (names.index(name) for name in ("x", "y", "psi"))
-        place = self.row.names.index(f"level_psi[{log}]")
         heading = -d_nu[:, :, k]
-        heading[place] -= self.row.scale[place]  # what is tracked moves, the nose does not
+        if (level := f"level_psi[{log}]") in self.row.names:
+            place = self.row.names.index(level)
+            heading[place] -= self.row.scale[place]  # what is tracked moves, the nose does not
         told = d_nu.copy()
         told[:, :, i] -= heading * nu[:, j]
         told[:, :, j] += heading * nu[:, i]
@@ -360,9 +362,9 @@ class PredictionError:
         """The noise at a row."""
         return Noise(*self.numbers(row)[0].noise.tolist())
 
-    def nuisance_of(self, row: Array) -> Nuisance:
-        """The records' mean nuisance at a row."""
-        return mean_nuisance(Nuisance(*np.array([numbers.nuisance for numbers in self.numbers(row)]).T))
+    def nuisances_of(self, row: Array) -> Nuisance:
+        """Constants at a row, one array entry per record."""
+        return Nuisance(*np.array([numbers.nuisance for numbers in self.numbers(row)]).T)
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its one-step predictions."""
@@ -405,14 +407,22 @@ def _by_covariance(dM: Array, n: int) -> Array:
 
 
 def _estimated(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
-    """The noise numbers that are estimated: speed and a line's frequency are given, others only where wanted."""
-    left = {"speed", "line_hertz", *(() if model.windy else _WIND), *(() if model.lined else _LINE)}
+    """The noise numbers that are estimated: the speed, a line's frequency and a gyroscope's noise are given,
+    the wind's, the line's and the separate ones only where wanted.
+
+    Tracked angles err for tenths of a second on end. To the likelihood such errors look like motion, and it would call
+    the gyroscope wrong that does not show them (found on flights of a Crazyflie: 0.17 rad/s instead of 0.04, and delays
+    and inertias to go with it).
+    """
+    left = {"speed", "sensor_rate", "line_hertz", *(() if model.windy else _WIND), *(() if model.lined else _LINE)}
     left |= {name for name in SEPARATE if not getattr(guess, name) > 0.0}
     return tuple(name for name in Noise._fields if name not in left)
 
 
-def _with_first_guesses(noise: Noise, separate: Sequence[str]) -> Noise:
-    """The noise with first guesses of what yaw or heave are to have for themselves."""
+def _with_first_guesses(noise: Noise, separate: Sequence[str], outputs: Sequence[str]) -> Noise:
+    """The noise with first guesses of what yaw or heave are to have for themselves, and that of a gyroscope in use."""
+    if set(RATES) & set(outputs) and not noise.sensor_rate > 0.0:
+        noise = noise._replace(sensor_rate=GYROSCOPE)
     return noise._replace(**{name: SEPARATE[name][1] for name in separate if not getattr(noise, name) > 0.0})
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.identification.time.beginning import Begun, FilterNumbers
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 
@@ -37,6 +37,8 @@ _DIRECTIONS = 8
 
 _TOGETHER = 32
 """Samples whose slopes are taken side by side: what stays in a core's cache."""
+
+_PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
 
 RUNS = 64
 """Predictions that run side by side."""
@@ -66,7 +68,7 @@ def along(
         begin: of `begun`.
         readings, commands, voltage: by sample.
     """
-    state, n, parts = first_state(model, begin.x), len(readings), []
+    state, n, parts = first_state(model, begin.x, numbers.nuisance), len(readings), []
     for rows in stretches(readings, commands, voltage):
         state, found = _along(model, state, begin.gain, numbers, *rows)
         parts.append(found)
@@ -207,7 +209,7 @@ def along_moved(
             each of the directions that the planes know (directions, k).
     """
     moved, to = (jax.tree.map(_filled, part) for part in (begin_moved, directions))
-    state, moving = first_state(model, begin.x), first_state(model, moved.x)
+    state, moving = (first_state(model, x, told) for x, told in ((begin.x, numbers.nuisance), (moved.x, to.nuisance)))
     commands, further = pushes
     room = steps[0].slopes.shape[-1] - steps[0].place.shape[-1] - commands.shape[-1] - further.shape[-1]
     further = _filled(np.pad(further, ((0, 0), (0, room))))
@@ -283,11 +285,11 @@ def whole(parts: Any, n: int) -> Any:
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
 
 
-def first_state(model: StochasticModel, x: Any) -> FilterState:
-    """State rows with nothing known of the air yet."""
+def first_state(model: StochasticModel, x: Any, nuisance: Any) -> FilterState:
+    """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
     front = x.shape[:-1]
     line = np.zeros((*front, model.n_line)) if model.lined else ()
-    return FilterState(x, np.zeros((*front, model.n_gusts)), np.zeros((*front, N_DISTURBANCES)), line)
+    return FilterState(x, np.zeros((*front, model.n_gusts)), nuisance[..., _PUSHES], line)
 
 
 def _acting(model: StochasticModel, states: FilterState) -> Array:

@@ -84,6 +84,8 @@ def fit_vehicle(
     check_biases(biases, outputs)
     table = parameterize(vehicle, free, ties=ties, priors=priors)
     beside = [*(item.name for item in table.of_records), *table.noises]
+    if beside and isinstance(free, str):  # a ready choice is also for methods that have them
+        table, beside = replace(table, of_records=(), noises=()), []
     if beside:
         raise IdentificationError(
             f"'{method}' has no such constants of records and no such noise.",
