@@ -36,8 +36,9 @@ from swashplate.identification.time.estimates import LAGS, Found, constants, est
 from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
+from swashplate.identification.time.noise_entries import in_wind, with_line
 from swashplate.identification.time.output_error import OutputError
-from swashplate.identification.time.prediction_error import SETTLING, PredictionError, in_wind, with_line
+from swashplate.identification.time.prediction_error import SETTLING, PredictionError
 from swashplate.identification.time.residual_fit import fit_residual
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle

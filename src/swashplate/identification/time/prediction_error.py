@@ -15,11 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from swashplate.arrays import Array
-from swashplate.errors import IdentificationError
-from swashplate.filtering.disturbances import GYROSCOPE, SEPARATE, Noise
-from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
-from swashplate.flights.schema import RATES
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
@@ -31,25 +29,10 @@ from swashplate.identification.time import innovations_ahead
 from swashplate.identification.time.beginning import FilterNumbers, seen_at_start
 from swashplate.identification.time.innovations import Filtered, FilterPlan, RecordRun, traced_cost
 from swashplate.identification.time.kinematics import PREDICTED
-from swashplate.identification.time.start_states import slopes
+from swashplate.identification.time.noise_entries import estimated_noises, noise_entries, with_first_guesses
 
 SETTLING = 1.5
 """Seconds at the start of each record that the filter is given to forget its first guess; they are not counted."""
-
-_NOISE_SPREAD = {
-    "tau_gust_moment": 0.5,
-    "tau_gust_force": 0.5,
-    "drift_moment": 0.5,
-    "drift_force": 0.5,
-    **{name: spread for name, (_, _, spread) in SEPARATE.items()},
-}
-"""Width of the prior on the logarithm of each noise number; the others get 2 (a factor of 7)."""
-
-_WIND = ("wind", "tau_wind")
-_LINE = ("line_angle", "line_height", "line_time")
-
-_ADDED = ("white", "gust", "wind", "sensor", "line_angle", "line_height")
-"""How the noise numbers begin whose squares add to the innovations' variance; drifts and times act by ratios."""
 
 _NUISANCE = {
     # name: start, scale, prior sigma
@@ -92,39 +75,6 @@ def parameter_entries(table: Parameterization) -> list[Entry]:
     ]
 
 
-def in_wind(pieces: Sequence[Record]) -> Noise:
-    """First guesses of the noise for flights in horizontal wind, with the speed that the records were flown at."""
-    return Noise(wind=0.1, speed=_typical_speed(pieces))
-
-
-def with_line(noise: Noise, hertz: float, pieces: Sequence[Record]) -> Noise:
-    """First guesses of the noise with a rotor's line at a signed frequency [Hz].
-
-    The heading, which the line does not shake, then has a white noise of its own.
-
-    Raises:
-        IdentificationError: where the records' rate cannot show it.
-    """
-    half = 0.5 / pieces[0].dt
-    if not 0.0 < abs(hertz) < half:
-        raise IdentificationError(
-            f"a line at {hertz:g} Hz, expected between 0 and {half:g} Hz, half the sample rate.",
-            where=pieces[0].name,
-            channel="rotor_line",
-            hint="Take what `swash rotor-speed` says of the flight, and condition to a higher rate where it needs one.",
-        )
-    return noise._replace(line_hertz=float(hertz), sensor_heading=SEPARATE["sensor_heading"][1])
-
-
-def _typical_speed(pieces: Sequence[Record]) -> float:
-    """Root mean square of each horizontal velocity [m/s]; zero where no positions were measured."""
-    if not {"x", "y"} <= set(pieces[0].output_names):
-        return 0.0
-    columns = [pieces[0].output_names.index(name) for name in ("x", "y")]
-    velocities = [slopes(piece, np.arange(0.0, piece.time.size, 10.0))[1][:, columns] for piece in pieces]
-    return float(np.sqrt(np.mean(np.concatenate(velocities) ** 2)))
-
-
 def stack_records(pieces: Sequence[Record]) -> dict[str, Array]:
     """Records of different lengths side by side, padded with their last sample, and a mask of what is real."""
     longest = -(-max(piece.time.size for piece in pieces) // _LENGTHS) * _LENGTHS
@@ -162,7 +112,7 @@ class PredictionError:
     ) -> None:
         self.table = table
         self.pieces = tuple(pieces)
-        self.noise = _with_first_guesses(noise or Noise(), table.noises, pieces[0].output_names)
+        self.noise = with_first_guesses(noise or Noise(), table.noises, pieces[0].output_names)
         self.estimate_noise = estimate_noise
         self.model = stochastic_model(table.vehicle, pieces[0].output_names, pieces[0].dt, noise=self.noise)
         self.logs, self._log = logs(pieces)
@@ -176,11 +126,8 @@ class PredictionError:
                 entries.append(
                     Entry(f"{name}[{number}]", "nuisance", start, scale, low, mean=start, sigma=sigma, kinked=kinked)
                 )
-        noises = _estimated(self.model, self.noise) if estimate_noise else ()
-        for name in noises:
-            log = float(np.log(getattr(self.noise, name)))
-            spread, added = _NOISE_SPREAD.get(name, 2.0), name.startswith(_ADDED)
-            entries.append(Entry(name, "noise", log, 1.0, log - 9.0, log + 9.0, log, spread, True, added))
+        noises = estimated_noises(self.model, self.noise) if estimate_noise else ()
+        entries += noise_entries(noises, self.noise)
         self.row = Row(tuple(entries), table.prior_correlations)
         stacked = stack_records(pieces)
         seen = [seen_at_start(table.vehicle, piece) for piece in pieces]
@@ -404,26 +351,6 @@ def _by_covariance(dM: Array, n: int) -> Array:
     """Information of n innovations about entries that change their covariance, dM = L^-1 dS L^-T (p, m, m)."""
     flat = dM.reshape(len(dM), -1)
     return np.asarray(0.5 * n * flat @ flat.T)
-
-
-def _estimated(model: StochasticModel, guess: Noise) -> tuple[str, ...]:
-    """The noise numbers that are estimated: the speed, a line's frequency and a gyroscope's noise are given,
-    the wind's, the line's and the separate ones only where wanted.
-
-    Tracked angles err for tenths of a second on end. To the likelihood such errors look like motion, and it would call
-    the gyroscope wrong that does not show them (found on flights of a Crazyflie: 0.17 rad/s instead of 0.04, and delays
-    and inertias to go with it).
-    """
-    left = {"speed", "sensor_rate", "line_hertz", *(() if model.windy else _WIND), *(() if model.lined else _LINE)}
-    left |= {name for name in SEPARATE if not getattr(guess, name) > 0.0}
-    return tuple(name for name in Noise._fields if name not in left)
-
-
-def _with_first_guesses(noise: Noise, separate: Sequence[str], outputs: Sequence[str]) -> Noise:
-    """The noise with first guesses of what yaw or heave are to have for themselves, and that of a gyroscope in use."""
-    if set(RATES) & set(outputs) and not noise.sensor_rate > 0.0:
-        noise = noise._replace(sensor_rate=GYROSCOPE)
-    return noise._replace(**{name: SEPARATE[name][1] for name in separate if not getattr(noise, name) > 0.0})
 
 
 def _of_record(free: Free) -> tuple[float, float, float]:
