@@ -14,6 +14,9 @@ from swashplate.filtering.disturbances import SEPARATE
 
 from .case import Values, apart, flat, named, thinned
 
+_PERHAPS = (*SEPARATE, "sensor_rate")
+"""Numbers of the noise that are zero where a fit has none of them."""
+
 
 def swash(*arguments: str | Path, code: int = 0) -> str:
     """What a command line of `swash` prints; any other exit code than the one that is expected is an error."""
@@ -44,7 +47,7 @@ def of_fit(fit: Any) -> Values:
     for k, e in enumerate(fit.constants):
         found |= {f"{k}.{e.name}": e.value, f"{k}.{e.name}.sigma": e.sigma}
     if fit.noise is not None:
-        told = [n for n in fit.noise._fields if n not in SEPARATE or getattr(fit.noise, n) > 0.0]  # others are shared
+        told = [n for n in fit.noise._fields if n not in _PERHAPS or getattr(fit.noise, n) > 0.0]  # others are shared
         told = [n for n in told if fit.noise.line_hertz or not n.startswith("line")]  # a line that was not asked for
         found |= apart("noise", (getattr(fit.noise, name) for name in told))
     found["directions"] = [d.sigma for d in fit.directions]
