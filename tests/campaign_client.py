@@ -20,7 +20,8 @@ def main(folder: str, workers: int, name: str, count: int) -> None:
     store = CampaignStore(Path(folder))
     with store.held():
         store.begin("", {}, {})
-        left = [task for task in every if task.name not in store.done()]
+        done = store.done()
+        left = [task for task in every if task.name not in done]
         engine: TaskEngine = (DaskEngine if name == "dask" else ProcessPool)(made_campaigns.numbers, workers=workers)
         try:
             standing = CampaignStanding(total=len(every), done=len(every) - len(left), failed=0)
