@@ -13,11 +13,11 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.core.scoring import Likelihood
 from swashplate.identification.core.whitened import Chains, unbent, whitening
 
 THIN = 20
@@ -37,7 +37,7 @@ _ALIKE = 30.0
 class _Chain:
     """One chain: its own copy of the likelihood, its place and its density there."""
 
-    likelihood: Any
+    likelihood: Likelihood
     random: np.random.Generator
     z: Array
     log: float
@@ -53,7 +53,7 @@ class _Reference:
 
 
 def sample(
-    likelihood: Any,
+    likelihood: Likelihood,
     optimum: Array,
     covariance: Array,
     *,
@@ -147,7 +147,7 @@ def _walked(
     return np.array(rows), np.array(stats), share
 
 
-def _density(likelihood: Any, data: Mapping[str, Array], z: Array) -> float:
+def _density(likelihood: Likelihood, data: Mapping[str, Array], z: Array) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         row, stretch = unbent(data, z, np)
     if not (np.all(np.isfinite(row)) and np.all((row >= data["low"]) & (row <= data["high"]))):

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.identification.core.parameter_row import Row
+
+if TYPE_CHECKING:
+    import jax
 
 _NEAR = 8.0
 """Sigmas from the optimum within which a bound bends the scale; farther ones only end it."""
@@ -58,7 +62,7 @@ def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
     }
 
 
-def unbent(data: Mapping[str, Any], z: Any, xp: Any) -> tuple[Any, Any]:
+def unbent(data: Mapping[str, Any], z: Array | jax.Array, xp: ModuleType) -> tuple[Any, Any]:
     """The scaled row of whitened numbers, and the logarithm of what the bent scales stretch.
 
     Args:

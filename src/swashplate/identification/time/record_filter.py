@@ -285,7 +285,7 @@ def whole(parts: Any, n: int) -> Any:
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
 
 
-def first_state(model: StochasticModel, x: Any, nuisance: Any) -> FilterState:
+def first_state(model: StochasticModel, x: Any, nuisance: Array | jax.Array) -> FilterState:
     """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
     front = x.shape[:-1]
     line = np.zeros((*front, model.n_line)) if model.lined else ()

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError, SwashError
@@ -136,9 +137,7 @@ class World:
         self._substeps = round(self._rate / self.pilot.rate)
         self.period = self._substeps / self._rate
         self.delays = _delays(vehicle, self.pilot.delays)
-        waits = np.round(self.delays * self._rate).astype(np.int_)
-        # How many controller steps ago the input was given that acts in a substep, (substeps, n_inputs).
-        self._back = np.maximum(0, -((np.arange(self._substeps)[:, None] - waits) // self._substeps))
+        self._back = _steps_back(self.delays, self._substeps, self._rate)
         self._maneuver: tuple[Maneuver, int] | None = None
         self.reset()
 
@@ -365,6 +364,12 @@ def _delays(vehicle: Vehicle, delays: Array | None) -> Array:
         return np.asarray(delays, dtype=np.float64)
     late = input_delays(vehicle) if vehicle.traits.linear else {}  # the page's own pilots are tuned without
     return np.array([late.get(name, 0.0) for name in vehicle.input_names])
+
+
+def _steps_back(delays: Array, substeps: int, rate: float) -> NDArray[np.int_]:
+    """How many controller steps ago the input was given that acts in a substep, shape (substeps, n_inputs)."""
+    waits = np.round(delays * rate).astype(np.int_)
+    return np.asarray(np.maximum(0, -((np.arange(substeps)[:, None] - waits) // substeps)))
 
 
 def _leans_too_far(x: Array) -> bool:

@@ -20,7 +20,7 @@ from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
 from swashplate.links.live.replay import Replay, as_json, replay
 from swashplate.links.live.session import LiveSession
-from swashplate.links.live.world import World, _steps_back
+from swashplate.links.live.world import World, _delays, _steps_back
 from swashplate.models.delays import input_delays
 from swashplate.models.linear.linear_vehicle import linear_vehicle
 from swashplate.models.linear.state_space import StateSpaceModel
@@ -101,10 +101,10 @@ def test_input_delays_are_flown(session: LiveSession) -> None:
 
 def test_delays_that_are_no_whole_controller_steps() -> None:
     late = linear_vehicle(parse(to_toml(structure("thirteen_state")).replace("value = 0.02", "value = 0.034")))
-    back = _steps_back(late, 5, None, 500.0)
+    back = _steps_back(_delays(late, None), 5, 500.0)
     ago = np.arange(5)[:, None] * 2 + 10 * back  # ms from when the input was given to the substep
     assert np.all((ago >= 34) & (ago < 44))
-    assert not _steps_back(sp.vehicle("coax"), 5, None, 500.0).any()
+    assert not _steps_back(_delays(sp.vehicle("coax"), None), 5, 500.0).any()
 
 
 @pytest.fixture(scope="module")
