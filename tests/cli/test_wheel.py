@@ -69,7 +69,8 @@ def test_it_runs_from_another_folder(wheel: Path, tmp_path: Path) -> None:
 def test_the_source_archive_builds_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     archive = _built(tmp_path / "made", "sdist")
     with tarfile.open(archive) as packed:
-        packed.extractall(tmp_path, filter="data")
+        packed.extraction_filter = getattr(tarfile, "data_filter", None)  # Python before 3.11.4 has none
+        packed.extractall(tmp_path)
     (source,) = (path for path in tmp_path.iterdir() if path.name.startswith("swashplate-"))
     environment = {**os.environ, "SWASHPLATE_WITHOUT_PAGE": "1", "SOURCE_DATE_EPOCH": "1577836800"}
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path / "again")]
