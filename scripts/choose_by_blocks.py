@@ -94,7 +94,7 @@ def learnt(
             rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(found.row)
     for name, row in rows.items():
         numbers = (row * likelihood.row.scale)[: len(table.names)]
-        told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.unpack(row)[1]))
+        told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.nuisances_of(row)))
         yield name, table.vehicle.with_values(table.identified(numbers)), likelihood.noise_of(row), told
 
 

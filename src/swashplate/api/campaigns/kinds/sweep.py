@@ -25,6 +25,9 @@ from swashplate.api.campaigns.shares import quantile, share_interval
 from swashplate.api.campaigns.tasks import Columns, Portion
 from swashplate.errors import CampaignError
 
+_UNITS = {"delay": "s", "payload": "kg", "indoor": "m/s", "outdoor": "m/s", "rate": "Hz", "computation": "s"}
+"""Of entries with numbers, by their last word."""
+
 
 class SweepCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """The file of a campaign over choices.
@@ -146,6 +149,8 @@ def curves(shares: Sequence[tuple[dict[str, Any], int, int]], *, what: str) -> t
         low, high = share_interval(count, of)
         others = words_of({name: value for name, value in choice.items() if name != along})
         found.setdefault(others, []).append((choice[along], 100.0 * count / of, 100.0 * low, 100.0 * high))
+    unit = _UNITS.get(along.rpartition(".")[2])
+    along = f"{along} [{unit}]" if unit else along
     return tuple(ChoiceCurve(f"{what} [%]", along, name, tuple(points)) for name, points in found.items())
 
 
