@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import binom
 
 import swashplate as sp
 from swashplate.flights.flight import Flight
@@ -90,3 +91,7 @@ def test_the_sensors_noise_is_right_with_the_line_and_too_large_without() -> Non
         related.append(np.sum(errors[3:] * errors[:-3], axis=0) / np.sum(errors**2, axis=0))
     assert np.all(related[0][2:5] > 0.25)  # z, phi, theta
     assert np.all(np.abs(related[1][2:5]) < 0.1)
+    inside = [off < 2.0 for off in _off(known).values()]
+    assert sum(inside) >= binom.ppf(0.01, len(inside), 0.954), (
+        "right bounds would have fewer inside in 1 of 100 flights"
+    )

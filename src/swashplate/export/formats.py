@@ -116,8 +116,6 @@ def export_model(
         raise ExportError(f"'{form}' is no format.", channel="--format", hint=f"There are {', '.join(FORMATS)}.")
     if precision != "double" and form != "c":
         raise ExportError(f"numbers of '{form}' are double.", channel="--precision", hint="It is for --format c.")
-    if isinstance(model, Vehicle):
-        refuse_predictor(model, "exports")
     flying = model if isinstance(model, Vehicle) and model.structure is None else None
     late, left_out, about = None, "", trim
     if flying is None:
@@ -129,6 +127,7 @@ def export_model(
         if delays is False:
             model, left_out = _without_delays(model, name)
     else:
+        refuse_predictor(flying, "exports")
         known = logged_delays(flying) if delays else input_delays(flying)
         late = None if delays is False else known or None
         if delays is False and any(known.values()):

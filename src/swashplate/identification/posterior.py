@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -152,32 +153,20 @@ def _drawn(
     if method == "nuts":
         from swashplate.identification.core import nuts
 
-        found = nuts.sample(
-            likelihood.traced(),
-            row,
-            fitted.row,
-            covariance,
-            chains=chains,
-            warmup=warmup,
-            block=BLOCK,
-            most=draws,
-            enough=enough,
-            seed=seed,
-            progress=progress,
-        )
+        draw = partial(nuts.sample, likelihood.traced(), row)
     else:
-        found = metropolis.sample(
-            likelihood,
-            fitted.row,
-            covariance,
-            chains=chains,
-            warmup=warmup,
-            block=BLOCK,
-            most=draws,
-            enough=enough,
-            seed=seed,
-            progress=progress,
-        )
+        draw = partial(metropolis.sample, likelihood)
+    found = draw(
+        fitted.row,
+        covariance,
+        chains=chains,
+        warmup=warmup,
+        block=BLOCK,
+        most=draws,
+        enough=enough,
+        seed=seed,
+        progress=progress,
+    )
     return Posterior(
         method,
         row.names,
