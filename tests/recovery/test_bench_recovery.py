@@ -157,7 +157,7 @@ def _held_bounds(aircraft: Vehicle, seeds: int) -> tuple[np.ndarray, np.ndarray,
     truth = np.array([aircraft.card.values()[name] for name in names])
     errors, sigmas, distances = [], [], []
     for seed in range(seeds):
-        card = _held(aircraft, seed)[0].card
+        card = _held(aircraft, seed)[0].model.card
         off = np.array([card.parameters[name].value for name in names]) - truth
         joint = parse_card(card.to_toml()).covariance(names)
         errors.append(off[: len(LEANING)])
