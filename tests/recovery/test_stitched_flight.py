@@ -92,9 +92,14 @@ def test_half_way_between_two_points() -> None:
     assert max(max(pair) for pair in found.steps.values()) < 0.05
 
 
+ONE_REGIME = {"rmax": 20.0, "raptor50": 17.5}
+"""Up to which speed [m/s] the points are of one regime: at 20 m/s the Raptor's tailplane gives all the lift it can. A
+point there has lost the tail's damping (q by q: -0.10 instead of -0.41 1/s), and no speed below 19.9 m/s has."""
+
+
 @pytest.mark.proof
 def test_between_points_of_two_helicopters() -> None:
-    rows, worst = [], {}
+    rows, worst, beyond = [], {}, []
     for name in ("rmax", "raptor50"):
         truth = vehicle(name)
         for spacing in (5.0, 2.5):
@@ -109,8 +114,11 @@ def test_between_points_of_two_helicopters() -> None:
                     [name, spacing, float(speed), f"{100 * d.controls:.2f}", f"{np.degrees(d.attitude):.3f}",
                      f"{100 * linear:.1f}", f"{100 * angular:.1f}", *told]
                 )  # fmt: skip
-            steps = [max(pair) for d in far for pair in d.steps.values()]
-            worst[name, spacing] = max(steps), sum(s <= 0.05 for s in steps), len(steps), max(d.controls for d in far)
+            within = [d for d, upper in zip(far, points[1:], strict=True) if upper <= ONE_REGIME[name]]
+            steps = [max(pair) for d in within for pair in d.steps.values()]
+            good = sum(s <= 0.05 for s in steps)
+            worst[name, spacing] = max(steps), good, len(steps), max(d.controls for d in within)
+            beyond += [max(max(pair) for pair in d.steps.values()) for d in far if d not in within]
     said = "; ".join(
         f"{name} every {spacing:g} m/s: {good} of {every} steps, the worst {100 * most:.1f} %"
         for (name, spacing), (most, good, every, _) in worst.items()
@@ -121,7 +129,8 @@ def test_between_points_of_two_helicopters() -> None:
             "title": "Stitched models between their points",
             "text": "Points linearised from hover to 20 m/s, against the nonlinear helicopter half way between them. "
             f"Steps of {np.degrees(STEP):.1f} deg from trim, open loop; error over truth (rms) on the step's own axis "
-            f"within 1 and 2 s. Within 5 %: {said}.",
+            f"within 1 and 2 s. Within 5 %: {said}. Not counted: raptor50 above {ONE_REGIME['raptor50']:g} m/s, "
+            f"where its tailplane saturates at the last point (there up to {100 * max(beyond):.0f} %).",
             "columns": [
                 "helicopter", "points every [m/s]", "speed [m/s]", "controls [% of travel]", "attitude [deg]",
                 "linear acc. [%]", "angular acc. [%]", *(f"{axis} after {name} [%]" for name, axis in AXES.items()),
@@ -133,3 +142,4 @@ def test_between_points_of_two_helicopters() -> None:
     assert all(controls < 2e-3 for *_, controls in worst.values())
     assert worst["rmax", 5.0][0] < 0.05
     assert worst["raptor50", 2.5][0] < 0.05
+    assert min(beyond) > 0.05  # a point of another regime is seen
