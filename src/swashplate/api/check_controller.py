@@ -14,6 +14,7 @@ from swashplate.control.analysis.check import check_controller as judge
 from swashplate.control.analysis.check_gusts import InGusts
 from swashplate.control.analysis.requirements import ATTITUDE_COUPLING, GAIN_MARGIN, PHASE_MARGIN, REJECTION_PEAK
 from swashplate.control.lateness import lateness
+from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
 from swashplate.reporting.structure import Report
@@ -99,6 +100,7 @@ def check_controller(
         delays=delays,
         computation=computation,
         required_delay=required_delay,
+        fly=loop_in_c(vehicle, made, at),
     )
     return ControllerCheck(found, name, lateness(vehicle, made, given=delays))
 

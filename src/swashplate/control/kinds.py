@@ -11,6 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
+from swashplate.arrays import Array
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
 from swashplate.errors import ControllerError
@@ -98,6 +101,28 @@ class ControllerKind(Generic[C]):
             ControllerError: where its step cannot be printed as C.
         """
         raise ControllerError("has no C: its step is written for JAX only.", where=type(controller).__name__)
+
+    def flown(self, controller: C) -> TracedStep:
+        """One step as a simulation calls it: `measured` names states of the vehicle, "voltage" and, where it has
+        sensors of its own, the specific force (`FELT`) and its `draws`.
+
+        Raises:
+            ControllerError: where its step cannot be printed as C.
+        """
+        return self.traced(controller)
+
+    def draws(self, controller: C, samples: int) -> Array:
+        """What its sensors draw for each of its samples, shape (samples, draws)."""
+        return np.zeros((samples, 0))
+
+
+FELT = ("felt_x", "felt_y", "felt_z")
+"""The specific force at the centre of gravity among what a simulation tells a controller [m/s^2]."""
+
+
+def draw_names(count: int) -> tuple[str, ...]:
+    """The draws of one sample among what a simulation tells a controller."""
+    return tuple(f"draw_{k}" for k in range(count))
 
 
 PLAIN: ControllerKind[Any] = ControllerKind()

@@ -16,7 +16,7 @@ from swashplate.filtering import observer
 from swashplate.filtering.disturbances import DISTURBED
 from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverPlan
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.discretisation import held_late, with_late_inputs
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import LinearModel
@@ -135,7 +135,7 @@ def outputs(plan: ObserverPlan, numbers: Numbers, trim: Trim) -> Array:
     return np.asarray(_outputs(plan, made, jnp.asarray(e), jnp.asarray(w)), dtype=np.float64)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _outputs(plan: ObserverPlan, numbers: Numbers, e: Any, w: Any) -> Any:
     M = JaxMatrices()
     return M.linearised(lambda e, w: observer.shown(plan, numbers, e, w, M.xp), e, w)[1]

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import FloatBackend
 from swashplate.physics.environment import Environment
+from swashplate.physics.frames import Euler, Vector, local_to_body
 
 _LOOKS = 40
 _NOMINAL = "voltage_nominal"
@@ -49,9 +50,8 @@ def _through_the_air(vehicle: Vehicle, x: Array, environment: Environment) -> fl
     if not {*_SPEEDS, *_ANGLES} <= {*vehicle.state_names}:
         return 0.0
     moving, angles = (x[[vehicle.index(name) for name in names]] for names in (_SPEEDS, _ANGLES))
-    wind = [float(value) for value in environment[:3]]
-    turned = Rotation.from_euler("ZYX", angles[::-1]).inv().apply(wind) if any(wind) else 0.0
-    return float(np.linalg.norm(moving - turned))
+    wind = local_to_body(Vector(*map(float, environment[:3])), Euler(*map(float, angles)), FloatBackend())
+    return float(np.linalg.norm(moving - np.array(wind)))
 
 
 _SPEEDS, _ANGLES = ("u", "v", "w"), ("phi", "theta", "psi")

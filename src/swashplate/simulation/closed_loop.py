@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.arrays import Array
 from swashplate.errors import SwashError
@@ -68,6 +68,36 @@ class Controller(Protocol):
     def step(self) -> Step: ...
 
 
+class LoopTables(NamedTuple):
+    """What a flight under a controller is made of, sample by sample of the simulation.
+
+    Attributes:
+        start: state row (states,).
+        around: `SURROUNDINGS`, shape (n, 4). wanted: `REFERENCES`, (n, 8). added: to the commands, (n, inputs).
+        limits: lowest and highest of the inputs, shape (2, inputs).
+        late: samples that the commands of each input are late, shape (inputs,).
+        first: what the actuators get until the first command arrives, shape (inputs,).
+        every: samples of the simulation to one of the controller.
+        dt: of a sample [s].
+        environment: the air and gravity of all of them.
+    """
+
+    start: Array
+    around: Array
+    wanted: Array
+    added: Array
+    limits: Array
+    late: NDArray[np.int_]
+    first: Array
+    every: int
+    dt: float
+    environment: Environment
+
+
+FlyLoop = Callable[[Controller, LoopTables], tuple[Array, Array]]
+"""Flies a controller's samples: states (n, states) and what the actuators got (n, inputs)."""
+
+
 def flown_delays(
     vehicle: Vehicle, controller: Controller, *, delays: Mapping[str, float] | float | None = None
 ) -> Array:
@@ -95,6 +125,7 @@ def simulate_closed_loop(
     start: Trim | Mapping[str, float] | None = None,
     rate: float = 100.0,
     environment: Environment | None = None,
+    fly: FlyLoop | None = None,
 ) -> Flight:
     """Fly a vehicle under a controller, with an excitation added to what the controller commands.
 
@@ -136,33 +167,17 @@ def simulate_closed_loop(
     at_start = dict(zip(vehicle.state_names, x0, strict=True))
     wanted = _table(REFERENCES, reference or {}, n, [at_start.get(name, 0.0) for name in REFERENCES])
     added = _table(vehicle.input_names, excitation or {}, n, [0.0] * len(vehicle.input_names))
-    fly = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly
     late = steps_late(flown_delays(vehicle, controller, delays=delays), rate)
     waiting = 1 << (int(late.max()) - 1).bit_length() if late.any() else 0
-    longer = shared_length(n)
     first = _inputs_before(vehicle, start, surroundings) if waiting else np.zeros(len(vehicle.input_names))
 
-    def flown(as_carried: CarriedAttitude) -> tuple[Array, Array]:
-        states, inputs = fly(
-            equations_of(as_carried.vehicle),
-            controller.step,
-            waiting,
-            as_carried.see,
-            as_carried.start,
-            as_carried.shown,
-            jnp.asarray(controller.memory),
-            jnp.asarray(controller.gains),
-            tuple(lengthened(table, longer) for table in (around, wanted, added)),
-            parameter_row(vehicle, surroundings),
-            np.array(vehicle.input_limits).T,
-            late,
-            first,
-            round(every),
-            1.0 / rate,
-        )
-        return np.asarray(states)[:n], np.asarray(inputs)[:n]
+    limits = np.array(vehicle.input_limits).T
+    tables = LoopTables(x0, around, wanted, added, limits, late, first, round(every), 1.0 / rate, surroundings)
 
-    states, inputs = flown(with_angles(vehicle, x0))
+    def flown(as_carried: CarriedAttitude) -> tuple[Array, Array]:
+        return _flown_by_xla(as_carried, controller, tables, waiting, parameter_row(vehicle, surroundings))
+
+    states, inputs = flown(with_angles(vehicle, x0)) if fly is None else fly(controller, tables)
     if not vehicle.traits.linear and steep(states):
         states, inputs = flown(with_quaternion(vehicle, x0))
     time, rows = np.arange(n) / rate, np.concatenate([inputs, around], axis=1)
@@ -170,6 +185,31 @@ def simulate_closed_loop(
     flight = simulated_flight(vehicle, time, states, rows, details=details)
     check_divergence(vehicle, time, states, flight)
     return flight
+
+
+def _flown_by_xla(
+    as_carried: CarriedAttitude, controller: Controller, tables: LoopTables, waiting: int, p: Array
+) -> tuple[Array, Array]:
+    fly, n = _fly_quickly_compiled if getattr(controller.step, "feels", False) else _fly, len(tables.around)
+    longer = shared_length(n)
+    states, inputs = fly(
+        equations_of(as_carried.vehicle),
+        controller.step,
+        waiting,
+        as_carried.see,
+        as_carried.start,
+        as_carried.shown,
+        jnp.asarray(controller.memory),
+        jnp.asarray(controller.gains),
+        tuple(lengthened(table, longer) for table in (tables.around, tables.wanted, tables.added)),
+        p,
+        tables.limits,
+        tables.late,
+        tables.first,
+        tables.every,
+        tables.dt,
+    )
+    return np.asarray(states)[:n], np.asarray(inputs)[:n]
 
 
 def _inputs_before(vehicle: Vehicle, start: Trim | Mapping[str, float] | None, around: Environment) -> Array:

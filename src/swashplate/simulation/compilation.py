@@ -20,6 +20,9 @@ from swashplate.errors import WriteError
 QUICK_TO_COMPILE = {"xla_cpu_use_fusion_emitters": False}
 """Options for `jax.jit` of what runs few times: four times less compiling for a helicopter's exact derivatives."""
 
+RUN_RARELY = {**QUICK_TO_COMPILE, "xla_backend_optimization_level": 0}
+"""Of what is called a few hundred times at most: half of the compiling, and a call takes 10 to 70 us longer."""
+
 _SMALL_LOOP = "xla_cpu_small_while_loop_byte_threshold"
 _SMALL_LOOP_BYTES = 1_000_000
 

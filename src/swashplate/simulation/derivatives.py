@@ -17,7 +17,7 @@ from swashplate.models.conventional.helicopter import CONTRIBUTORS, loads
 from swashplate.models.conventional.helicopter_options import HelicopterOptions
 from swashplate.models.nesting import leaves, rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.dynamics import (
     SURROUNDINGS,
     Equations,
@@ -66,7 +66,7 @@ def derivative_table(vehicle: Vehicle, trim: Trim) -> DerivativeTable:
     return DerivativeTable(parts, following[:2], "automatic differentiation")
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " parameters"]) -> tuple[Any, Any]:
     vehicle = equations.vehicle
 

@@ -18,7 +18,7 @@ from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
 from swashplate.physics.environment import Environment
-from swashplate.simulation.compilation import QUICK_TO_COMPILE, compile_small_loops_whole
+from swashplate.simulation.compilation import RUN_RARELY, compile_small_loops_whole
 from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]
@@ -147,7 +147,7 @@ def row_force(equations: Equations, *, xp: JaxBackend | None = None) -> RowRates
     return felt
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def rates_and_slopes(
     equations: Equations,
     x: Float[jax.Array, " states"],

@@ -73,11 +73,32 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
     for name, part in zip(_NAMES, _filters(gusts, rate), strict=True):
         x = part.start @ random.standard_normal((part.step.shape[0], count))
         series = np.empty((samples, count))
-        for k in range(samples):
-            series[k] = part.output @ x
-            x = part.step @ x + part.noise @ random.standard_normal(x.shape)
+        coming, shaken = _block(part)
+        for k in range(0, samples, _BLOCK):
+            size = min(_BLOCK, samples - k)
+            noise = random.standard_normal((size, *x.shape)).reshape(-1, count)
+            states = coming[: size * len(x)] @ x + shaken[: size * len(x), : len(noise)] @ noise
+            series[k], x = part.output @ x, states[-len(x) :]
+            series[k + 1 : k + size] = part.output @ states[: -len(x)].reshape(size - 1, len(x), count)
         found[name] = series
     return found
+
+
+_BLOCK = 64
+"""Samples in one product; a step of two states alone is some calls of numpy."""
+
+
+def _block(part: _Filter) -> tuple[Array, Array]:
+    """The next states, one below the other, from the state at the start of a block and from its noise."""
+    n = len(part.step)
+    powers = [np.eye(n)]
+    for _ in range(_BLOCK):
+        powers.append(part.step @ powers[-1])
+    shaken = np.zeros((_BLOCK, n, _BLOCK, n))
+    for k in range(_BLOCK):
+        for j in range(k + 1):
+            shaken[k, :, j] = powers[k - j] @ part.noise
+    return np.concatenate(powers[1:]), shaken.reshape(_BLOCK * n, _BLOCK * n)
 
 
 class Turbulence:

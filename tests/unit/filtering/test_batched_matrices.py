@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from swashplate.control.lqg.design import design
+from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.filtering.batched_matrices import Stack, StackMatrices
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.linear.linear_vehicle import linear_vehicle
@@ -55,11 +56,15 @@ def test_a_batch_flies_as_one_does() -> None:
     )
     again = controller.starting_at(controller.start, seed=5)
     held = np.append(np.repeat(push["longitudinal"], 2), 0.05)
-    one = simulate_closed_loop(
-        vehicle, again, duration=0.8, rate=100.0, reference={"z": -0.1}, excitation={"longitudinal": held}
+    one, in_c = (
+        simulate_closed_loop(
+            vehicle, again, duration=0.8, rate=100.0, reference={"z": -0.1}, excitation={"longitudinal": held}, fly=fly
+        )
+        for fly in (None, loop_in_c(vehicle, controller, controller.start))
     )
     for name in ("u", "theta", "z", "q"):
         series = one.values(name)[:-1:2]
         assert np.max(np.abs(series)) > 1e-3
         np.testing.assert_allclose(many[name][: len(series), 1], series, atol=1e-10)
+        np.testing.assert_allclose(in_c.values(name), one.values(name), atol=1e-10)
     assert np.max(np.abs(many["u"][-1, 1] - many["u"][-1, [0, 2]])) > 1e-6

@@ -10,7 +10,7 @@ import numpy as np
 from swashplate.control.analysis.check_steps import LEAD, flying_rate
 from swashplate.control.analysis.judged_loop import Aircraft
 from swashplate.errors import DivergenceError
-from swashplate.simulation.closed_loop import Controller, simulate_closed_loop
+from swashplate.simulation.closed_loop import Controller, FlyLoop, simulate_closed_loop
 from swashplate.simulation.wind import Gusts, dryden
 
 FLIGHTS = 4
@@ -48,6 +48,8 @@ def fly_gusts(
     duration: float,
     problems: list[str],
     notes: list[str],
+    *,
+    fly: FlyLoop | None = None,
 ) -> InGusts | None:
     """Fly `FLIGHTS` times in turbulence about a trim.
 
@@ -58,6 +60,7 @@ def fly_gusts(
         duration: of each flight, as long as a step's so that nothing is compiled anew [s].
         problems: a lost flight is told here.
         notes: why there is none.
+        fly: see `simulate_closed_loop`.
     """
     if gusts is None or not held:
         return None
@@ -81,6 +84,7 @@ def fly_gusts(
                 start=trim,
                 rate=rate,
                 environment=trim.environment,
+                fly=fly,
             )
         except DivergenceError as error:
             problems.append(f"A flight in gusts was lost after {error.time:.2f} s ({error.state}).")

@@ -7,14 +7,14 @@ IEEE Control Systems Magazine (2020), balanced form.
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import control
 import numpy as np
 import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
 from swashplate.arrays import Array
 from swashplate.errors import ControllerError
@@ -128,9 +128,9 @@ def margins(frequencies: ArrayLike, loop: ArrayLike, names: tuple[str, ...]) -> 
     if L.shape != (w.size, m, m) or not np.all(np.isfinite(L)):
         raise ControllerError(f"the loop has shape {L.shape}, expected finite numbers ({w.size}, {m}, {m}).")
     S = np.linalg.inv(np.eye(m) + L)
-    half = S - 0.5 * np.eye(m)  # (S - T) / 2
+    half = np.asarray(S - 0.5 * np.eye(m), dtype=np.complex128)  # (S - T) / 2
     axes = tuple(_axis(name, w, 1.0 / S[:, i, i] - 1.0, half[:, i, i]) for i, name in enumerate(names))
-    bounds = np.array([_scaled(M, _perron(M)) for M in half])
+    bounds = _scaled(half, _perron(half))
     peak = int(np.argmax(bounds))
     around = slice(max(peak - _REFINED // 2, 0), peak + _REFINED // 2 + 1)
     for i in range(*around.indices(w.size)):
@@ -149,16 +149,13 @@ def promised_disc(sensitivities: NDArray[np.complex128]) -> float:
     Args:
         sensitivities: 1 / (1 + L) over frequency, shape (n, m, m).
     """
-    half = sensitivities - 0.5 * np.eye(sensitivities.shape[-1])
-    return min(1.0 / max(_scaled(M, _perron(M)) for M in half), 2.0)
+    half = np.asarray(sensitivities - 0.5 * np.eye(sensitivities.shape[-1]), dtype=np.complex128)
+    return min(1.0 / float(np.max(_scaled(half, _perron(half)))), 2.0)
 
 
 def _axis(name: str, w: Array, loop: Any, half: Any) -> AxisMargins:
     worst = int(np.argmax(np.abs(half)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of points at the edge of the grid
-        found: Any = control.stability_margins(control.frd(loop, w, smooth=True), returnall=True)
-    gains, phases, crossings = np.asarray(found[0]), np.asarray(found[1]), np.asarray(found[4])
+    gains, phases, crossings = _crossings(w, loop)
     up, down = gains[gains > 1.0], gains[(gains < 1.0) & (gains > 0.0)]
     turned = np.abs((phases + 180.0) % 360.0 - 180.0)
     return AxisMargins(
@@ -173,25 +170,54 @@ def _axis(name: str, w: Array, loop: Any, half: Any) -> AxisMargins:
     )
 
 
+def _crossings(w: Array, loop: NDArray[np.complex128]) -> tuple[Array, Array, Array]:
+    """Gain margins where the phase is -180 degrees; phase margins [deg] and frequencies where the gain is one.
+
+    Read from the cubic spline through the points, as python-control's `stability_margins` reads frequency responses.
+    """
+    between = CubicSpline(w, loop)
+
+    def roots(of: Callable[[Any], Any], at: NDArray[np.int_]) -> Array:
+        return np.array([scipy.optimize.brentq(lambda v: float(of(between(v))), w[i], w[i + 1]) for i in at])
+
+    def turned(value: Any) -> Any:
+        return np.angle(-value)
+
+    def grown(value: Any) -> Any:
+        return np.abs(value) - 1.0
+
+    opposed = np.flatnonzero(np.diff(np.sign(turned(loop))))
+    opposed = opposed[loop[opposed].real <= 0.0]
+    at_one = roots(grown, np.flatnonzero(np.diff(np.sign(grown(loop)))))
+    with np.errstate(divide="ignore"):
+        gains = 1.0 / np.abs(between(roots(turned, opposed)))
+    return gains, np.remainder(np.degrees(np.angle(between(at_one))), 360.0) - 180.0, at_one
+
+
 def _perron(M: NDArray[np.complex128]) -> Array:
-    """log of the scaling that is best for |M|: the square root of its Perron vectors' ratio (Safonov 1982)."""
-    size = np.abs(M) + 1e-12 * np.abs(M).max()
+    """log of the scaling that is best for |M|: the square root of its Perron vectors' ratio (Safonov 1982).
+
+    Of one matrix (m, m), or of each of many (..., m, m).
+    """
+    size = np.abs(M)
+    size = size + 1e-12 * size.max(axis=(-2, -1), keepdims=True)
     vectors = []
-    for matrix in (size, size.T):
+    for matrix in (size, np.swapaxes(size, -1, -2)):
         values, found = np.linalg.eig(matrix)
-        vectors.append(np.abs(found[:, int(np.argmax(values.real))]))
+        largest = np.argmax(values.real, axis=-1)[..., None, None]
+        vectors.append(np.abs(np.take_along_axis(found, largest, axis=-1)[..., 0]))
     right, left = vectors
     return np.asarray(0.5 * np.log(left / right), dtype=np.float64)
 
 
-def _scaled(M: NDArray[np.complex128], logs: Array) -> float:
-    """Largest singular value of D M D^-1."""
-    d = np.exp(logs - logs[-1])
-    return float(np.linalg.norm(d[:, None] * M / d, 2))
+def _scaled(M: NDArray[np.complex128], logs: Array) -> Any:
+    """Largest singular value of D M D^-1, of one matrix or of each of many."""
+    d = np.exp(logs - logs[..., -1:])
+    return np.linalg.svd(d[..., :, None] * M / d[..., None, :], compute_uv=False)[..., 0]
 
 
 def _best_scaled(M: NDArray[np.complex128]) -> float:
     """The smallest over D found; a convex problem in log D."""
     start = _perron(M)
     best = scipy.optimize.minimize(lambda logs: _scaled(M, logs), start, method="Nelder-Mead", options={"xatol": 1e-4})
-    return min(_scaled(M, start), float(best.fun))
+    return min(float(_scaled(M, start)), float(best.fun))

@@ -20,7 +20,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.closed_loop import REFERENCES, Controller, Step, flown_delays
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.discretisation import held_late, with_late_inputs
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.linearize import linearize
@@ -165,7 +165,7 @@ def sampled_loop(
     return made(np.zeros(len(late)))
 
 
-@partial(jax.jit, static_argnums=(0, 6), compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=(0, 6), compiler_options=RUN_RARELY)
 def _decisions(
     control: Step,
     measured: Float[jax.Array, " measured"],

@@ -36,10 +36,11 @@ from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverEstimate, ObserverPlan
 from swashplate.filtering.sensor_suite import BIASED, readings
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import Backend
 from swashplate.physics.frames import Vector
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import Step
-from swashplate.simulation.compilation import QUICK_TO_COMPILE
+from swashplate.simulation.compilation import RUN_RARELY
 from swashplate.simulation.trim import Trim
 
 _BODY = len(RigidBody._fields)
@@ -108,12 +109,10 @@ class SensedStep:
         nb, channels = len(plan.biases), len(plan.channels)
         bias, seed, count = own[:nb], own[nb], own[nb + 1]
         queue = own[nb + 2 :].reshape(self.depth, channels, *own.shape[1:])
-        now = true_readings(plan, x, force, bias, M)
+        now = M.row(true_readings(plan, x, force, bias, M.xp))
         queue = jnp.where(count < 0.5, jnp.broadcast_to(now, queue.shape), jnp.concatenate([now[None], queue[:-1]]))
 
-        def drawing(seed: Int[jax.Array, ""], count: Int[jax.Array, ""]) -> Any:
-            return jax.random.normal(jax.random.fold_in(jax.random.key(seed), count), (channels + nb,))
-
+        drawing = partial(_drawing, channels + nb)
         each: Any = drawing if own.ndim == 1 else jax.vmap(drawing, out_axes=1)
         drawn = each(seed.astype(int), count.astype(int))
         place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
@@ -129,17 +128,23 @@ class SensedStep:
         return noisy, jnp.concatenate([bias, jnp.stack([seed, count + 1.0]), queue.reshape(-1, *own.shape[1:])])
 
 
-def true_readings(
-    plan: ObserverPlan,
-    x: Float[jax.Array, "states ..."],
-    force: Float[jax.Array, "3 ..."],
-    bias: Float[jax.Array, "biases ..."],
-    M: JaxMatrices,
-) -> Any:
-    """All channels of a true state row, without noise."""
+def _drawing(count: int, seed: Int[jax.Array, ""], sample: Int[jax.Array, ""]) -> Any:
+    """What sensors draw for one sample, shape (count,)."""
+    return jax.random.normal(jax.random.fold_in(jax.random.key(seed), sample), (count,))
+
+
+@partial(jax.jit, static_argnums=0)
+def _drawn_compiled(count: int, seed: Int[jax.Array, ""], samples: Int[jax.Array, " samples"]) -> Any:
+    each: Any = jax.vmap(partial(_drawing, count), in_axes=(None, 0))
+    return each(seed, samples)
+
+
+def true_readings(plan: ObserverPlan, x: Any, force: Any, bias: Any, xp: Backend) -> list[Any]:
+    """All channels of a true state row, without noise; x (states, ...), force (3, ...) and bias (biases, ...) are rows
+    of the backend's numbers."""
     body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])
     named = {name: bias[i] for i, name in enumerate(plan.biases)}
-    return M.row([v for sensor in plan.sensors for v in readings(sensor, body, felt, named, M.xp).values()])
+    return [v for sensor in plan.sensors for v in readings(sensor, body, felt, named, xp).values()]
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,21 @@ class Lqg:
 
     @property
     def step(self) -> Step:
+        return self.sensed
+
+    @property
+    def sensed(self) -> SensedStep:
+        """The step with its sensors."""
         return SensedStep(self.plan, len(self.feedback.speeds))
+
+    @property
+    def drawn(self) -> int:
+        """How many numbers its sensors draw for a sample: noise of the channels, steps of the biases."""
+        return len(self.plan.channels) + len(self.plan.biases)
+
+    def draws(self, samples: int) -> Array:
+        """What its sensors draw in flight, shape (samples, drawn)."""
+        return np.asarray(_drawn_compiled(self.drawn, self.seed, jnp.arange(samples)))
 
     @property
     def gains(self) -> Array:
@@ -227,7 +246,7 @@ class Lqg:
             return np.zeros(0)
         random = np.random.default_rng(seed)
         bias = np.array([BIASED[name][0] for name in plan.biases]) * random.standard_normal(len(plan.biases))
-        depth = SensedStep(plan, 1).depth
+        depth = self.sensed.depth
         return np.concatenate([bias, [float(seed), 0.0], np.zeros(depth * len(plan.channels))])
 
     def memories(self, seeds: Iterable[int]) -> Array:
@@ -260,7 +279,7 @@ def _stored(plan: ObserverPlan, numbers: Numbers, mean: ArrayLike, w: ArrayLike)
     return _stored_compiled(plan, made, jnp.asarray(mean), jnp.asarray(w))
 
 
-@partial(jax.jit, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
+@partial(jax.jit, static_argnums=0, compiler_options=RUN_RARELY)
 def _stored_compiled(
     plan: ObserverPlan, numbers: Numbers, mean: Float[jax.Array, "n 1"], w: Float[jax.Array, " driving"]
 ) -> Any:

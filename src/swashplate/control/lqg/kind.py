@@ -10,16 +10,17 @@ import numpy as np
 from swashplate.arrays import Array, Complex
 from swashplate.control.analysis.judged_loop import Aircraft, JudgedLoop, judged_with_states
 from swashplate.control.analysis.margins import Margins
-from swashplate.control.kinds import ControllerKind, TracedStep
+from swashplate.control.kinds import FELT, ControllerKind, TracedStep, draw_names
 from swashplate.control.lqg.analysis import sensitivity
 from swashplate.control.lqg.controller import Lqg
 from swashplate.control.lqg.file import lqg_document, lqg_from
 from swashplate.control.lqg.other_model import differences
 from swashplate.control.lqg.steady_loop import observed_loop
-from swashplate.control.lqg.traced import lqg_function, measured_names
+from swashplate.control.lqg.traced import lqg_function, measured_names, sensed_function
 from swashplate.control.lqg.transfer import flown_on
 from swashplate.errors import ControllerError
 from swashplate.models.vehicle import Vehicle
+from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.trim import Trim
 
 _OBSERVED = (
@@ -81,6 +82,20 @@ class LqgKind(ControllerKind[Lqg]):
             vehicle.input_names,
             f"{vehicle.name}, LQG, designed on: {vehicle.card.title}",
         )
+
+    def flown(self, controller: Lqg) -> TracedStep:
+        traced = self.traced(controller)
+        if not controller.plan.sensors:
+            return traced
+        return replace(
+            traced,
+            function=sensed_function(controller, traced.function),
+            start=tuple(controller.memory.tolist()),
+            measured=(*RigidBody._fields, *FELT, "voltage", *draw_names(controller.drawn)),
+        )
+
+    def draws(self, controller: Lqg, samples: int) -> Array:
+        return controller.draws(samples)
 
 
 KIND = LqgKind()

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.control.lqg.controller import Lqg
+from swashplate.control.lqg.controller import Lqg, true_readings
 from swashplate.control.lqg.controller_step import Carried, lqg_step, sizes
 from swashplate.control.lqg.law import LAW_MEMORY
 from swashplate.filtering.matrix_operations import Scalars
 from swashplate.filtering.observer import ObserverEstimate
 from swashplate.physics.backend import Backend, CasadiBackend
+from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.closed_loop import REFERENCES
 
 
@@ -105,6 +106,48 @@ def lqg_function(controller: Lqg) -> Any:
     covariance = [casadi.reshape(casadi.densify(after.estimate.covariance), rows * rows, 1)] if rows else []
     mean = [after.estimate.mean] if N else []
     result = casadi.vertcat(*mean, *covariance, *flat, *commands)
+    return casadi.Function("swash_traced", [memory, measured, reference], [result])
+
+
+def sensed_function(controller: Lqg, step: Any) -> Any:
+    """`step` of `lqg_function` behind the simulated sensors, as `SensedStep` flies it.
+
+    Its memory has the sensors' behind it; `measured` is the body's state row, the specific force, the voltage and the
+    draws.
+    """
+    import casadi
+
+    plan = controller.plan
+    nb, channels, body = len(plan.biases), len(plan.channels), len(RigidBody._fields)
+    inner, depth = controller.inner_memory.size, controller.sensed.depth
+    own, x, felt, drawn = (
+        casadi.SX.sym(name, size)
+        for name, size in (
+            ("own", nb + 2 + depth * channels),
+            ("x", body),
+            ("felt", 3),
+            ("drawn", controller.drawn),
+        )
+    )
+    bias, count = own[:nb], own[nb + 1]
+    now = casadi.vertcat(*true_readings(plan, x, felt, bias, CasadiBackend()))
+    stored = casadi.vertcat(now, own[nb + 2 : nb + 2 + (depth - 1) * channels])
+    queue = casadi.if_else(count < 0.5, casadi.repmat(now, depth, 1), stored)
+    place = [at.late for s, at in zip(plan.sensors, plan.sampling, strict=True) for _ in s.channels]
+    numbers = controller.numbers
+    wander = np.asarray(numbers.process)[plan.n + 6 : plan.n + 6 + nb]
+    noisy = [
+        queue[late * channels + i] + np.sqrt(variance) * drawn[i]
+        for i, (late, variance) in enumerate(zip(place, np.asarray(numbers.measurement), strict=True))
+    ]
+    wandered = [bias[i] + np.sqrt(wander[i]) * drawn[channels + i] for i in range(nb)]
+    after = casadi.vertcat(*wandered, own[nb], count + 1.0, queue)
+    sensing = casadi.Function("swash_sensed", [own, x, felt, drawn], [casadi.vertcat(*noisy), casadi.densify(after)])
+    memory, reference = casadi.MX.sym("memory", inner + own.shape[0]), casadi.MX.sym("reference", len(REFERENCES))
+    measured = casadi.MX.sym("measured", body + 3 + 1 + controller.drawn)
+    y, carried = sensing(memory[inner:], measured[:body], measured[body : body + 3], measured[body + 4 :])
+    found = step(memory[:inner], casadi.vertcat(y, measured[body + 3]), reference)
+    result = casadi.vertcat(found[:inner], carried, found[inner:])
     return casadi.Function("swash_traced", [memory, measured, reference], [result])
 
 

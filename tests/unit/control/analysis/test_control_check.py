@@ -19,6 +19,7 @@ from swashplate.control.laws.autopilot import autopilot
 from swashplate.control.lqg.analysis import analyse, sensitivity
 from swashplate.control.lqg.design import design
 from swashplate.errors import SwashError
+from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.control_check import compose_check
@@ -189,13 +190,14 @@ def test_a_conventional_helicopter_under_its_state_hold(place: ControlCheck) -> 
 
 
 def test_linear_quadratic_controllers_with_and_without_an_observer(coax: Vehicle, hover: Trim) -> None:
-    fed = check_controller(coax, design(coax, sensors=()), hover, duration=5.0)
+    states = design(coax, sensors=())
+    fed = check_controller(coax, states, hover, duration=5.0, fly=loop_in_c(coax, states, hover))
     assert fed.problems == ()
     assert fed.notes == ()
     assert fed.slowest.real < -0.01  # memory that nothing writes is no mode
     assert {r.state for r in fed.rejections} >= {"x", "y", "z", "psi"}
     told = design(coax, sensors=suite("imu@100,mocap@100+10ms"))
-    seen = check_controller(coax, told, hover, duration=5.0)
+    seen = check_controller(coax, told, hover, duration=5.0, fly=loop_in_c(coax, told, hover))
     assert seen.problems == ()
     assert "observer" in seen.notes[0]
     assert seen.margins is not None

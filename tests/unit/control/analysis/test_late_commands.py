@@ -23,6 +23,7 @@ from swashplate.control.lqg.design import design
 from swashplate.control.lqg.steady_loop import Watched, crossovers
 from swashplate.control.lqg.weights import crossover_limits, total_delays
 from swashplate.errors import ControllerError
+from swashplate.export.closed_loop_c import loop_in_c
 from swashplate.filtering.sensor_suite import suite
 from swashplate.models.delays import input_delays
 from swashplate.models.vehicle import Vehicle
@@ -62,7 +63,7 @@ def aware(late: Vehicle) -> Lqg:
 
 @pytest.fixture(scope="module")
 def judged(late: Vehicle, aware: Lqg, hover: Trim) -> ControlCheck:
-    return check_controller(late, aware, hover, duration=8.0)
+    return check_controller(late, aware, hover, duration=8.0, fly=loop_in_c(late, aware, hover))
 
 
 # ---- what is known -------------------------------------------------------------------------------------------------
@@ -117,9 +118,14 @@ def test_late_loops_are_what_late_flights_do(coax: Vehicle) -> None:
 
 def test_many_flights_are_as_late_as_one(late: Vehicle, hover: Trim) -> None:
     controller = autopilot(late, hover)
-    one = simulate_closed_loop(late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0)
+    one, in_c = (
+        simulate_closed_loop(late, controller, duration=0.5, reference={"psi": 0.3}, start=hover, rate=500.0, fly=fly)
+        for fly in (None, loop_in_c(late, controller, hover))
+    )
     many = simulate_closed_loops(late, controller, duration=0.5, size=2, reference={"psi": 0.3}, start=hover)
     np.testing.assert_allclose(many["psi"][:, 0], one.values("psi")[:-1:5], atol=1e-11)
+    for name in (*late.state_names, *late.input_names):
+        np.testing.assert_allclose(in_c.values(name), one.values(name), rtol=1e-9, atol=1e-11, err_msg=name)
     for name, wait in input_delays(late).items():
         place = late.input_names.index(name)
         moved = np.flatnonzero(np.abs(many.rows[:, place, 0] - hover.inputs[place]) > 1e-6)
@@ -168,8 +174,10 @@ def test_a_design_that_knows_no_delay_is_refused_and_its_flights_are_lost(
     coax: Vehicle, late: Vehicle, hover: Trim
 ) -> None:
     blind = design(coax, sensors=suite(SENSORS))
-    assert check_controller(coax, blind, sp.trim(coax), duration=5.0, gusts=None).problems == ()
-    found = check_controller(late, blind, hover, duration=5.0)
+    rest = sp.trim(coax)
+    fly = loop_in_c(coax, blind, rest)
+    assert check_controller(coax, blind, rest, duration=5.0, gusts=None, fly=fly).problems == ()
+    found = check_controller(late, blind, hover, duration=5.0, fly=loop_in_c(late, blind, hover))
     assert found.margins is None
     assert found.slowest.real > 1.0
     assert any("growing mode" in words for words in found.problems)
@@ -207,7 +215,8 @@ def test_from_a_fits_file_to_an_aircraft_that_flies_in_short(late: Vehicle, tmp_
     drawn = {name: float(values[0]) for name, values in draw_models(fit.model, fit, count=1, seed=3).items()}
     assert abs(drawn["tau_f_upper"] - 1.6) > 0.05
     aircraft = fit.model.with_values(drawn)
-    flown = check_controller(aircraft, made, sp.trim(aircraft, voltage=12.22), duration=8.0)
+    rest = sp.trim(aircraft, voltage=12.22)
+    flown = check_controller(aircraft, made, rest, duration=8.0, fly=loop_in_c(aircraft, made, rest))
     assert flown.problems == ()
     assert flown.in_gusts is not None
     assert flown.in_gusts.place < 0.25

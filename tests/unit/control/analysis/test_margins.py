@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import control
 import numpy as np
 import pytest
 
@@ -25,6 +26,20 @@ def test_one_loop_in_closed_form() -> None:
     # The disc never promises more than either of them.
     assert axis.disc.gain < 2.0
     assert axis.disc.phase < axis.phase
+
+
+def test_gain_and_phase_are_those_of_python_control() -> None:
+    random, w = np.random.default_rng(0), np.geomspace(0.05, 300.0, 600)
+    s = 1j * w
+    for _ in range(5):
+        gain, lag, mode, wait = random.uniform((5.0, 0.01, 3.0, 0.0), (30.0, 0.5, 30.0, 0.1))
+        L = gain / (s * (1.0 + lag * s) * (1.0 + 0.1 * s + (s / mode) ** 2)) * np.exp(-wait * s)
+        up, turned, _, _, crossings, _ = control.stability_margins(control.frd(L, w, smooth=True), returnall=True)
+        (axis,) = margins(w, L[:, None, None], ("one",)).axes
+        assert axis.gain == pytest.approx(min(up[up > 1.0], default=np.inf), rel=1e-9)
+        assert axis.gain_down == pytest.approx(max(up[up < 1.0], default=0.0), rel=1e-9)
+        assert axis.phase == pytest.approx(np.radians(np.abs((turned + 180.0) % 360.0 - 180.0)).min(), rel=1e-9)
+        assert axis.crossover == pytest.approx(crossings.max(), rel=1e-9)
 
 
 def test_the_disc_margin_is_reached_by_a_factor_on_its_circle() -> None:

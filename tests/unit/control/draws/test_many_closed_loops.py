@@ -92,6 +92,8 @@ def test_gusts_have_drydens_variance_and_spectrum() -> None:
         power = 2.0 * power / (rate * np.sum(window**2))
         band = (frequencies > 0.2) & (frequencies < 5.0)
         assert np.mean(power[band] / density[band]) == pytest.approx(1.0, abs=0.1), name
+    short, long = (dryden(setting, samples=n, rate=rate, seed=3)["wind_north"] for n in (130, 200))
+    np.testing.assert_allclose(short, long[:130], atol=1e-12)  # whatever the blocks that it is made in
     with pytest.raises(SwashError, match="expected a wind above zero"):
         outdoor(0.0)
 
