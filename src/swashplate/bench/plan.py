@@ -16,6 +16,7 @@ from swashplate.bench.evaluate import PROCEDURES, evaluate, hover_commands, sche
 from swashplate.bench.virtual_bench import RecordSchedule, Setup, virtual_bench
 from swashplate.errors import BenchError
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Saved
 
 MOST_REPEATS = 200
 """More passes than this are not a plan: the sensor or the input has to become better."""
@@ -42,7 +43,7 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class MeasurementPlan:
+class MeasurementPlan(Saved):
     """The whole plan: records in the order in which to take them, and what they give."""
 
     records: tuple[RecordSchedule, ...]
