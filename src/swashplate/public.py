@@ -153,6 +153,7 @@ _BEHIND_METHODS: Mapping[str, str] = {
     "flight_from_arrays": "swashplate.flights.tabular:from_arrays",
     "flight_from_dataframe": "swashplate.flights.tabular:from_dataframe",
     "flight_to_dataframe": "swashplate.flights.tabular:to_dataframe",
+    "encode": "swashplate.identification.core.document_codec:encode",
     "explore": "swashplate.reporting.figures.views:explore",
     "explore_derivatives": "swashplate.reporting.figures.views:explore_derivatives",
     "explore_flight": "swashplate.reporting.figures.views:explore_flight",

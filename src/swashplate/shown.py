@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from swashplate.atomic import write_json
 from swashplate.public import resolve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Shown:
+class Saved:
+    """A result that can be kept as a file."""
+
+    def save(self, path: str | Path) -> Path | tuple[Path, ...]:
+        """Write its numbers as a JSON file; what has a file of its own kind (a controller, a flight) says so there."""
+        told = getattr(self, "to_document", None) or getattr(self, "as_dict", None)
+        return write_json(path, resolve("encode")(self) if told is None else told())
+
+
+class Shown(Saved):
     """A result that plots itself, can be explored, and shows itself in a notebook."""
 
     @property

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from swashplate import atomic
 from swashplate.reporting.case_parts import CaseParts
 from swashplate.reporting.structure import Block, Points, Report, Section
 from swashplate.reporting.versions import date, versions
@@ -33,10 +31,6 @@ class CaseComparison(Shown):
         """The numbers as JSON types."""
         told = {"remarks": list(self.parts.told)}
         return {"what": self.what, "cases": list(self.names), **_plain(self.parts.document), **told}
-
-    def save(self, path: str | Path) -> Path:
-        """Write the numbers as a JSON file."""
-        return atomic.write_json(path, self.to_document())
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from swashplate.api.case_comparison import CaseComparison
 from swashplate.errors import SwashError
@@ -14,18 +14,13 @@ from swashplate.identification.core.result_file import load
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.catalogue import vehicle
 from swashplate.models.linear.answering import LinearResponse
-from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.case_parts import CaseParts
 from swashplate.reporting.cases_of_models import compare_answers, compare_modes
 from swashplate.reporting.cases_of_responses import compare_responses
 from swashplate.reporting.cases_of_results import compare_estimates
-from swashplate.simulation.linearize import LinearModel
 from swashplate.validation.compare import ModelComparison, along_flights
 from swashplate.validation.verb import fitted
-
-Case: TypeAlias = FrequencyResponse | Result[Any, Any] | Vehicle | StateSpaceModel | LinearModel | str | Path
-"""What can stand beside others: a response, a fit, a model, or its name, file or folder of results."""
 
 
 def compare(

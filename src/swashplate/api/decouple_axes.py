@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from swashplate.atomic import write_text
 from swashplate.control.laws.linear_decoupling import Decoupling, coupling, dynamic_decoupling, static_decoupling
 from swashplate.errors import SwashError
-from swashplate.json_text import as_json
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.linear_decoupling import compose_linear_decoupling
 from swashplate.reporting.structure import Report
@@ -82,11 +79,6 @@ class AxesDecoupling(Shown):
             "filter": matrices,
             "off_over_on_axis": self.ratios(),
         }
-
-    def save(self, path: str | Path) -> Path:
-        """Write matrix and filter (.json)."""
-        write_text(path, as_json(self.to_document()) + "\n")
-        return Path(path)
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes."""

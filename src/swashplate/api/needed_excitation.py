@@ -14,6 +14,7 @@ from typing import Any
 from swashplate.documents import read
 from swashplate.errors import SwashError
 from swashplate.flights.schema import channel as known
+from swashplate.shown import Saved
 from swashplate.text_table import text_table
 from swashplate.validation.validation import Validation
 
@@ -37,7 +38,7 @@ class Movement:
 
 
 @dataclass(frozen=True, repr=False)
-class NeededExcitation:
+class NeededExcitation(Saved):
     """What the next flight must have.
 
     Attributes:

@@ -13,10 +13,11 @@ from swashplate.models.linear.state_space_file import structure, structure_names
 from swashplate.models.linear.structure_parts import PARTS
 from swashplate.models.linear.written import WrittenStructure
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Saved
 
 
 @dataclass(frozen=True)
-class Structures:
+class Structures(Saved):
     """What a linear model can be made of.
 
     Attributes:

@@ -30,6 +30,7 @@ from swashplate.bench.joint import Joint
 from swashplate.bench.record import BenchRecord
 from swashplate.bench.refusals import (
     refuse_exchanged,
+    refuse_other_inputs,
     refuse_out_of_range,
     refuse_saturated,
     refuse_stalled,
@@ -124,6 +125,7 @@ def evaluate(records: Sequence[BenchRecord], vehicle: Vehicle) -> Bench:
         BenchError: for a record that no procedure knows, lacks a column, or contradicts what it measures: a saturated
             sensor, a motor that did not reach its speed, signs that physics forbids, too few points.
     """
+    refuse_other_inputs(vehicle)
     published = vehicle.card
     by_procedure = _sorted(records)
     for record in records:

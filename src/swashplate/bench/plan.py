@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from swashplate.bench.evaluate import PROCEDURES, evaluate, hover_commands, schedules
+from swashplate.bench.refusals import refuse_other_inputs
 from swashplate.bench.virtual_bench import RecordSchedule, Setup, virtual_bench
 from swashplate.errors import BenchError
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Saved
 
 MOST_REPEATS = 200
 """More passes than this are not a plan: the sensor or the input has to become better."""
@@ -42,7 +44,7 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class MeasurementPlan:
+class MeasurementPlan(Saved):
     """The whole plan: records in the order in which to take them, and what they give."""
 
     records: tuple[RecordSchedule, ...]
@@ -74,13 +76,14 @@ def planned(vehicle: Vehicle, only: Sequence[str] = ()) -> list[RecordSchedule]:
     """The records of the whole bench, or of some procedures.
 
     Raises:
-        BenchError: for a procedure that is not known, or that is only for records that exist.
+        BenchError: for a procedure that is not known, or that is only for records that exist, or another vehicle.
     """
     unknown = [name for name in only if name not in PROCEDURES]
     if unknown:
         raise BenchError(
             "there is no such procedure.", channel=", ".join(unknown), hint=f"Known are {', '.join(PROCEDURES)}."
         )
+    refuse_other_inputs(vehicle)
     made = schedules(hover_commands(vehicle.card.values()))
     unplanned = set(only) - {name for record in made for name in record.procedures}
     if unplanned:

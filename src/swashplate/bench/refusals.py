@@ -8,7 +8,10 @@ import numpy as np
 
 from swashplate.bench.record import COLUMNS, LOADS, BenchRecord
 from swashplate.errors import BenchError
+from swashplate.models.vehicle import Vehicle
 
+COMMANDS = ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")
+"""What drives the aircraft on the bench."""
 _CLIPPED = 8
 """So many samples in a row at exactly the largest value of a channel are a sensor at its range."""
 _SLACK = 0.01
@@ -28,6 +31,20 @@ _RANGES: Mapping[str, tuple[float, float]] = {
     "omega_upper": (0.0, np.inf),
 }
 """What commands, tachometers and the supply can give; tachometers give the size of a speed."""
+
+
+def refuse_other_inputs(vehicle: Vehicle) -> None:
+    """Raise for a vehicle that the bench does not measure.
+
+    Raises:
+        BenchError: naming the inputs.
+    """
+    if vehicle.input_names != COMMANDS:
+        raise BenchError(
+            f"has the inputs {', '.join(vehicle.input_names)}, expected {', '.join(COMMANDS)}.",
+            where=vehicle.card.called,
+            hint="The bench measures helicopters with two rotors and the equations of the CoaX.",
+        )
 
 
 def refuse_out_of_range(record: BenchRecord) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.bench.record import LOADS, BenchRecord
+from swashplate.bench.refusals import COMMANDS
 from swashplate.errors import BenchError
 from swashplate.models.coax import CoaxInputs, CoaxParameters, CoaxState, Drive, loads
 from swashplate.models.coax_rotors import InflowOptions
@@ -48,7 +49,6 @@ DRIVING = (
 """What drives the bench, in the order of a compiled row."""
 
 _STATES = ("alpha_lower", "beta_lower", "eta_bar", "zeta_bar", "omega_lower", "omega_upper")
-_COMMANDS = ("motor_lower", "motor_upper", "servo_roll", "servo_pitch")
 _PADDING = 2048  # samples: records of like lengths share compiled code
 
 
@@ -165,7 +165,7 @@ def _acting(plan: _Held, x: Any, w: Any, p: Any) -> Any:
     is_free = p[-2] > 0.5
     bar = StabilizerBar(jnp.where(is_free, x[2], held.eta), jnp.where(is_free, x[3], held.zeta))
     state = CoaxState(body, TipPathPlane(x[0], x[1]), bar, Drive(x[4], x[5]))
-    inputs = CoaxInputs(*(drive[name] for name in _COMMANDS))
+    inputs = CoaxInputs(*(drive[name] for name in COMMANDS))
     air = Environment(
         wind_north=-drive["airspeed_x"],
         wind_east=-drive["airspeed_y"],
@@ -315,7 +315,7 @@ def _observe(
         for name, angle in (*((k, commanded[k]) for k in ("phi", "theta")), *((k, truth[k]) for k in _STATES[2:4])):
             channels[name] = angle + setup.angle_noise * rng.standard_normal(n)
         return BenchRecord(f"{schedule.name}.csv", schedule.procedures, channels)
-    channels |= {name: commanded[name] for name in _COMMANDS}
+    channels |= {name: commanded[name] for name in COMMANDS}
     channels["voltage"] = commanded["voltage"] + setup.voltage_noise * rng.standard_normal(n)
     for name in ("omega_lower", "omega_upper"):
         noisy = truth[name] + setup.speed_noise * rng.standard_normal(n)

@@ -10,6 +10,7 @@ import typer
 from swashplate.cli import options
 from swashplate.cli.usual_verb import usual
 from swashplate.errors import SwashError
+from swashplate.models.usual import USUAL
 
 _EVALUATE = "evaluate"
 
@@ -37,7 +38,7 @@ def evaluate(
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE", help="The card (.toml).")] = None,
     report: Annotated[Path | None, typer.Option("--report", metavar="FILE", help="The report (.html).")] = None,
-    vehicle: _Vehicle = "coax",
+    vehicle: _Vehicle = USUAL,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -94,7 +95,7 @@ def evaluate(
 
 @app.command("plan")
 def plan(
-    vehicle: _Vehicle = "coax",
+    vehicle: _Vehicle = USUAL,
     only: _Only = None,
     accuracy: Annotated[
         float, typer.Option("--accuracy", help="Required relative standard deviation.", min=1e-5, max=1.0)
@@ -127,7 +128,7 @@ def plan(
 @app.command("simulate")
 def simulate(
     out: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the records; it is made if missing.")],
-    vehicle: _Vehicle = "coax",
+    vehicle: _Vehicle = USUAL,
     only: _Only = None,
     repeats: Annotated[int, typer.Option("--repeats", help="Passes through the points of each record.", min=1)] = 1,
     seed: Annotated[int, typer.Option("--seed", help="Seed of noise, bias, drift and vibration.", min=0)] = 0,

@@ -103,11 +103,8 @@ def check(
                 required_delay=None if delay_margin is None else delay_margin / 1e3,
             )
         if folder is not None:
-            from swashplate.atomic import write_text
-            from swashplate.json_text import as_json
-
             sp.report(found, path=folder / "report.html")
-            write_text(folder / "check.json", as_json(found.to_document()) + "\n")
+            found.save(folder / "check.json")
     written = () if out is None else tuple(dict.fromkeys(place_of(out, name, OURS) for name in OURS))
     shared.show(found, written=written, json=json, quiet=quiet)
     end_with(found.problems)

@@ -14,13 +14,11 @@ import json
 import math
 from collections.abc import Iterator
 from itertools import count, repeat
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from swashplate.atomic import write_bytes
 from swashplate.errors import ExportError
 from swashplate.extras import library
 from swashplate.flights.flight import Flight
@@ -67,16 +65,6 @@ def as_mcap(flight: Flight) -> bytes:
         writer.add_metadata(name, entries)
     writer.finish()
     return file.getvalue()
-
-
-def write_mcap(flight: Flight, path: str | Path) -> Path:
-    """Writes a flight as an MCAP file; returns its path.
-
-    Raises:
-        ExportError: as `as_mcap`.
-        WriteError: where the file cannot be written.
-    """
-    return write_bytes(Path(path), as_mcap(flight))
 
 
 def schema(name: str, data: xr.Dataset) -> dict[str, Any]:

@@ -117,11 +117,11 @@ class Vehicle:
         """A copy with other numbers (see `Card.with_values`)."""
         return replace(self, card=self.card.with_values(values, **changes))
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path) -> Path:
         """Write the card as a model file."""
         from swashplate.atomic import write_text
 
-        write_text(path, self.card.to_toml())
+        return write_text(path, self.card.to_toml())
 
     def as_linear(self) -> LinearResponse:
         """The linear model: of its structure, else about hover (about another trim: `swashplate.linearize`).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from swashplate.physics.backend import Backend, Scalar
 from swashplate.physics.frames import Vector, body_to_local, local_to_body
@@ -18,6 +18,12 @@ class Skids(NamedTuple):
     stiffness: Scalar
     damping: Scalar
     friction: Scalar
+
+    @staticmethod
+    def of(par: Any) -> Skids:
+        """Those of a card's parameters."""
+        names = ("length", "width", "depth", "stiffness", "damping", "friction")
+        return Skids(*(getattr(par, f"skid_{name}") for name in names))
 
 
 class Grip(NamedTuple):

@@ -13,10 +13,8 @@ from swashplate.identification.responses.frequency_response import LEAST_COHEREN
 from swashplate.reporting.case_parts import CaseParts, bode_overlay, common
 from swashplate.reporting.structure import Cell, Table
 
-ALIKE = 50.0
-"""J up to which two responses can hardly be told apart in use; 100 is the usual limit of a good model (Tischler and
-Remple 2012, ch. 11)."""
 _LARGE = 100.0
+"""J of a good model is below it (Tischler and Remple 2012, ch. 11)."""
 
 
 def compare_responses(cases: Mapping[str, FrequencyResponse]) -> CaseParts:

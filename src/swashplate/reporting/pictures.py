@@ -14,16 +14,12 @@ from swashplate.errors import SwashError
 from swashplate.flights.schema import channel
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.reporting.figures_time import flight_name
-from swashplate.reporting.figures_validation import JUDGED, middle_horizon
 from swashplate.reporting.sections_validation import apart
-from swashplate.reporting.theme import FLIGHT, MODEL, PREDICTOR_STYLE, PREDICTOR_WORDS, axis_title
-from swashplate.validation.validation import PREDICTORS, Validation
+from swashplate.reporting.theme import FLIGHT, MODEL, axis_title
+from swashplate.validation.validation import Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_MARKERS = {"model": "o", "published card": "s", "constant rates": "X", "hold": "|"}
-_FLOOR = -60.0
 
 
 def prediction_picture(
@@ -62,42 +58,6 @@ def prediction_picture(
     np.atleast_1d(panels)[-1].set_xlabel("time [s]")
     figure.suptitle(title or f"Prediction of {source}", fontsize=11, x=0.02, ha="left")
     return _save(figure, path)
-
-
-def score_picture(validation: Validation, *, path: str | os.PathLike[str], title: str | None = None) -> Path:
-    """Fit % of every predictor on every channel, one second ahead, as a file."""
-    return _save(score_figure(validation, title=title), path)
-
-
-def score_figure(validation: Validation, *, title: str | None = None) -> Figure:
-    """Fit % of every predictor on every channel, at the middle horizon."""
-    if not validation.scores:
-        raise SwashError("the validation has no scores to draw.")
-    horizon = middle_horizon(validation)
-    scores = {(s.channel, s.predictor): s.fit for s in validation.scores if s.horizon == horizon}
-    names = [name for name in JUDGED if (name, "model") in scores]
-    figure = blank_figure(7.2, 0.32 * len(names) + 1.4)
-    panel: Any = figure.subplots()
-    for predictor in reversed([p for p in PREDICTORS if p != "hold"]):
-        rows = [(i, scores[name, predictor]) for i, name in enumerate(names) if (name, predictor) in scores]
-        color = PREDICTOR_STYLE[predictor][0]
-        style = {"edgecolors": color, "zorder": 3, "clip_on": False}
-        filled = color if predictor != "published card" else "none"
-        size = 70 if predictor == "model" else 46
-        label = PREDICTOR_WORDS[predictor]
-        inside = [(i, fit) for i, fit in rows if fit >= _FLOOR]
-        x, y = [fit for _, fit in inside], [i for i, _ in inside]
-        panel.scatter(x, y, marker=_MARKERS[predictor], s=size, facecolors=filled, label=label, **style)
-        below = [i for i, fit in rows if fit < _FLOOR]
-        panel.scatter([_FLOOR] * len(below), below, marker="<", s=size, facecolors="none", **style)
-    panel.axvline(0.0, color="#333", lw=1.2, label="hold the last value")
-    panel.set(yticks=range(len(names)), yticklabels=names, xlim=(_FLOOR, 102.0), xlabel=f"fit {horizon:g} s ahead [%]")
-    panel.invert_yaxis()
-    tidy(panel)
-    figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=9)
-    if title:
-        panel.set_title(title, fontsize=11, loc="left")
-    return figure
 
 
 def blank_figure(width: float, height: float) -> Figure:

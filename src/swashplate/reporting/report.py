@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from swashplate.bench.result import BenchDetails
 from swashplate.errors import SwashError
+from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import FrequencyResponse
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.vehicle import Vehicle
 from swashplate.reporting.bench import compose_bench
 from swashplate.reporting.compose import compose
-from swashplate.reporting.figures.of_comparison import section_of_comparison
+from swashplate.reporting.figures.sections import own_section
 from swashplate.reporting.html import write_page
 from swashplate.reporting.response_report import compose_responses
 from swashplate.reporting.sections_responses import ResponseMaterial
 from swashplate.reporting.structure import Report
 from swashplate.reporting.versions import date, versions
+from swashplate.shown import Shown
 from swashplate.simulation.modes import Mode
-from swashplate.validation.compare import ModelComparison
 from swashplate.validation.validation import Validation
 from swashplate.validation.verification import Verification
 
-Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse | ModelComparison
+Reportable = Result[Any, Any] | Validation | Verification | FrequencyResponse
 
 
 @runtime_checkable
@@ -39,7 +41,7 @@ class HasPage(Protocol):
 
 
 def report(
-    *results: Reportable | HasPage | None,
+    *results: Shown | Flight | FrequencyResponse | HasPage | None,
     path: str | os.PathLike[str],
     title: str | None = None,
     modes: Mapping[str, Sequence[Mode]] | None = None,
@@ -49,11 +51,9 @@ def report(
     The file needs no network: plotly.js and all data are in it. It appears by rename when it is complete.
 
     Args:
-        results: of any identification, a validation or a verification of it, measured responses, models along a flight
-            (alone); None is left out. A
+        results: of any identification, a validation or a verification of it, measured responses; None is left out. A
             page is about one vehicle's fit and validation, or about linear models, their responses and verification.
-            Trims or derivatives over a range of speeds make a page of their own.
-            One that knows its own page (`check_controller`, `decouple`, `monte_carlo` ...) goes alone.
+            All else that plots (a flight, a spectrum, trims, a check of a controller ...) makes a page alone.
         path: where to write; the folder is made where it is missing.
         title: heading; made from the models and the flights where None.
         modes: eigenvalues at hover by vehicle ("published", "identified"); computed where None.
@@ -68,7 +68,9 @@ def report(
 
 
 def structure_of(
-    *results: Reportable | HasPage | None, title: str | None = None, modes: Mapping[str, Sequence[Mode]] | None = None
+    *results: Shown | Flight | FrequencyResponse | HasPage | None,
+    title: str | None = None,
+    modes: Mapping[str, Sequence[Mode]] | None = None,
 ) -> Report:
     """What `report` writes, before it is a page; arguments and errors as there."""
     asked = [one for one in results if one is not None]
@@ -76,14 +78,12 @@ def structure_of(
         raise SwashError("there is nothing to report: neither a result nor a validation was given.")
     given: list[Reportable] = []
     for one in asked:
-        if isinstance(one, ModelComparison) and len(asked) == 1:
-            return _along_flight(one, title)
-        if not isinstance(one, HasPage):
+        if isinstance(one, Result | Validation | Verification | FrequencyResponse):
             given.append(one)
         elif len(asked) > 1 or modes is not None:
             raise SwashError("has a page of its own.", channel=type(one).__name__, hint="Write a report of each.")
         else:
-            return one.page(title=title)
+            return one.page(title=title) if isinstance(one, HasPage) else _of_one(one, title)
     of_vehicles = [one for one in given if isinstance(one, Validation) or _is_of(one, Vehicle)]
     if not of_vehicles:
         return _of_linear_models(given, title)
@@ -100,10 +100,13 @@ def structure_of(
     return compose(fit, validation, verification, title=title, modes=modes)
 
 
-def _along_flight(found: ModelComparison, title: str | None) -> Report:
-    summary = (("Models", ", ".join(found.found), "plain"),)
+def _of_one(shown: object, title: str | None) -> Report:
+    """The page of what shows itself in one section: a flight, a spectrum, models along a flight."""
+    section = own_section(shown)
+    if section is None:
+        raise SwashError("has nothing that a page could show.", channel=type(shown).__name__, hint="Print it.")
     made = f"swashplate {versions()['swashplate']}, {date()}"
-    return Report(title or "Models along a flight", (), summary, None, (section_of_comparison(found),), made)
+    return Report(title or section.title, (), (), None, (replace(section, identifier="shown"),), made)
 
 
 def _of_linear_models(given: Sequence[Reportable], title: str | None) -> Report:

@@ -10,6 +10,7 @@ from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import DerivativeTable, factor_to_feet, split_name, unit
 from swashplate.models.vehicle import Vehicle
 from swashplate.public import resolve
+from swashplate.shown import Saved
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.trim import Trim
 from swashplate.simulation.uncertainty import CardSpread, spread
@@ -22,7 +23,7 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
-class Derivatives:
+class Derivatives(Saved):
     """Derivatives of force per mass and moment per inertia, by contributor; flapping follows without delay.
 
     Attributes:

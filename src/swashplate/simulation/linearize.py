@@ -157,9 +157,9 @@ class LinearModel(Shown):
             title=title or f"Linearised at {self.trim.speed:g} m/s",
         )
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path) -> Path:
         """Write the model's file, which `swashplate.vehicle` and `swashplate.stitch` read."""
-        atomic.write_text(path, to_toml(self.to_structure(name=Path(path).stem)))
+        return atomic.write_text(path, to_toml(self.to_structure(name=Path(path).stem)))
 
     def __repr__(self) -> str:
         lines = [f"LinearModel: {len(self.states)} states, inputs {', '.join(self.inputs)}"]

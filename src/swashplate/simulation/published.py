@@ -16,6 +16,7 @@ from swashplate.models.conventional.derivative_table import DerivativeTable, spl
 from swashplate.models.published import read_published
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
+from swashplate.shown import Saved
 from swashplate.simulation.trim import Trim, trim
 from swashplate.text_table import text_table
 
@@ -63,7 +64,7 @@ class ComparisonStep:
 
 
 @dataclass(frozen=True, repr=False)
-class PublishedComparison:
+class PublishedComparison(Saved):
     """Published derivatives against a card's.
 
     Attributes:

@@ -12,6 +12,7 @@ from swashplate.arrays import Array, Complex
 from swashplate.errors import SwashError
 from swashplate.models.conventional.derivative_table import ROWS
 from swashplate.models.vehicle import Vehicle
+from swashplate.shown import Saved
 from swashplate.simulation.derivatives import derivative_table
 from swashplate.simulation.linearize import LinearModel, linearize
 from swashplate.simulation.trim import Trim
@@ -204,7 +205,7 @@ def omissions(model: LinearModel) -> tuple[Omission, ...]:
 
 
 @dataclass(frozen=True, repr=False)
-class OmissionStudy:
+class OmissionStudy(Saved):
     """What leaving out each derivative changes, at some speeds [m/s]; those that matter least come first."""
 
     speeds: tuple[float, ...]

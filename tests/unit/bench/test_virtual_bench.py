@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -207,3 +208,9 @@ def test_a_table_of_averaged_points_needs_no_time(coax: Vehicle, tmp_path: Path)
     path.write_text(path.read_text().replace("speed_map", "drive_steps"))
     with pytest.raises(BenchError, match="drive_steps needs samples at a fixed rate"):
         evaluate(read_records(path), coax)
+
+
+@pytest.mark.parametrize("work", [sp.plan_bench, sp.simulate_bench, lambda vehicle: sp.evaluate_bench(vehicle=vehicle)])
+def test_another_vehicle_than_the_bench_measures_is_refused(work: Callable[[Vehicle], object]) -> None:
+    with pytest.raises(BenchError, match=r"raptor50: has the inputs theta0, B1, A1, theta0T, expected motor_lower"):
+        work(sp.vehicle("raptor50"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import re
 from collections.abc import Callable
 from typing import Any, get_args, get_origin, get_type_hints
@@ -26,7 +27,7 @@ from swashplate.reporting.theme import axis, base_layout, line
 from swashplate.simulation.linearize import LinearModel
 from swashplate.simulation.trim_curve import trim_curve
 
-_WAYS = ("plot", "explore", "_repr_html_")
+_WAYS = ("plot", "explore", "_repr_html_", "save")
 _UNIT = re.compile(r"\[[^\]]+\]")
 
 
@@ -141,6 +142,19 @@ def test_what_has_no_curve_says_so_and_still_shows_its_words(tmp_path: Any) -> N
     assert "it refuses to arm." in check._repr_html_()
     with pytest.raises(SwashError, match="has nothing to draw"):
         check.plot()
+
+
+@pytest.mark.parametrize("what", ["inspection", "spectrogram", "harmonics", "reconstruction", "equation error"])
+def test_what_shows_itself_makes_a_page_and_is_saved(what: str, tmp_path: Any) -> None:
+    shown = sp.inspect(flight(5.0)) if what == "inspection" else MAKE[what]()
+    page = sp.report(shown, path=tmp_path / "page.html").read_text(encoding="utf-8")
+    assert all(f'id="{name}"' in page for name in figures_of(shown))
+    assert json.loads(shown.save(tmp_path / "numbers.json").read_text(encoding="utf-8"))
+
+
+def test_what_no_page_can_show_is_refused_by_its_name(tmp_path: Any) -> None:
+    with pytest.raises(SwashError, match="Card: has nothing that a page could show"):
+        sp.report(sp.vehicle("coax").card, path=tmp_path / "page.html")
 
 
 def test_what_an_identifying_verb_returns_stands_for_its_fit() -> None:

@@ -14,7 +14,7 @@ from swashplate.errors import SwashError
 from swashplate.reporting.figures.of_flight import over_time
 from swashplate.reporting.html import render, write_page
 from swashplate.reporting.packing import figures_text, read_figures
-from swashplate.reporting.pictures import prediction_picture, score_picture
+from swashplate.reporting.pictures import prediction_picture
 from swashplate.reporting.report import report
 from swashplate.reporting.structure import Figure, Report, Section
 from swashplate.reporting.theme import line
@@ -120,11 +120,11 @@ def test_pictures_are_written_and_repeatable(tmp_path: Path) -> None:
     sample = validation()
     predicted = prediction_picture(sample, path=tmp_path / "p.png")
     assert predicted.read_bytes().startswith(b"\x89PNG")
-    one = score_picture(sample, path=tmp_path / "a.svg").read_bytes()
-    assert one == score_picture(sample, path=tmp_path / "b.svg").read_bytes()
+    one = prediction_picture(sample, path=tmp_path / "a.svg").read_bytes()
+    assert one == prediction_picture(sample, path=tmp_path / "b.svg").read_bytes()
     assert b"<svg" in one
     with pytest.raises(SwashError, match=r"expected \.png or \.svg"):
-        score_picture(sample, path=tmp_path / "a.bmp")
+        prediction_picture(sample, path=tmp_path / "a.bmp")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.svg", "b.svg", "p.png"]
 
 

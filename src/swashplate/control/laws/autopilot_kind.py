@@ -14,7 +14,6 @@ from swashplate.control.laws.autopilot import MODES, Autopilot, CyclicGains, Gai
 from swashplate.control.laws.decoupling import Decoupler
 from swashplate.control.laws.height_yaw import CoaxialRotors, HeightYawGains, HeightYawMemory
 from swashplate.errors import ControllerError
-from swashplate.models.coax import CoaxInputs
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.rigid_body import RigidBody
@@ -108,7 +107,7 @@ class AutopilotKind(ControllerKind[Autopilot]):
             tuple(controller.memory.tolist()),
             ", ".join(names),
             (*RigidBody._fields, "voltage"),
-            CoaxInputs._fields,
+            command._fields,
             f"{controller.vehicle}, mode {controller.mode}, designed on: {controller.model}",
         )
 

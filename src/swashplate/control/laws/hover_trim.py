@@ -9,7 +9,6 @@ import numpy as np
 from swashplate.control.laws.autopilot import Autopilot
 from swashplate.errors import FlightError
 from swashplate.flights.flight import Flight
-from swashplate.models.coax import CoaxInputs
 from swashplate.models.coax_vehicle import rotor_factors
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.drive_train import steady_speed
@@ -67,8 +66,8 @@ def hover_trim(vehicle: Vehicle, flight: Flight, *, window: float = 10.0, gravit
                 channel=name,
                 hint="Hover longer, in calm air.",
             )
-    commands = {name: float(np.mean(end.values(name))) for name in CoaxInputs._fields}
-    scatter = {name: float(np.std(end.values(name))) for name in CoaxInputs._fields}
+    commands = {name: float(np.mean(end.values(name))) for name in vehicle.input_names}
+    scatter = {name: float(np.std(end.values(name))) for name in vehicle.input_names}
     voltage, card = float(np.mean(end.values("voltage"))), vehicle.card.values()
     omega = {
         rotor: steady_speed(

@@ -20,7 +20,6 @@ from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.filtering.sensor_suite import KINDS, Sensor
 from swashplate.models.card import card_from
 from swashplate.models.catalogue import from_card
-from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.dynamics import equations_of, parameter_row
 from swashplate.simulation.trim import Trim
@@ -143,7 +142,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
             )
         plan = replace(plan, period=len(steady))
     feedback = Feedback(**parts)
-    _check_sizes(vehicle, plan, feedback, path)
+    _check_sizes(plan, feedback, path)
     around = around._replace(voltage=float(feedback.voltage))
     fade, process = observer.process_noise(plan, unrest)
     numbers = Numbers(parameter_row(vehicle, around), fade, process, observer.measurement_noise(plan), steady)
@@ -161,7 +160,7 @@ def lqg_from(document: dict[str, Any], path: str | Path) -> Lqg:
     return Lqg(vehicle, plan, numbers, feedback, start, unrest)
 
 
-def _check_sizes(vehicle: Vehicle, plan: ObserverPlan, f: Feedback, path: str | Path) -> None:
+def _check_sizes(plan: ObserverPlan, f: Feedback, path: str | Path) -> None:
     S, n, m = f.speeds.size, plan.n, plan.inputs
     expected: dict[str, tuple[int, ...]] = dict.fromkeys(_SINGLE, ()) | dict.fromkeys(("battery", "low", "high"), (m,))
     expected |= {"speeds": (S,), "states": (S, n), "inputs": (S, m)}

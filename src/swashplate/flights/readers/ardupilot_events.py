@@ -167,7 +167,7 @@ def _reached(data: MessageTable | None, begin: float, until: float) -> float | N
     return float(own.max()) if own.size else None
 
 
-def _vehicle(messages: Messages, texts: list[Event]) -> str:
+def _vehicle(texts: list[Event]) -> str:
     firmware = next((e.text for e in texts if re.match(r"Ardu\w+ V|(AP|Ardu)\w* ?(Copter|Plane|Rover)", e.text)), "")
     frame = next((e.text.partition(":")[2].strip() for e in texts if e.text.startswith("Frame:")), "")
     return ", ".join(part for part in (firmware, frame) if part)
@@ -186,4 +186,4 @@ def story(messages: Messages, *, end: float) -> Story:
     if arming and arming[-1].kind == "armed":
         damage.append(f"the log is cut off: it ends at {end:.2f} s with the motors armed since {arming[-1].time:.2f} s")
     events = sorted((*changes, *texts, *_modes(messages), *arming, *sweeps), key=lambda event: event.time)
-    return Story(_vehicle(messages, texts), parameters, tuple(events), tuple(damage))
+    return Story(_vehicle(texts), parameters, tuple(events), tuple(damage))

@@ -16,11 +16,11 @@ import tomli_w
 
 from swashplate import documents
 from swashplate.arrays import Array
-from swashplate.errors import DocumentError
+from swashplate.errors import CardError, DocumentError
 from swashplate.identification.core.document_codec import decode, encode, part
 from swashplate.identification.core.result import Result
 from swashplate.models.card import card_from
-from swashplate.models.catalogue import from_card
+from swashplate.models.catalogue import EQUATIONS, from_card
 from swashplate.models.linear import state_space_file
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.transfer_function import TransferFunction, TransferFunctions
@@ -148,6 +148,13 @@ def model_from(found: Any, *, where: str, at: str, equations: Vehicle | None) ->
         card = replace(card, path=path if isinstance(path, str) else "")
         if equations is not None and equations.name == card.vehicle:
             return carrying(equations, card)
+        if card.vehicle not in EQUATIONS:
+            raise CardError(
+                f"is a model of the equations '{card.vehicle}', which no package here has.",
+                where=where,
+                channel=at,
+                hint=f"Give them: swashplate.load({where!r}, equations=...), or by an entry point (docs/extending.md).",
+            )
         return from_card(card)
     if kind == "state-space":
         try:

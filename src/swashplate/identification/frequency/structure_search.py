@@ -211,7 +211,7 @@ def _grown(search: _Search) -> tuple[Contender, dict[str, Contender]]:
             named = {"+".join(p for p in PARTS if p in (*parts, n)): n for n in group if n not in idle}
             seen = search.looks([_composed(search, name.split("+")) for name in named], like=best, iterations=LOOK)
             looks = {named[one.name]: one for one in seen}
-            idle |= {n for n, one in looks.items() if not _hopeful(search, one, best)}
+            idle |= {n for n, one in looks.items() if not _hopeful(one, best)}
             first = search.best([best, *looks.values()])
             better += [n for n, one in looks.items() if one is first]
         if not better:
@@ -225,7 +225,7 @@ def _grown(search: _Search) -> tuple[Contender, dict[str, Contender]]:
     return _settled(search, best)
 
 
-def _hopeful(search: _Search, one: Contender, best: Contender) -> bool:
+def _hopeful(one: Contender, best: Contender) -> bool:
     """Whether a part lowers the misfit by half of what its numbers cost, were the scatter as it should be."""
     points = sum(t.omega.size for t in best.fit.targets)
     half = 0.5 * (one.score(np.inf, points) - best.score(np.inf, points))

@@ -317,7 +317,7 @@ def _composed(
             )
         )
     response, coherence, error = _joined(parts, [m.averages for m in matrices], n_in)
-    weight = np.stack([_window_weight(part, matrix) for part, matrix in zip(parts, matrices, strict=True)])
+    weight = np.stack([_window_weight(matrix) for matrix in matrices])
     plain = [m.values for m in matrices]
     auto = _mean(weight, np.stack([np.diagonal(v, axis1=1, axis2=2).real for v in plain]))
     gxx = _mean(weight, np.stack([v[:, :n_in, :n_in] for v in plain]))
@@ -357,7 +357,7 @@ def _joined(parts: Sequence[Conditioned], averages: Sequence[float], inputs: int
     return response, coherence, random_error(coherence, 1.0) / np.sqrt(effective)
 
 
-def _window_weight(part: Conditioned, matrix: SpectralMatrix) -> Array:
+def _window_weight(matrix: SpectralMatrix) -> Array:
     """How much one window's matrix counts for figures that belong to no pair, shape (n_f,)."""
     known = np.isfinite(matrix.values[:, 0, 0])
     return np.where(known, matrix.averages**2, 0.0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
 from swashplate.links.gym.flying import Flying, FlyingOptions, flying
 from swashplate.links.gym.tasks import Task, task_of
+from swashplate.models.usual import USUAL
 from swashplate.models.vehicle import Vehicle
 
 Observation = NDArray[np.float32]
@@ -43,7 +44,7 @@ class HelicopterEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def __init__(
         self,
-        vehicle: Vehicle | str = "coax",
+        vehicle: Vehicle | str = USUAL,
         task: str | Task = "hover",
         *,
         task_options: dict[str, Any] | None = None,

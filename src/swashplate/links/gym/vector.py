@@ -14,6 +14,7 @@ from swashplate.links.gym.drawing import MODES, EnvironmentPicture, checked_mode
 from swashplate.links.gym.environment import spaces
 from swashplate.links.gym.flying import FlyingOptions, flying
 from swashplate.links.gym.tasks import Task, task_of
+from swashplate.models.usual import USUAL
 from swashplate.models.vehicle import Vehicle
 
 Observations = NDArray[np.float32]
@@ -35,7 +36,7 @@ class HelicopterVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[A
     def __init__(
         self,
         num_envs: int = 1,
-        vehicle: Vehicle | str = "coax",
+        vehicle: Vehicle | str = USUAL,
         task: str | Task = "hover",
         *,
         task_options: dict[str, Any] | None = None,

@@ -19,6 +19,7 @@ from swashplate.models.catalogue import from_card
 from swashplate.models.catalogue import vehicle as named_vehicle
 from swashplate.models.delays import input_delays
 from swashplate.models.surroundings import environment_of
+from swashplate.models.usual import HELICOPTER, USUAL
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.dynamics import SURROUNDINGS, enable_double_precision
@@ -71,7 +72,7 @@ def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
     """
     if model is not None:
         return model
-    for name in (flight.provenance.vehicle, "coax", "raptor50"):
+    for name in (flight.provenance.vehicle, USUAL, HELICOPTER):
         try:
             found = named_vehicle(name)
         except SwashError:

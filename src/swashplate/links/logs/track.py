@@ -16,13 +16,11 @@ from swashplate.links.logs import code_lines
 from swashplate.links.logs.opened import Opened
 from swashplate.models.card import packaged_cards
 from swashplate.models.catalogue import vehicle
+from swashplate.models.usual import BY_CHANNELS, HELICOPTER
 
 MOST = 4000
 """Moments of a page."""
 _RATE = 50.0
-_SHAPES = {"coax": ("motor_lower", "omega_lower"), "x8": ("motor_8",), "crazyflie": ("motor_4",)}
-"""Packaged vehicles by channels of which a log of their kind has one."""
-_USUAL_SHAPE = "raptor50"
 
 
 def track(opened: Opened) -> dict[str, Any]:
@@ -86,7 +84,7 @@ def drawn_as(flight: Flight) -> str:
     """The packaged vehicle whose shape is drawn: the log's own, else one with such motors, else a helicopter."""
     if flight.provenance.vehicle in packaged_cards():
         return flight.provenance.vehicle
-    return next((name for name, channels in _SHAPES.items() if any(c in flight for c in channels)), _USUAL_SHAPE)
+    return next((name for name, channels in BY_CHANNELS.items() if any(c in flight for c in channels)), HELICOPTER)
 
 
 def _finite(flight: Flight, name: str) -> tuple[Array, Array]:

@@ -203,10 +203,7 @@ def loads(
     drag = fuselage.flat_plate_drag(air, wake, areas=areas, density=density, xp=xp)
     touching, bending = None, None
     if switches.ground:
-        skids = ground_contact.Skids(
-            par.skid_length, par.skid_width, par.skid_depth, par.skid_stiffness, par.skid_damping, par.skid_friction
-        )
-        force, moment, bending = ground_contact.skid_loads(body, skids, xp, state.grip)
+        force, moment, bending = ground_contact.skid_loads(body, ground_contact.Skids.of(par), xp, state.grip)
         touching = Contribution(force, moment)
     return TwinRotorLoads(
         upper,

@@ -203,10 +203,7 @@ def loads(
         lifted = Contribution(lifted.force, lifted.moment + tilt)
     touching, bending = None, None
     if options.ground:
-        skids = ground_contact.Skids(
-            par.skid_length, par.skid_width, par.skid_depth, par.skid_stiffness, par.skid_damping, par.skid_friction
-        )
-        force, moment, bending = ground_contact.skid_loads(body, skids, xp, state.grip)
+        force, moment, bending = ground_contact.skid_loads(body, ground_contact.Skids.of(par), xp, state.grip)
         touching = Contribution(force, moment)
     return HelicopterLoads(
         lifted,

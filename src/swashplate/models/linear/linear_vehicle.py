@@ -42,14 +42,11 @@ class StateSpaceVehicle(Vehicle):
         same = card.values() == self.card.values() and dict(card.options) == dict(self.card.options)
         return made if same else linear(card)
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path) -> Path:
         """Write the model's file, which `swashplate.vehicle` reads."""
         from swashplate.atomic import write_text
 
-        if self.structure is None:
-            super().save(path)
-        else:
-            write_text(path, to_toml(self.structure))
+        return super().save(path) if self.structure is None else write_text(path, to_toml(self.structure))
 
     def __repr__(self) -> str:
         return f"{super().__repr__()}\n{self.structure!r}"

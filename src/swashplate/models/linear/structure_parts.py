@@ -92,7 +92,6 @@ _BODY_STATES = {
     "u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s", "phi": "rad", "theta": "rad"
 }  # fmt: skip
 
-_ONE_CORE = "has that axis already"
 _ONE_ROTOR = "the tip-path plane is there already; take one of the two"
 _HUB = {
     "p": {"b": "Lb"},

@@ -11,6 +11,7 @@ import numpy as np
 
 from swashplate.models.linear.expressions import Expression
 from swashplate.models.linear.state_space import ModelParameter, StateSpaceModel
+from swashplate.shown import Saved
 
 _GIVEN = "the structure's file"
 
@@ -62,7 +63,7 @@ def _sum(terms: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
-class WrittenStructure:
+class WrittenStructure(Saved):
     """What `swash structures show` prints.
 
     Attributes:

@@ -6,7 +6,7 @@ in a notebook.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from swashplate.control.analysis.ardupilot_gains import Suggestion
@@ -14,10 +14,11 @@ from swashplate.errors import SwashError
 from swashplate.flights.flight import Flight
 from swashplate.identification.core.result import Result
 from swashplate.identification.responses.frequency_response import TWO_PI, FrequencyResponse
-from swashplate.registry import Registry, nearest
+from swashplate.registry import nearest
 from swashplate.reporting.figures import bode_matrix
 from swashplate.reporting.figures.interactive import interactive
 from swashplate.reporting.figures.of_flight import over_time
+from swashplate.reporting.figures.sections import own_section
 from swashplate.reporting.figures.still import still
 from swashplate.reporting.figures.themes import Frequency, Theme
 from swashplate.reporting.report import structure_of
@@ -31,43 +32,14 @@ if TYPE_CHECKING:
     from swashplate.simulation.derivatives_over_speed import Derivatives
 
 
-_HERE = "swashplate.reporting.figures"
-_MODELS, _RESULTS = f"{_HERE}.of_models", f"{_HERE}.of_results"
-SECTIONS: Registry[Callable[[Any], Section]] = Registry(
-    "sections",
-    what="an object that shows itself",
-    own={
-        "Flight": f"{_HERE}.of_flight:section_of_flight",
-        "Inspection": f"{_HERE}.of_flight:section_of_inspection",
-        "FrequencyResponse": f"{_HERE}.views:section_of_responses",
-        "ModelComparison": f"{_HERE}.of_comparison:section_of_comparison",
-        "Residuals": f"{_HERE}.of_comparison:section_of_residuals",
-        "Suggestion": f"{_HERE}.views:section_of_gains",
-        "HeightVelocity": "swashplate.reporting.height_velocity_page:section_of_height_velocity",
-        "TrimCurve": f"{_MODELS}:section_of_trims",
-        "Derivatives": f"{_MODELS}:section_of_derivatives",
-        "LinearModel": f"{_MODELS}:section_of_linear_model",
-        "EquationError": f"{_RESULTS}:section_of_equation",
-        "Harmonics": f"{_RESULTS}:section_of_harmonics",
-        "PlannedManeuver": f"{_RESULTS}:section_of_planned",
-        "RateSteps": f"{_RESULTS}:section_of_steps",
-        "Reconstruction": f"{_RESULTS}:section_of_reconstruction",
-        "Spectrogram": f"{_RESULTS}:section_of_spectrogram",
-        "Spectrum": f"{_RESULTS}:section_of_spectrum",
-    },
-)
-"""What shows an object, by the name of its class; loaded when it is asked for, for those of models need JAX."""
-
-
 def section_of(shown: Any) -> Section:
     """What an object shows; the first figure is the main one.
 
     Raises:
         SwashError: an object that shows nothing.
     """
-    for kind in type(shown).__mro__:
-        if kind.__name__ in SECTIONS:
-            return SECTIONS[kind.__name__](shown)
+    if (own := own_section(shown)) is not None:
+        return own
     return _of_report(structure_of(shown, modes={}) if _has_modes(shown) else structure_of(shown), shown)
 
 

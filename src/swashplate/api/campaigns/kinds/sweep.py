@@ -100,7 +100,7 @@ class SweepKind:
             found = kind.findings(inner, rows | {"number": table["number"][here] - table["number"][here].min()})
             careful += [f"{words_of(choice)}: {words}" for words in found.careful]
             parts.append(found)
-            middles = [_middle(rows[name], unit, factor) for name, (unit, factor) in found.shown.items()]
+            middles = [_middle(rows[name], factor) for name, (_, factor) in found.shown.items()]
             values = tuple(str(_plain(choice[name])) for name in names)
             told = (words.partition(" (")[0] for _, words, _ in found.summary)
             cells.append((*values, str(int(here.sum())), *told, *middles))
@@ -193,7 +193,7 @@ def _plain(value: Any) -> float | str:
     return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
-def _middle(values: Any, unit: str, factor: float) -> str:
+def _middle(values: Any, factor: float) -> str:
     numbers = factor * np.asarray(values, dtype=np.float64)
     known = numbers[~np.isnan(numbers)]
     return f"{quantile(known, 0.5)[0]:.4g} to {quantile(known, 0.95)[0]:.4g}" if known.size else ""
