@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from swashplate.codegen.c_text import Precision, identifier
 from swashplate.control.controller_file import read_controller
 from swashplate.errors import SwashError
 from swashplate.export import formats
-from swashplate.export.c_text import Precision, identifier
 from swashplate.export.control_json import read_linear
 from swashplate.export.controller_c import controller_code
 from swashplate.export.formats import Export, Model

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.codegen.c_text import Precision
 from swashplate.compiled import NATIVE, loaded
 from swashplate.export.c_lanes import lane_code
-from swashplate.export.c_text import Precision
 from swashplate.simulation.dynamics import Equations
 
 _OPTIONS = (

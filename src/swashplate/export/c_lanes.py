@@ -10,15 +10,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from typing import Any
 
-from swashplate.errors import ExportError
-from swashplate.export.c_expression import Statement, Statements, statements
-from swashplate.export.c_loops import SETTLED, Search, searches
-from swashplate.export.c_stages import ROOTS, split
-from swashplate.export.c_text import REAL, Precision, literal
-from swashplate.export.traced import Looping, require_casadi
-from swashplate.simulation.dynamics import Equations, unpack_rows
+from swashplate.codegen.c_expression import Statement, Statements, statements
+from swashplate.codegen.c_loops import SETTLED, Search, searches
+from swashplate.codegen.c_split import ROOTS, split
+from swashplate.codegen.c_text import REAL, Precision, literal
+from swashplate.simulation.dynamics import Equations
+from swashplate.simulation.traced_rates import traced_rates
 from swashplate.simulation.trigonometry import KERNELS
 
 LANES: dict[Precision, int] = {"double": 16, "single": 32}
@@ -43,7 +41,8 @@ def lane_code(equations: Equations, precision: Precision) -> str:
     Raises:
         ExportError: for equations that CasADi cannot trace or that are not printed as C; without CasADi.
     """
-    function, steps = _traced(equations)
+    traced = traced_rates(equations)
+    function, steps = traced.function, traced.steps
     found = statements(function, precision=precision, inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(found, moving=("x[", "w[", *ROOTS), fixed="cp")
     of_inputs, rest = split(rest)
@@ -68,19 +67,6 @@ def lane_code(equations: Equations, precision: Precision) -> str:
         "MOVING": _moving(rest, steps, precision),
     }
     return re.sub(r"@(\w+)@", lambda blank: blanks[blank[1]], _SOURCE)
-
-
-def _traced(equations: Equations) -> tuple[Any, tuple[int, ...]]:
-    """The rates as a function of (x, w, p, guess, root), and the most steps of each root."""
-    casadi, vehicle = require_casadi(), equations.vehicle
-    sizes = (len(vehicle.state_names), len(vehicle.input_names) + 4, len(vehicle.parameter_names) + 2)
-    x, w, p = (casadi.SX.sym(name, size) for name, size in zip("xwp", sizes, strict=True))
-    looping = Looping(casadi)
-    try:
-        found = looping.looped([x, w, p], [casadi.vertcat(*vehicle.rates(x, *unpack_rows(equations, w, p), looping))])
-    except Exception as error:  # whatever a model of another package does with numbers that are none
-        raise ExportError(f"CasADi cannot trace the equations: {error}", where=vehicle.name) from error
-    return found.function, found.steps
 
 
 def _horner(coefficients: Sequence[float], precision: Precision) -> str:

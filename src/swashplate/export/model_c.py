@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from swashplate.export.c_expression import body
+from swashplate.codegen.c_expression import body
+from swashplate.codegen.c_text import REAL, Precision, array, words
 from swashplate.export.c_stages import stages
-from swashplate.export.c_text import REAL, Precision, array, words
 from swashplate.export.traced import Traced, Variable, late_notes
 
 _KINDS = ("state", "input", "surrounding", "parameter", "output")

@@ -11,8 +11,8 @@ from importlib import resources
 
 import numpy as np
 
+from swashplate.codegen.c_text import REAL, Precision, identifier, literal, words
 from swashplate.errors import ExportError
-from swashplate.export.c_text import REAL, Precision, identifier, literal, words
 from swashplate.identification.recursive import fourier_regression
 from swashplate.identification.recursive.equation import BIAS
 from swashplate.identification.recursive.fourier_regression import EARLY, LATE, RegressionPlan

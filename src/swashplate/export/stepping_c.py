@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.codegen.looping import require_casadi
 from swashplate.compiled import loaded
 from swashplate.export.model_c import frame_code
-from swashplate.export.traced import require_casadi, trace_vehicle
+from swashplate.export.traced import trace_vehicle
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import CasadiBackend
 from swashplate.physics.environment import Environment

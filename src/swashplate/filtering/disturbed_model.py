@@ -287,20 +287,27 @@ class StochasticModel:
     def n_outputs(self) -> int:
         return len(self.output_names)
 
-    def correct(self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance) -> tuple[FilterState, Any]:
-        """The state after a measurement, and the innovation with its horizontal part in heading axes."""
+    def correct(
+        self, state: FilterState, y: Any, gain: FilterGain, nuisance: Nuisance, xp: Backend | None = None
+    ) -> tuple[FilterState, Any]:
+        """The state after a measurement, and the innovation with its horizontal part in heading axes.
+
+        JAX's operations where `xp` is None.
+        """
+        xp = xp or jax_backend()
         psi = state.x[self.vehicle.index("psi")]
-        expected = self.measure(state.x, nuisance)
+        expected = self.measure(state.x, nuisance, xp)
         expected = expected + self.line_seen @ state.line if self.lined else expected
-        innovation = _turn(y - expected, self.output_names, -psi)
+        innovation = _turn(y - expected, self.output_names, -psi, xp)
         x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
-        x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
+        x, gust = _turn(x, self.vehicle.state_names, psi, xp), _turn(gust, _GUST_NAMES[: self.n_gusts], psi, xp)
         line = state.line + gain.line @ innovation if self.lined else ()
         return FilterState(state.x + x, state.gust + gust, state.drift + drift, line), innovation
 
-    def acting(self, state: FilterState) -> Any:
+    def acting(self, state: FilterState, xp: Backend | None = None) -> Any:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
-        return state.gust + jnp.concatenate([state.drift, jnp.zeros(2 * self.windy)])
+        xp = xp or jax_backend()
+        return state.gust + xp.arrays.concatenate([state.drift, np.zeros(2 * self.windy)])
 
     def predict(self, state: FilterState, noise: Noise, advance: Advance, now: Any) -> FilterState:
         """The state one sample later."""
@@ -370,7 +377,7 @@ _GUST_NAMES = (*DISTURBED, "x", "y")
 """The gusts, the wind by the axes that it blows along."""
 
 
-def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
+def _turn(row: Any, names: tuple[str, ...], angle: Any, xp: Backend) -> Any:
     """The part of a row that lies along x and y, turned by an angle about the vertical.
 
     Sums of unit rows instead of setting entries: a loop that scatters is not compiled as one function.
@@ -379,7 +386,7 @@ def _turn(row: Any, names: tuple[str, ...], angle: Any) -> Any:
         return row
     i, j = names.index("x"), names.index("y")
     along, across = np.eye(len(names))[[i, j]]
-    c, s = jnp.cos(angle) - 1.0, jnp.sin(angle)
+    c, s = xp.cos(angle) - 1.0, xp.sin(angle)
     return row + along * (c * row[i] - s * row[j]) + across * (s * row[i] + c * row[j])
 
 

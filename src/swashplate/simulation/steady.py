@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -15,6 +17,8 @@ from swashplate.physics.frames import Euler, Vector, local_to_body
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import Equations, jax_backend, rates_and_slopes, row_rates
 
+Slopes = Callable[[Array, Array, Array], tuple[Any, Any, Any]]
+"""Rates and their slopes by state and driving row, of (x, w, p)."""
 BODY = len(RigidBody._fields)
 ACCELERATIONS = slice(3, 6)
 ANGULAR_ACCELERATIONS = slice(9, 12)
@@ -80,10 +84,13 @@ def unrest(
     return value, slope
 
 
-def unrest_at(equations: Equations, z: Array, course: Array, row: Array, p: Array) -> tuple[Array, Array]:
-    """`unrest` by NumPy, from the rates and slopes that are compiled for linear models too."""
+def unrest_at(
+    equations: Equations, z: Array, course: Array, row: Array, p: Array, slopes: Slopes | None = None
+) -> tuple[Array, Array]:
+    """`unrest` by NumPy, from the rates and slopes that are compiled for linear models too, or others of these."""
     state, inputs = assemble(equations, z, course, _XP)
-    rates, by_x, by_w = map(np.asarray, rates_and_slopes(equations, state, np.concatenate([inputs, row]), p))
+    taken = slopes or partial(rates_and_slopes, equations)
+    rates, by_x, by_w = map(np.asarray, taken(state, np.concatenate([inputs, row]), p))
     held, inside = dict(equations.vehicle.trim_held), len(state) - BODY
     free = [name not in held for name in equations.vehicle.input_names]
     by_z, by_input = np.zeros((len(state), z.size)), np.zeros((len(inputs), z.size))

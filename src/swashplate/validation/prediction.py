@@ -84,7 +84,7 @@ def predict(
     starting = reaching[: starting_samples(record.dt)].mean(axis=0)
     numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
     begin = begun(model, numbers, seen_at_start(vehicle, record))
-    innovations, filtered = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
+    innovations, filtered, _ = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
     kept = [vehicle.index(name) for name in PREDICTED]
     laws = learnt(vehicle, record, filtered.x[:, kept], axes=close_loop, seconds=settling)
     closed = None

@@ -13,9 +13,9 @@ import pytest
 
 import swashplate as sp
 from exported import compiled
+from swashplate.codegen.c_text import identifier, literal, words
 from swashplate.compiler import compiler, shared_library
 from swashplate.errors import ExportError
-from swashplate.export.c_text import identifier, literal, words
 from swashplate.export.formats import export_model
 from swashplate.export.linear import of_state_space
 from swashplate.export.model_c import model_code

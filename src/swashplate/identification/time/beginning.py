@@ -7,14 +7,16 @@ taken a little to either side, and Riccati's equation gives what follows from th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from swashplate.arrays import Array, Complex
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, StochasticModel
-from swashplate.filtering.nuisance import Nuisance
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
+from swashplate.filtering.filter_library import filter_library
+from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.filtering.riccati import steady_gain, steady_gain_moved
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.start_states import (
@@ -34,7 +36,10 @@ from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
 from swashplate.physics.rigid_body import RigidBody
 from swashplate.simulation.dynamics import CONSTANTS, rates_and_slopes
-from swashplate.simulation.steady import assemble, unrest_at
+from swashplate.simulation.steady import Slopes, assemble, unrest_at
+
+if TYPE_CHECKING:
+    import jax
 
 _XP = ArrayBackend()
 _BODY = len(RigidBody._fields)
@@ -44,6 +49,8 @@ _ASIDE = 2e-3
 
 _IMAGINARY = 1e-30
 """Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
+
+_PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
 
 _POINTS = (1.0, -1.0, 2.0, -2.0)
 _WEIGHTS = (8.0 / 12.0, -8.0 / 12.0, -1.0 / 12.0, 1.0 / 12.0)
@@ -109,6 +116,13 @@ def begun(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion) -> 
     return Begun(model.gain_of(K, S), _starts(model, rows, seen)[0])
 
 
+def first_state(model: StochasticModel, x: Any, nuisance: Array | jax.Array) -> FilterState:
+    """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
+    front = x.shape[:-1]
+    line = np.zeros((*front, model.n_line)) if model.lined else ()
+    return FilterState(x, np.zeros((*front, model.n_gusts)), nuisance[..., _PUSHES], line)
+
+
 def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotion, directions: FilterNumbers) -> Begun:
     """Slopes of `begun` along directions, which come first."""
     k = len(directions.parameters)
@@ -164,10 +178,16 @@ def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) ->
     return model.joined(by_x, by_gust, _measured_slopes(model, x[which], nuisance), noise, np)
 
 
-def _numbers(vehicle: Vehicle, parameters: Array) -> Array:
+def numbers_and_constants(vehicle: Vehicle, parameters: Array) -> Array:
     """Parameters and constant surroundings, as the equations take them."""
     around = environment_of(vehicle, parameters=vehicle.parameters(*parameters.tolist()))
     return np.array([*parameters, *(getattr(around, name) for name in CONSTANTS)])
+
+
+def _rates_and_slopes(model: StochasticModel) -> Slopes:
+    """The rates of the equations and their slopes: in C, where that can be had."""
+    library = filter_library(model)
+    return partial(rates_and_slopes, model.equations) if library is None else library.rates_and_slopes
 
 
 def _driving(inputs: Array, voltage: float) -> Array:
@@ -177,11 +197,11 @@ def _driving(inputs: Array, voltage: float) -> Array:
 
 def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, voltage: float) -> tuple[Array, Array]:
     """Slopes of the rates by states and disturbances, by row."""
-    vehicle, by_x, by_gust = model.vehicle, [], []
+    vehicle, by_x, by_gust, taken = model.vehicle, [], [], _rates_and_slopes(model)
     pushes = np.eye(len(vehicle.state_names))[:, model.disturbed]
     wind = len(vehicle.input_names) + np.arange(model.n_gusts - N_DISTURBANCES)
     for state, u, p in zip(x, inputs, parameters, strict=True):
-        _, by_state, by_driving = rates_and_slopes(model.equations, state, _driving(u, voltage), _numbers(vehicle, p))
+        _, by_state, by_driving = taken(state, _driving(u, voltage), numbers_and_constants(vehicle, p))
         by_x.append(np.asarray(by_state))
         by_gust.append(np.concatenate([pushes, np.asarray(by_driving)[:, wind]], axis=1))
     return np.array(by_x), np.array(by_gust)
@@ -227,8 +247,10 @@ def _steady(
     z = np.array([0.0, 0.0, *middle, *list(leaves(vehicle.state))[_BODY:]])
     calm = np.array([0.0, 0.0, 0.0, voltage])
 
+    slopes = _rates_and_slopes(model)
+
     def unrest(row: Array) -> tuple[Array, Array]:
-        return unrest_at(model.equations, z, course, calm, _numbers(vehicle, row))
+        return unrest_at(model.equations, z, course, calm, numbers_and_constants(vehicle, row), slopes)
 
     slope = np.eye(z.size)
     for _ in range(STEPS):
@@ -261,10 +283,12 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
     if vehicle.traits.settled is not None:
         return found
 
+    taken = _rates_and_slopes(model)
+
     def unrest(row: int, inner: Array) -> tuple[Array, Array]:
         state = np.concatenate([found[row, :_BODY], inner])
-        p = _numbers(vehicle, rows.parameters[row])
-        rates, slope, _ = rates_and_slopes(model.equations, state, _driving(rows.inputs[row], first), p)
+        p = numbers_and_constants(vehicle, rows.parameters[row])
+        rates, slope, _ = taken(state, _driving(rows.inputs[row], first), p)
         # A governor at its stop does not move: without this the slope could not be inverted.
         return np.asarray(rates)[_BODY:], np.asarray(slope)[_BODY:, _BODY:] - NUDGE * np.eye(inner.size)
 

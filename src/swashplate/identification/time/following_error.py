@@ -29,11 +29,11 @@ from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.core.scoring import TracedCost
-from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, traced_begin
+from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, first_state, traced_begin
 from swashplate.identification.time.innovations import RecordRun
 from swashplate.identification.time.kinematics import PREDICTED
 from swashplate.identification.time.prediction_error import PredictionError
-from swashplate.identification.time.record_filter import STRETCH, first_state, stretches, whole
+from swashplate.identification.time.record_filter import STRETCH, stretches, whole
 from swashplate.identification.time.start_states import steady_flight
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 from swashplate.simulation.discretisation import held_series
@@ -65,6 +65,11 @@ class FollowingError(PredictionError):
     def constant(self) -> PredictionError:
         """The likelihood of the same row with a constant gain."""
         return self._constant
+
+    @property
+    def compiled_by(self) -> str:
+        """XLA, always."""
+        return "XLA"
 
     def traced(self) -> TracedCost:
         """None: what JAX can differentiate as a whole has a constant gain, which is another likelihood.

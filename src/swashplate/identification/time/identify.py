@@ -122,13 +122,15 @@ def identify_flight(
     nuisance = mean_nuisance(nuisances)
     identified = _identified(found, noise, nuisance, vehicle, parameters, pieces, by.method)
     settings: dict[str, Any] = {}
+    if isinstance(likelihood, PredictionError):
+        settings["filter by"] = likelihood.compiled_by
     if question.residual and noise is not None and not problems:
         each = [Nuisance(*numbers) for numbers in np.array(nuisances).T.tolist()]
         residual = fit_residual(identified, pieces, each, noise, horizon=_horizon(question))
         wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}
         card = residual.vehicle.card
         identified = residual.vehicle.with_card(replace(card, observer={**card.observer, **wanders}))
-        settings = {"residual": residual.told}
+        settings["residual"] = residual.told
         notes.append(residual.words)
     told = constants(found)
     if vehicle.traits.balance is not None:

@@ -27,10 +27,12 @@ from swashplate.identification.time.beginning import (
     FirstMotion,
     begun,
     begun_moved,
+    first_state,
     starting_samples,
     traced_begin,
 )
-from swashplate.identification.time.record_filter import along, along_moved, first_state, planes
+from swashplate.identification.time.compiled_filter import FilterRun
+from swashplate.identification.time.record_filter import along, moved
 
 _COMPLEX = 1e-30
 """Step of a slope by complex numbers, exact to rounding for ties, which are rational (Squire and Trapp 1998)."""
@@ -56,13 +58,15 @@ class FilterPlan:
 
 
 class Filtered(NamedTuple):
-    """A record's run: commands as they arrive, numbers, beginning, innovations (n, n_outputs) and filtered states."""
+    """A record's run: commands as they arrive, numbers, beginning, innovations (n, n_outputs) and filtered states; of a
+    run in C the roots that its steps found."""
 
     commands: Array
     numbers: FilterNumbers
     begin: Begun
     innovations: Array
     states: FilterState
+    roots: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -104,8 +108,7 @@ class RecordRun:
         """The run at a row, of arguments as `placed` has them."""
         reaching, at = self.placed(card, noise, numbers)
         begin = begun(self.plan.model, at, self.seen)
-        ran = along(self.plan.model, begin, at, self.readings, reaching, self.voltage)
-        return Filtered(reaching, at, begin, *ran)
+        return Filtered(reaching, at, begin, *along(self.plan.model, begin, at, self.readings, reaching, self.voltage))
 
     def moved(self, run: Filtered, card: Array, numbers: Array, scale: Array) -> tuple[Array, Array]:
         """Slopes by every scaled entry of the row: innovations (p, n, outputs), covariance (p, outputs, outputs)."""
@@ -125,11 +128,10 @@ class RecordRun:
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
         directions = FilterNumbers(*(scale[:, None] * part for part in directions))
-        steps = planes(model, run.states, run.commands, self.voltage, run.numbers.parameters, directions.parameters[:k])
-        pushed, further = np.zeros((p, *run.commands.shape)), np.eye(p, k)
-        pushed[own : own + m] = by_command * scale[own : own + m, None, None]
         begin = begun_moved(model, run.numbers, self.seen, directions)
-        found = along_moved(model, run.begin, begin, run.numbers, directions, self.readings, steps, (pushed, further))
+        late, series = by_command * scale[own : own + m, None, None], (self.readings, run.commands, self.voltage)
+        went = FilterRun(run.innovations, run.states, run.roots)
+        found = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, late), free=k)
         return found, np.asarray(begin.gain.covariance)
 
     def _commands_moved(self, run: Filtered) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
+from swashplate.filtering.filter_library import filter_library
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
 from swashplate.identification.core.comparison import Comparison
@@ -158,6 +159,11 @@ class PredictionError:
     def constant(self) -> PredictionError:
         """The likelihood of the same row with a constant gain."""
         return self
+
+    @property
+    def compiled_by(self) -> str:
+        """What makes the code that runs along the records: a C compiler or XLA."""
+        return "XLA" if filter_library(self.model) is None else "C"
 
     def numbers(self, row: Array) -> list[FilterNumbers]:
         """What the filter of each record depends on at a scaled row."""

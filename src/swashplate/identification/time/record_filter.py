@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
-from swashplate.filtering.nuisance import PUSHES, Nuisance
-from swashplate.identification.time.beginning import Begun, FilterNumbers
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state
+from swashplate.identification.time.compiled_filter import FilterRun, compiled_filter
 from swashplate.simulation.compilation import QUICK_TO_COMPILE, lengthened
 
 STRETCH = 256
@@ -37,8 +38,6 @@ _DIRECTIONS = 8
 
 _TOGETHER = 32
 """Samples whose slopes are taken side by side: what stays in a core's cache."""
-
-_PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
 
 RUNS = 64
 """Predictions that run side by side."""
@@ -60,20 +59,21 @@ class Planes(NamedTuple):
 # ---- along the record ----------------------------------------------------------------------------------------------
 def along(
     model: StochasticModel, begin: Begun, numbers: FilterNumbers, readings: Array, commands: Array, voltage: Array
-) -> tuple[Array, FilterState]:
-    """Innovations (n, n_outputs) and the states after each reading.
+) -> FilterRun:
+    """Innovations and the states after each reading: in C, where that can be had.
 
     Args:
         model, numbers: of the filter.
         begin: of `begun`.
         readings, commands, voltage: by sample.
     """
+    if (in_c := compiled_filter(model)) is not None:
+        return in_c.along(begin, numbers, (readings, commands, voltage))
     state, n, parts = first_state(model, begin.x, numbers.nuisance), len(readings), []
     for rows in stretches(readings, commands, voltage):
         state, found = _along(model, state, begin.gain, numbers, *rows)
         parts.append(found)
-    innovations, states = whole(parts, n)
-    return innovations, states
+    return FilterRun(*whole(parts, n))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -113,6 +113,8 @@ def ahead_of(
         commands, voltage: by sample, `ahead` of them beyond the last start.
         starts: samples. ahead: how many samples to predict.
     """
+    if (in_c := compiled_filter(model)) is not None:
+        return in_c.ahead_of(states, numbers, commands, voltage, starts, ahead)
     parts = [np.zeros((0, ahead, len(model.vehicle.state_names)))]
     for first in range(0, len(starts), RUNS):
         here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
@@ -143,6 +145,37 @@ def _ahead_of(
 
 
 # ---- slopes --------------------------------------------------------------------------------------------------------
+def moved(
+    model: StochasticModel,
+    begin: Begun,
+    begin_moved: Begun,
+    numbers: FilterNumbers,
+    directions: FilterNumbers,
+    series: tuple[Array, Array, Array],
+    run: FilterRun,
+    late: tuple[int, Array],
+    *,
+    free: int,
+) -> Array:
+    """Slopes of a run's innovations along directions (directions, n, n_outputs).
+
+    Args:
+        model, begin, numbers: as of `along`; series: its readings, commands and voltage.
+        begin_moved: of `begun_moved`. directions: in which the numbers move.
+        run: of `along`.
+        late: the first of the directions that move the commands, and how they do (directions, n, inputs).
+        free: so many directions, the first, are of parameters.
+    """
+    if (in_c := compiled_filter(model)) is not None and run.roots is not None:
+        return in_c.moved(begin, begin_moved, numbers, directions, series, run.roots, late)
+    readings, commands, voltage = series
+    p, (first, pushed) = len(directions.parameters), late
+    steps = planes(model, run.states, commands, voltage, numbers.parameters, directions.parameters[:free])
+    pushes = np.zeros((p, *commands.shape)), np.eye(p, free)
+    pushes[0][first : first + len(pushed)] = pushed
+    return along_moved(model, begin, begin_moved, numbers, directions, readings, steps, pushes)
+
+
 def planes(
     model: StochasticModel, states: FilterState, commands: Array, voltage: Array, parameters: Array, directions: Array
 ) -> list[Planes]:
@@ -283,13 +316,6 @@ def _stretches_of(moved: Array) -> Iterator[Array]:
 def whole(parts: Any, n: int) -> Any:
     """Stretches or blocks one after the other, the first n of their rows."""
     return jax.tree.map(lambda *rows: np.concatenate([np.asarray(row) for row in rows])[:n], *parts)
-
-
-def first_state(model: StochasticModel, x: Any, nuisance: Array | jax.Array) -> FilterState:
-    """State rows (..., states) with nothing known of the air yet, and drifts where the records' numbers have them."""
-    front = x.shape[:-1]
-    line = np.zeros((*front, model.n_line)) if model.lined else ()
-    return FilterState(x, np.zeros((*front, model.n_gusts)), nuisance[..., _PUSHES], line)
 
 
 def _acting(model: StochasticModel, states: FilterState) -> Array:

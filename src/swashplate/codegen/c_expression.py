@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from swashplate.codegen.c_text import Precision, literal
 from swashplate.errors import ExportError
-from swashplate.export.c_text import Precision, literal
 
 _BINARY = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/"}
 _COMPARED = {"LT": "<", "LE": "<=", "EQ": "==", "NE": "!=", "AND": "&&", "OR": "||"}

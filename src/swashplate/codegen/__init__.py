@@ -1,0 +1,1 @@
+"""Equations as C: traced by CasADi, put in order, differentiated and printed."""

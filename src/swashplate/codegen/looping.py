@@ -1,0 +1,73 @@
+"""Equations traced by CasADi with their roots left as symbols, to be found in loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from swashplate.extras import library
+from swashplate.physics.backend import CasadiBackend
+
+
+def require_casadi() -> Any:
+    """CasADi, or what to do without it."""
+    return library("casadi", what="C code")
+
+
+@dataclass(frozen=True)
+class Root:
+    """A root that is found by Newton's method in a loop, in symbols.
+
+    Attributes:
+        start: the first guess. guess: what `value` and `slope`, the residual and its derivative, are functions of.
+        root: stands for the solution wherever it is used. steps: at most.
+    """
+
+    start: Any
+    guess: Any
+    value: Any
+    slope: Any
+    root: Any
+    steps: int
+
+
+@dataclass(frozen=True)
+class Looped:
+    """A CasADi function whose roots are found in loops.
+
+    Attributes:
+        function: of (state, input, surrounding, parameter, guesses, roots); its outputs are those that are wanted, then
+            starts, values and slopes of the roots, each as a column.
+        steps: of each root, at most; later roots may depend on earlier ones.
+    """
+
+    function: Any = field(repr=False)
+    steps: tuple[int, ...] = ()
+
+
+class Looping(CasadiBackend):
+    """Leaves roots as symbols. C can then end the search when the guess no longer moves, instead of unrolling it."""
+
+    def __init__(self, casadi: Any) -> None:
+        super().__init__()
+        self.roots: list[Root] = []
+        self._casadi = casadi
+
+    def newton(self, residual: Any, start: Any, *, steps: int) -> Any:
+        guess, root = (self._casadi.SX.sym(f"{name}{len(self.roots)}") for name in ("guess", "root"))
+        value, slope = residual(guess)
+        self.roots.append(Root(start, guess, value, slope, root, steps))
+        return root
+
+    def looped(self, given: Sequence[Any], results: Sequence[Any]) -> Looped:
+        """A function of `given` whose outputs are `results` and what the roots need."""
+
+        def column(*entries: Any) -> Any:
+            return self._casadi.vertcat(self._casadi.SX(0, 1), *entries)
+
+        symbols = [column(*(getattr(root, name) for root in self.roots)) for name in ("guess", "root")]
+        sought = [column(*(getattr(root, name) for root in self.roots)) for name in ("start", "value", "slope")]
+        inputs, outputs = [*given, *symbols], [*results, *sought]
+        made = self._casadi.Function("f", inputs, [self._casadi.densify(o) for o in outputs], {"cse": True})
+        return Looped(made, tuple(root.steps for root in self.roots))

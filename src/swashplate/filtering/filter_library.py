@@ -1,0 +1,73 @@
+"""The C of `filter_c`, compiled and loaded, where there is a compiler."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.compiled import NATIVE, can_compile, loaded
+from swashplate.errors import ExportError
+from swashplate.filtering.disturbed_model import StochasticModel
+from swashplate.filtering.filter_c import filter_source
+
+_OPTIONS = ("-O1", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
+_QUIET = ("-Wno-unused-variable", "-Wno-unused-but-set-variable", "-Wno-psabi", "-Wno-unknown-warning-option")
+_KINDS = {
+    "l": ctypes.c_long,
+    "d": ctypes.c_double,
+    "*": np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS"),
+    "i": np.ctypeslib.ndpointer(ctypes.c_long, flags="C_CONTIGUOUS"),
+}
+_ARGUMENTS = {
+    "run_along": "ld" + 9 * "*",
+    "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*",
+    "run_ahead": "lld" + 5 * "*" + "i*",
+    "rates_and_slopes": 6 * "*",
+}
+
+
+class FilterLibrary:
+    """The functions of one model's C; their arguments are as its text has them.
+
+    Args:
+        model: whose filter.
+
+    Raises:
+        ExportError: for equations that cannot be printed as C, and without a compiler.
+        MissingLibraryError: without CasADi.
+    """
+
+    def __init__(self, model: StochasticModel) -> None:
+        self._c = loaded(filter_source(model), options=(*_OPTIONS, *_QUIET))
+        for name, kinds in _ARGUMENTS.items():
+            function = getattr(self._c, name)
+            function.argtypes, function.restype = [_KINDS[kind] for kind in kinds], None
+        self.run_along, self.run_moved, self.run_ahead = self._c.run_along, self._c.run_moved, self._c.run_ahead
+        self.directions, self.roots = int(self._c.directions()), int(self._c.roots())
+
+    def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
+        """As `dynamics.rates_and_slopes`; slopes by the voltage are left at zero."""
+        n = len(x)
+        found = np.empty(n), np.empty((n, n)), np.empty((n, len(w)))
+        self._c.rates_and_slopes(*map(flat, (x, w, p)), *found)
+        return found
+
+
+def flat(rows: Any) -> Array:
+    """Numbers as C reads them."""
+    return np.ascontiguousarray(rows, dtype=np.float64)
+
+
+@lru_cache(maxsize=16)
+def filter_library(model: StochasticModel) -> FilterLibrary | None:
+    """A model's filter in C; None where it cannot be had here: then it is XLA's."""
+    if not can_compile():
+        return None
+    try:
+        return FilterLibrary(model)
+    except ExportError:
+        return None

@@ -1,0 +1,142 @@
+"""The filter in C: the equations' own steps, slopes of its own runs, and the numbers that XLA's filter finds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from swashplate.arrays import Array
+from swashplate.compiled import can_compile
+from swashplate.filtering import filter_library as libraries
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import StochasticModel, stochastic_model
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import POSE, Record
+from swashplate.identification.time.beginning import FilterNumbers
+from swashplate.identification.time.compiled_filter import compiled_filter
+from swashplate.identification.time.prediction_error import PredictionError
+from swashplate.models.surroundings import environment_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.physics.backend import FloatBackend
+from swashplate.simulation.dynamics import enable_double_precision
+from swashplate.simulation.runge_kutta import rk4_step
+
+pytestmark = pytest.mark.skipif(not can_compile(), reason="there is no C compiler, or the extra 'export' is missing")
+
+_FREE = {"coax": ["linkage_lower", "tau_f_upper", "inertia_zz"], "xcell60": ["mass", "bar_gain"], "x8": ["mass"]}
+_EVERYTHING = Noise(wind=0.5, line_hertz=34.4, line_angle=1.4e-3, line_height=2e-4, line_time=0.2)
+
+
+def _record(vehicle: Vehicle, n: int = 250) -> Record:
+    """What something that wanders about shows, under commands that wander about the middle."""
+    rng, time = np.random.default_rng(3), np.arange(n) * 0.01
+    outputs = np.cumsum(rng.standard_normal((n, 6)) * [0.003, 0.003, 0.003, 0.004, 0.004, 0.006], axis=0)
+    middle = np.array([0.5 * (low + high) for low, high in vehicle.input_limits])
+    inputs = middle + 0.01 * np.cumsum(rng.standard_normal((n, len(middle))), axis=0)
+    return Record("wandering", time, inputs, outputs, 12.0 + 0.1 * np.sin(time), POSE, voltage_known=True)
+
+
+@lru_cache(maxsize=8)
+def _likelihood(name: str, noise: Noise | None = None) -> PredictionError:
+    enable_double_precision()
+    vehicle = sp.vehicle(name)
+    return PredictionError(parameterize(vehicle, _FREE[name]), [_record(vehicle)], noise=noise)
+
+
+def _somewhere(likelihood: PredictionError) -> Array:
+    return likelihood.row.starts() + 0.02 * np.random.default_rng(1).standard_normal(len(likelihood.row))
+
+
+@pytest.mark.parametrize("name", ["coax", "xcell60", "x8"])
+def test_steps_in_c_are_those_of_the_equations(name: str) -> None:
+    vehicle = sp.vehicle(name)
+    model = stochastic_model(vehicle, POSE, 0.01, noise=Noise(wind=0.3))
+    in_c = compiled_filter(model)
+    assert in_c is not None
+    likelihood = _likelihood(name)
+    run = likelihood.runs(_somewhere(likelihood))[0]
+    gust = np.array([0.3, -0.2, 0.1, 1.0, -2.0, 0.5, 0.4, -0.3])
+    states = run.states._replace(gust=np.tile(gust, (len(run.states.x), 1)))
+    commands, voltage = run.commands, likelihood.pieces[0].voltage
+    noise = np.array(Noise(wind=0.3), dtype=np.float64)
+    numbers = FilterNumbers(run.numbers.parameters, noise, run.numbers.nuisance, run.numbers.inputs)
+    found = in_c.ahead_of(states, numbers, commands, voltage, np.array([100, 170]), 2)
+    parameters, push = vehicle.parameters(*run.numbers.parameters.tolist()), np.zeros(len(vehicle.state_names))
+    around = environment_of(vehicle, parameters=parameters)
+    for start, predicted in zip((100, 170), found, strict=True):
+        x, faded = states.x[start], gust
+        for k in range(2):
+            acting = faded + np.concatenate([states.drift[start], [0.0, 0.0]])
+            push[model.disturbed] = acting[:6]
+            here = around._replace(wind_north=acting[6], wind_east=acting[7], wind_down=0.0, voltage=voltage[start + k])
+
+            def rates(x: Array, u: Array, here: object = here, push: Array = push) -> Array:
+                return np.array(vehicle.rates(x, u, parameters, here, FloatBackend())) + push
+
+            x = rk4_step(rates, x, lambda _, u=commands[start + k]: u, 0.01, looped=False)
+            faded = faded * np.asarray(model.fade(Noise(wind=0.3), np))
+            np.testing.assert_allclose(predicted[k], x, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "noise"), [("coax", _EVERYTHING), ("xcell60", None), ("x8", None)])
+def test_slopes_in_c_are_those_of_its_own_runs(name: str, noise: Noise | None) -> None:
+    likelihood = _likelihood(name, noise)
+    row = _somewhere(likelihood)
+    _, found, _ = likelihood.scores(row)
+    way = np.random.default_rng(2).standard_normal(len(row))
+    step = 1e-5 * way
+    costs = [likelihood.cost(row + factor * step) for factor in (1.0, -1.0, 2.0, -2.0)]
+    slope = (8.0 * (costs[0] - costs[1]) - (costs[2] - costs[3])) / 12e-5
+    assert found @ way == pytest.approx(slope, rel=1e-6)
+    assert likelihood.compiled_by == "C"
+
+
+def _without_a_compiler(likelihood: PredictionError, monkeypatch: pytest.MonkeyPatch) -> PredictionError:
+    monkeypatch.setattr(libraries, "can_compile", lambda: False)
+    _forget()
+    return PredictionError(likelihood.table, likelihood.pieces, noise=likelihood.noise)
+
+
+def _forget() -> None:
+    libraries.filter_library.cache_clear()
+    compiled_filter.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("name", "noise"),
+    [
+        ("coax", None),
+        pytest.param("coax", _EVERYTHING, marks=pytest.mark.proof),
+        pytest.param("xcell60", None, marks=pytest.mark.proof),
+        pytest.param("x8", None, marks=pytest.mark.proof),
+    ],
+)
+def test_xla_finds_the_same_numbers(name: str, noise: Noise | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_c = _likelihood(name, noise)
+    row = _somewhere(in_c)
+    ours, (run,) = in_c.scores(row), in_c.runs(row)
+    by_xla = _without_a_compiler(in_c, monkeypatch)
+    try:
+        theirs, (other,) = by_xla.scores(row), by_xla.runs(row)
+        assert (by_xla.compiled_by, run.roots is None, other.roots is None) == ("XLA", False, True)
+    finally:
+        _forget()
+    np.testing.assert_allclose(run.innovations, other.innovations, atol=1e-11 * np.abs(other.innovations).max())
+    for mine, exact in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(mine, exact, rtol=1e-10, atol=1e-11 * np.max(np.abs(exact)))
+
+
+def test_equations_that_cannot_be_printed_are_left_to_xla() -> None:
+    vehicle = sp.vehicle("coax")
+    rates = vehicle.derivatives
+
+    def own(state: object, inputs: object, parameters: object, environment: object, xp: FloatBackend) -> object:
+        xp.arrays.ones(3)  # arrays are nothing that CasADi traces
+        return rates(state, inputs, parameters, environment, xp)
+
+    model: StochasticModel = stochastic_model(replace(vehicle, derivatives=own), POSE, 0.01)
+    assert libraries.filter_library(model) is None
