@@ -2,13 +2,15 @@
 
 Each learns how body velocities, roll, pitch and body rates follow the motors, and is given what a model is given: the
 motion up to a start, commands and voltage up to the target. Motors enter as (command x voltage)^2, which is thrust but
-for a factor, less its mean over the seconds that calibrate a model. Places and heading are integrals and not learnt.
+for a factor, less its mean over the seconds that calibrate a model; one of them gets the bare commands instead. Places
+and heading are integrals and not learnt.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 
 from swashplate.arrays import Array
@@ -28,10 +31,11 @@ _PAST, _SEED = 8, 20
 
 @dataclass(frozen=True)
 class Motion:
-    """Body states (n, 12), thrusts (n, motors) as the module says, and the step [s]."""
+    """Body states (n, 12), thrusts and bare commands (n, motors) as the module says, and the step [s]."""
 
     body: Array
     thrusts: Array
+    commands: Array
     dt: float
 
     @property
@@ -41,8 +45,9 @@ class Motion:
 
 def motion(body: Array, inputs: Array, voltage: Array, dt: float, *, calibration: float) -> Motion:
     """A record as the rivals see it."""
-    thrusts = (inputs * voltage[:, None]) ** 2
-    return Motion(body, thrusts - thrusts[: round(calibration / dt)].mean(axis=0), dt)
+    first = round(calibration / dt)
+    thrusts, commands = (inputs * voltage[:, None]) ** 2, inputs
+    return Motion(body, thrusts - thrusts[:first].mean(axis=0), commands - commands[:first].mean(axis=0), dt)
 
 
 Rival = Callable[[Motion, Places, int], Array]
@@ -94,6 +99,133 @@ def arx(training: Sequence[Motion], *, past: int = _PAST, ridge: float = 1e-3) -
     return predict
 
 
+def n4sid(training: Sequence[Motion], *, bare: bool = False) -> Rival:
+    """Subspace identification (Van Overschee and De Moor 1994: N4SID) with the filter of its own residuals.
+
+    The oblique projection of later motion on the past, along later inputs, by an LQ decomposition of all flights side
+    by side; states from its singular vectors; A, B, C, D by least squares on them, and the filter's gain from what
+    these leave. The rows of the Hankel matrices and the order are those whose predictions of the training flights err
+    least over half a second.
+
+    Args:
+        bare: inputs are the commands, without the static nonlinearity and the voltage.
+    """
+    size = _scales(np.concatenate([m.learnt for m in training]))[1]
+
+    def error(rival: Rival) -> float:
+        total = []
+        for m in training:
+            starts = np.arange(500, len(m.body) - 51, 25)
+            later = m.learnt[starts[:, None] + np.arange(1, 51)]
+            total.append((np.abs(rival(m, starts, 50)[..., list(LEARNT)] - later) / size).mean())
+        return float(np.mean(total))
+
+    return min((model for rows in (8, 15, 25) for model in _subspace_models(training, bare=bare, rows=rows)), key=error)
+
+
+def _subspace_models(training: Sequence[Motion], *, bare: bool, rows: int) -> list[Rival]:
+    """Models of several orders, from block Hankel matrices of so many rows past and later."""
+
+    def inputs(m: Motion) -> Array:
+        return m.commands if bare else m.thrusts
+
+    mean, y_size = _scales(np.concatenate([m.learnt for m in training]))
+    u_size = np.concatenate([inputs(m) for m in training]).std(axis=0)
+    k_y, k_u = len(LEARNT), len(u_size)
+
+    def hankel(values: Array) -> Array:
+        n = len(values) - 2 * rows + 1
+        return np.concatenate([values[i : i + n].T for i in range(2 * rows)])
+
+    Y, U = (
+        np.concatenate([hankel(each) for each in part], axis=1)
+        for part in ([(m.learnt - mean) / y_size for m in training], [inputs(m) / u_size for m in training])
+    )
+    past = np.concatenate([U[: rows * k_u], Y[: rows * k_y]])
+    later_u, later_y = U[rows * k_u :], Y[rows * k_y :]
+    lower = np.linalg.qr(np.concatenate([later_u, past, later_y]).T, mode="r").T
+    a, b = len(later_u), len(later_u) + len(past)
+    along = lower[b:, a:b] @ np.linalg.pinv(lower[a:b, a:b], rcond=1e-8)
+    left, size, _ = np.linalg.svd(along @ lower[a:b, :b])  # of the oblique projection, along @ past
+    ends = np.cumsum([len(m.learnt) - 2 * rows + 1 for m in training])[:-1] - 1
+    inside = np.setdiff1d(np.arange(past.shape[1] - 1), ends)  # a state and the next one of the same flight
+
+    def of_order(order: int) -> Rival:
+        X = (left[:, :order].T @ along @ past) / np.sqrt(size[:order, None] * past.shape[1] ** 0.5)
+        u, y = later_u[:k_u, inside], later_y[:k_y, inside]
+        known = np.concatenate([X[:, inside], u])
+        found = np.linalg.lstsq(known.T, np.concatenate([X[:, inside + 1], y]).T, rcond=None)[0].T
+        off = np.concatenate([X[:, inside + 1], y]) - found @ known
+        A, B, C, D = found[:order, :order], found[:order, order:], found[order:, :order], found[order:, order:]
+        spread = off @ off.T / off.shape[1]
+        Q, S, R = spread[:order, :order], spread[:order, order:], spread[order:, order:] + 1e-6 * np.eye(k_y)
+        P = solve_discrete_are(A.T, C.T, Q, R, s=S)
+        gain = np.linalg.solve(C @ P @ C.T + R, (A @ P @ C.T + S).T).T
+
+        def predict(of: Motion, starts: Places, ahead: int) -> Array:
+            u, y = inputs(of) / u_size, (of.learnt - mean) / y_size
+            x, states = np.zeros(order), np.empty((len(u), order))
+            for k in range(int(starts.max()) + 1):
+                x = A @ x + B @ u[k] + gain @ (y[k] - C @ x - D @ u[k])
+                states[k] = x
+            now, made = states[starts], []
+            for k in range(1, ahead + 1):
+                made.append(now @ C.T + u[starts + k] @ D.T)
+                now = now @ A.T + u[starts + k] @ B.T
+            return _whole(of, starts, np.stack(made, axis=1) * y_size + mean)
+
+        return predict
+
+    return [of_order(order) for order in (8, 12, 16, 24, 32, 48)]
+
+
+# ---- accelerations ---------------------------------------------------------------------------------------------------
+_LAGS = np.arange(0, _PAST + 1, 2)
+"""Samples back of the thrusts that an acceleration depends on."""
+
+
+def _features(states: Array, thrusts: Sequence[Array]) -> Array:
+    return np.concatenate([states, *thrusts], axis=1)
+
+
+def _accelerations(training: Sequence[Motion]) -> tuple[Array, Array]:
+    """Features (n, columns) and the rates of the learnt states (n, 8), all flights together."""
+    X, y = [], []
+    for m in training:
+        at = np.arange(_PAST + 1, len(m.body) - 2)
+        X.append(_features(m.learnt[at], [m.thrusts[at - i] for i in _LAGS]))
+        y.append((m.learnt[at + 1] - m.learnt[at - 1]) / (2.0 * m.dt))
+    return np.concatenate(X), np.concatenate(y)
+
+
+def _integrated(rates: Callable[[Array], Array]) -> Rival:
+    """Euler steps along rates (s, 8) that depend on features."""
+
+    def predict(of: Motion, starts: Places, ahead: int) -> Array:
+        states, made = of.learnt[starts], []
+        for k in range(ahead):
+            states = states + of.dt * rates(_features(states, [of.thrusts[starts + k - i] for i in _LAGS]))
+            made.append(states)
+        return _whole(of, starts, np.stack(made, axis=1))
+
+    return predict
+
+
+def boosted_trees(training: Sequence[Motion]) -> Rival:
+    """Gradient-boosted trees (Friedman 2001; scikit-learn's by histograms) that give the rates of the learnt states.
+
+    Raises:
+        SystemExit: without scikit-learn, which only this table needs.
+    """
+    try:
+        from sklearn.ensemble import HistGradientBoostingRegressor
+    except ImportError as error:
+        raise SystemExit("gradient-boosted trees need scikit-learn, which is no dependency: install it.") from error
+    X, y = _accelerations(training)
+    trees = [HistGradientBoostingRegressor(random_state=_SEED).fit(X, rate) for rate in y.T]
+    return _integrated(lambda rows: np.stack([tree.predict(rows) for tree in trees], axis=1))
+
+
 # ---- networks --------------------------------------------------------------------------------------------------------
 def _adam(loss: Callable[[Any, Any], Any], weights: Any, batches: Callable[[int], Any], *, steps: int) -> Any:
     import optax
@@ -125,17 +257,7 @@ def _network(layers: Any, x: Any) -> Any:
 def perceptron(training: Sequence[Motion], *, steps: int = 4000) -> Rival:
     """Two layers of 32 that give the rates of the learnt states from them and the thrusts of the last 0.08 s."""
     rng = np.random.default_rng(_SEED)
-    lags = np.arange(0, _PAST + 1, 2)
-
-    def features(states: Array, thrusts: Sequence[Array]) -> Array:
-        return np.concatenate([states, *thrusts], axis=1)
-
-    X, y = [], []
-    for m in training:
-        at = np.arange(_PAST + 1, len(m.body) - 2)
-        X.append(features(m.learnt[at], [m.thrusts[at - i] for i in lags]))
-        y.append((m.learnt[at + 1] - m.learnt[at - 1]) / (2.0 * m.dt))
-    x, rates = np.concatenate(X), np.concatenate(y)
+    x, rates = _accelerations(training)
     (x_mean, x_size), (y_mean, y_size) = _scales(x), _scales(rates)
     xs, ys = jnp.asarray((x - x_mean) / x_size), jnp.asarray((rates - y_mean) / y_size)
 
@@ -145,16 +267,7 @@ def perceptron(training: Sequence[Motion], *, steps: int = 4000) -> Rival:
 
     layers = _adam(loss, _layers(rng, (x.shape[1], 32, 32, 8)), lambda _: rng.integers(0, len(x), 256), steps=steps)
     told = jax.jit(_network)
-
-    def predict(of: Motion, starts: Places, ahead: int) -> Array:
-        states, made = of.learnt[starts], []
-        for k in range(ahead):
-            row = (features(states, [of.thrusts[starts + k - i] for i in lags]) - x_mean) / x_size
-            states = states + of.dt * (np.asarray(told(layers, row)) * y_size + y_mean)
-            made.append(states)
-        return _whole(of, starts, np.stack(made, axis=1))
-
-    return predict
+    return _integrated(lambda rows: np.asarray(told(layers, (rows - x_mean) / x_size)) * y_size + y_mean)
 
 
 def lstm(training: Sequence[Motion], *, hidden: int = 32, warm: int = 30, ahead: int = 50, steps: int = 1500) -> Rival:
@@ -222,6 +335,9 @@ def lstm(training: Sequence[Motion], *, hidden: int = 32, warm: int = 30, ahead:
 
 RIVALS: dict[str, Callable[[Sequence[Motion]], Rival]] = {
     "linear ARX": arx,
+    "N4SID, commands alone": partial(n4sid, bare=True),
+    "N4SID, thrusts": n4sid,
+    "gradient-boosted trees on accelerations": boosted_trees,
     "small network on accelerations": perceptron,
     "LSTM": lstm,
 }

@@ -1,12 +1,14 @@
 """Open-loop predictions of multirotor flights that no fit saw, beside rivals trained on the flights of the fit.
 
-    python scripts/multirotor_scores.py --model LABEL=MODEL.toml ... --fit FLIGHT ... --on FLIGHT ...
+    python scripts/multirotor_scores.py --model LABEL=MODEL.toml ... --fit FLIGHT ... --on FLIGHT ... [--new FLIGHT ...]
 
 MODEL.toml is what `swash identify --vehicle crazyflie ... --out FOLDER` wrote; a flight may have a window (FILE@8-30).
-Predictions start every 0.1 s, run 0.5 s at 100 Hz on the logged commands and voltage, and are scored by mean absolute
-errors over the axes. A model starts from its own observer, which has seen the flight up to the start; everything else
-from measured motion. The first five seconds of each flight tell a model that flight's constants; nothing is scored
-there. "Textbook" is the card before the identification.
+Predictions start every 0.1 s, run at 100 Hz on the logged commands and voltage, and are scored by mean absolute errors
+over the axes up to 0.5 s, and by fit % after 0.5, 1 and 2 s. A model starts from its own observer, which has seen the
+flight up to the start; everything else from measured motion. The first five seconds of each flight tell a model that
+flight's constants; nothing is scored there. "Textbook" is the card before the identification. Heave is told of the
+first model (`multirotor_heave`). `--new`: flights of kinds that no fit saw, in tables of their own. `--page FILE` puts
+the tables into a page, each between <!-- scores: NAME --> and <!-- end -->. The trees need scikit-learn.
 """
 
 from __future__ import annotations
@@ -15,14 +17,15 @@ import argparse
 import time
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from multirotor_heave import HEADS, Heave, heave
 from multirotor_rivals import RIVALS, Motion, Rival, motion
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 import swashplate as sp
@@ -35,24 +38,34 @@ from swashplate.identification.core.records import Record, records
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
-from swashplate.physics.environment import LABORATORY_GRAVITY, Environment
-from swashplate.simulation.compilation import enable_compilation_cache
+from swashplate.physics.environment import Environment
+from swashplate.simulation.compilation import enable_compilation_cache, lengthened
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
 from swashplate.validation.calibration import CALIBRATION, calibrate
-from swashplate.validation.prediction import naive, predict
+from swashplate.validation.metrics import fit_percent
+from swashplate.validation.prediction import Predictions, naive, predict
 from swashplate.validation.validate import observer_of, started_from
 
 AHEAD, EVERY = 50, 10
-"""Samples of 10 ms."""
+"""Samples of 10 ms: how far ahead mean errors go, and between starts."""
 SHOWN = (10, 50)
+FITS = (50, 100, 200)
+"""Samples after which fit % is told."""
 GROUPS = {
-    "position m": slice(0, 3),
-    "velocity m/s": slice(3, 6),
-    "attitude deg": slice(6, 9),
-    "rates rad/s": slice(9, 12),
+    "position [m]": slice(0, 3),
+    "velocity [m/s]": slice(3, 6),
+    "attitude [deg]": slice(6, 9),
+    "rates [rad/s]": slice(9, 12),
 }
-SLOW = 3.0
-"""Hz below which the acceleration along body z is compared."""
+MOTIONS = {
+    "horizontal (u, v)": (3, 4),
+    "heave (w)": (5,),
+    "tilt (φ, θ)": (6, 7),
+    "tilting (p, q)": (9, 10),
+    "heading (ψ)": (8,),
+    "turning (r)": (11,),
+}
+"""Channels whose mean fit is told together."""
 BODY = len(PREDICTED)
 EDGE = 10
 """Samples at a record's end whose measured motion has too few samples around it."""
@@ -63,7 +76,7 @@ Places = NDArray[np.intp]
 def flown(
     model: Any, of: Any, body: Any, inner: Any, inputs: Any, voltage: Any, par: Any, push: Any, starts: Any
 ) -> Any:
-    """States after each start (s, AHEAD, 12) from measured motion, and the specific force along it (n, 3)."""
+    """States after each start (s, FITS[-1], 12) from measured motion, and the specific force along it (n, 3)."""
     vehicle = of.vehicle
 
     def along(inside: Any, here: Any) -> Any:
@@ -86,13 +99,13 @@ def flown(
             return x, x[:BODY]
 
         first = jnp.concatenate([body[start], inside[start]])
-        return jax.lax.scan(sample, first, start + jnp.arange(AHEAD))[1]
+        return jax.lax.scan(sample, first, start + jnp.arange(FITS[-1]))[1]
 
     return jax.vmap(run)(starts), jax.vmap(felt)(body, inside, inputs, voltage)
 
 
 def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Places) -> tuple[Array, Array]:
-    """Predictions (s, AHEAD, 12) from measured motion and the specific force (n, 3) of a vehicle."""
+    """Predictions (s, FITS[-1], 12) from measured motion and the specific force (n, 3) of a vehicle."""
     model = stochastic_model(vehicle, record.output_names, record.dt)
     body, par = measured_states(record, nuisance), jax.tree.map(jnp.asarray, vehicle.values())
     reaching = commands(vehicle, record.dt, jnp.asarray(record.inputs), nuisance)
@@ -117,84 +130,163 @@ def in_the_room(states: Array) -> Array:
     return out
 
 
-def errors(states: Array, truth: Array, starts: Places) -> Array:
-    """Absolute errors (s, AHEAD, 4): the mean over the axes of each group."""
+class Scored(NamedTuple):
+    """Absolute errors (s, AHEAD, 4): the mean over the axes of each group; and by horizon of `FITS` predicted, true and
+    starting states (s, 12) as `validate` compares them."""
+
+    errors: Array
+    fits: tuple[tuple[Array, Array, Array], ...]
+
+
+def scored(states: Array, truth: Array, starts: Places) -> Scored:
+    """Predictions (s, FITS[-1], 12) beside what came."""
     later = truth[starts[:, None] + 1 + np.arange(AHEAD)]
-    off = in_the_room(states) - in_the_room(later)
+    off = in_the_room(states[:, :AHEAD]) - in_the_room(later)
     off[..., 6:9] = (off[..., 6:9] + 180.0) % 360.0 - 180.0
-    return np.stack([np.abs(off[..., part]).mean(axis=-1) for part in GROUPS.values()], axis=-1)
+    errors = np.stack([np.abs(off[..., part]).mean(axis=-1) for part in GROUPS.values()], axis=-1)
+    fits = []
+    for ahead in FITS:
+        at = np.flatnonzero(starts + ahead < len(truth) - EDGE)
+        fits.append((states[at, ahead - 1], truth[starts[at] + ahead], truth[starts[at]]))
+    return Scored(errors, tuple(fits))
 
 
-def measured_force(body: Array, dt: float) -> Array:
-    """Specific force along body z [m/s^2] from the tracked motion, shape (n,)."""
-    u, v, w, phi, theta, _, p, q, _ = body[:, 3:].T
-    return np.asarray(np.gradient(w, dt) + p * v - q * u - LABORATORY_GRAVITY * np.cos(phi) * np.cos(theta))
+def of_files(names: Sequence[str], vehicle: Vehicle) -> list[tuple[Record, Array]]:
+    """Records of at least calibration and a prediction, and what the accelerometer read along z at their samples."""
+    shortest, made = CALIBRATION + 2.0 * AHEAD * 0.01, []
+    for flight in (read(name).condition(rate=100.0, cutoff=0.0) for name in names):
+        for record in records(flight, vehicle):
+            if record.time[-1] - record.time[0] > shortest:
+                made.append((record, np.interp(record.time, flight.time("az"), flight.values("az"))))
+    return made
 
 
-def share(found: Array, truth: Array, dt: float, after: int) -> tuple[float, float, float]:
-    """R^2 below `SLOW`, the same without what is constant in the flight, and the spread of the truth [m/s^2]."""
-    sos = butter(4, SLOW, fs=1.0 / dt, output="sos")
-    a, b = (sosfiltfilt(sos, row)[after : -round(0.3 / dt)] for row in (found, truth))
-    spread, off = float(np.sum((b - b.mean()) ** 2)), a - b
-    return 1.0 - float(np.sum(off**2)) / spread, 1.0 - float(np.sum((off - off.mean()) ** 2)) / spread, float(b.std())
-
-
-def of_files(names: Sequence[str], vehicle: Vehicle) -> list[Record]:
-    """Records of at least calibration and a prediction."""
-    flights = [read(name).condition(rate=100.0, cutoff=0.0) for name in names]
-    shortest = CALIBRATION + 2.0 * AHEAD * 0.01
-    return [r for flight in flights for r in records(flight, vehicle) if r.time[-1] - r.time[0] > shortest]
-
-
-def seen(record: Record) -> Motion:
-    """A record as the rivals see it."""
+def seen(record: Record, *, beyond: int = 0) -> Motion:
+    """A record as the rivals see it, with its last commands held for some samples."""
     body = measured_states(record, Nuisance())
-    return motion(body, record.inputs, record.voltage, record.dt, calibration=CALIBRATION)
+    inputs, voltage = (lengthened(rows, len(rows) + beyond) for rows in (record.inputs, record.voltage))
+    return motion(lengthened(body, len(body) + beyond), inputs, voltage, record.dt, calibration=CALIBRATION)
 
 
-def main(models: dict[str, Vehicle], fitted: Sequence[str], held_out: Sequence[str]) -> None:
-    enable_double_precision()
-    enable_compilation_cache()
-    first = next(iter(models.values()))
-    training = [seen(record) for record in of_files(fitted, first)]
-    rivals: dict[str, Rival] = {}
-    for label, make in RIVALS.items():
-        began = time.process_time()
-        rivals[label] = make(training)
-        print(f"{label}: trained in {time.process_time() - began:.0f} s of processor time")
-    textbook = {"textbook quadrotor (the card)": started_from(first)}
-    found: dict[str, list[Array]] = {}
-    for record in of_files(held_out, first):
+def along_z(vehicle: Vehicle, record: Record, felt: Array, nuisance: Nuisance, told: Predictions, first: int) -> Heave:
+    """What can be explained of a record's acceleration along body z, and what the model explains."""
+    body = measured_states(record, nuisance)
+    force = open_loop(vehicle, record, nuisance, np.array([first]))[1][:, 2] - float(nuisance.push_w)
+    return heave(vehicle, record, nuisance, body, force, told.disturbances[:, 2], felt, first)
+
+
+def compare(
+    models: dict[str, Vehicle], rivals: dict[str, Rival], pieces: Sequence[tuple[Record, Array]]
+) -> tuple[dict[str, list[Scored]], list[Heave]]:
+    """Every predictor on every record, and heave by the first model."""
+    first = next(iter(models))
+    textbook = {"textbook quadrotor (the card)": started_from(models[first])}
+    found: dict[str, list[Scored]] = {}
+    slow: list[Heave] = []
+    for record, felt in pieces:
         starts = np.arange(round(CALIBRATION / record.dt), record.time.size - AHEAD - EDGE, EVERY)
         plain = measured_states(record, Nuisance())
         for kind, label in (("hold", "hold"), ("rates", "constant velocity and rates")):
-            ahead = [naive(plain, starts, k, record.dt, kind=kind) for k in range(1, AHEAD + 1)]
-            found.setdefault(label, []).append(errors(np.stack(ahead, axis=1), plain, starts))
+            ahead = [naive(plain, starts, k, record.dt, kind=kind) for k in range(1, FITS[-1] + 1)]
+            found.setdefault(label, []).append(scored(np.stack(ahead, axis=1), plain, starts))
         for label, vehicle in (textbook | models).items():
             noise, prior = observer_of(vehicle)
             nuisance = calibrate(vehicle, record, noise=noise, prior=prior)
             body = measured_states(record, nuisance)
-            states, force = open_loop(vehicle, record, nuisance, starts)
             if label in models:
-                told = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD * record.dt,
+                told = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=FITS[-1] * record.dt,
                                every=EVERY * record.dt, settling=CALIBRATION)  # fmt: skip
                 states = told.states[np.isin(told.starts, starts)]
-                whole, moved, spread = share(force[:, 2], measured_force(body, record.dt), record.dt, int(starts[0]))
-                print(
-                    f"{record.name}: {label}: delay {1e3 * float(nuisance.delay_motor):.0f} ms; acceleration along z "
-                    f"below {SLOW:g} Hz ({spread:.2f} m/s^2): R^2 {whole:.2f}, {moved:.2f} without its constant error"
-                )
-            found.setdefault(label, []).append(errors(states, body, starts))
+                if label == first:
+                    slow.append(along_z(vehicle, record, felt, nuisance, told, int(starts[0])))
+            else:
+                states = open_loop(vehicle, record, nuisance, starts)[0]
+            found.setdefault(label, []).append(scored(states, body, starts))
+        motion = seen(record, beyond=FITS[-1] + 1)
         for label, rival in rivals.items():
-            found.setdefault(label, []).append(errors(rival(seen(record), starts, AHEAD), plain, starts))
-    print(f"\nmean absolute error after {' and '.join(f'{h / 100:g} s' for h in SHOWN)}")
-    heads = [group.split()[0] + f" {h / 100:g}" for group in GROUPS for h in SHOWN]
-    print("| predictor | " + " | ".join(heads) + " |\n|---" * 1 + "|---" * len(heads) + "|")
+            with np.errstate(over="ignore", invalid="ignore"):
+                found.setdefault(label, []).append(scored(rival(motion, starts, FITS[-1]), plain, starts))
+    return found, slow
+
+
+def mean_errors(found: dict[str, list[Scored]]) -> str:
+    """A table of mean absolute errors, the best of each column in bold."""
+    means = {label: np.concatenate([one.errors for one in parts]).mean(axis=0) for label, parts in found.items()}
+    heads = [f"{group if h == SHOWN[0] else ''} {h / 100:g} s".strip() for group in GROUPS for h in SHOWN]
+    rows = np.array([[mean[h - 1, g] for g in range(len(GROUPS)) for h in SHOWN] for mean in means.values()])
+    best = rows.min(axis=0)
+    cells = [[f"**{v:.3g}**" if v == least else f"{v:.3g}" for v, least in zip(row, best, strict=True)] for row in rows]
+    return table(["predictor", *heads], [[label, *row] for label, row in zip(means, cells, strict=True)])
+
+
+def mean_fits(found: dict[str, list[Scored]]) -> str:
+    """A table of fit % after the horizons of `FITS`."""
+    lines = []
     for label, parts in found.items():
-        mean = np.concatenate(parts).mean(axis=0)
-        cells = [f"{mean[h - 1, g]:.3g}" for g in range(len(GROUPS)) for h in SHOWN]
-        print(f"| {label} | " + " | ".join(cells) + " |")
-    print(f"{sum(len(part) for part in found['hold'])} starts")
+        fits = [
+            fit_percent(*(np.concatenate(rows) for rows in zip(*(one.fits[h] for one in parts), strict=True)))
+            for h in range(len(FITS))
+        ]
+        cells = [" / ".join(percent(float(np.mean(fit[list(at)]))) for fit in fits) for at in MOTIONS.values()]
+        lines.append([label, *cells])
+    return table(["predictor", *MOTIONS], lines)
+
+
+def percent(fit: float) -> str:
+    return f"{fit:.0f}" if fit > -1000.0 else "<-999"
+
+
+def table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ["---"] * len(heads), *lines))
+
+
+def into_page(text: str, name: str, made: str) -> str:
+    """A page with a part of it made anew.
+
+    Raises:
+        SystemExit: where it has no such part.
+    """
+    begin, end = f"<!-- scores: {name} -->", "<!-- end -->"
+    before, found, after = text.partition(begin)
+    if not found or end not in after:
+        raise SystemExit(f"the page has no part {begin} ... {end}")
+    return f"{before}{begin}\n{made}\n{end}{after.split(end, 1)[1]}"
+
+
+def main(
+    models: dict[str, Vehicle],
+    fitted: Sequence[str],
+    held_out: Sequence[str],
+    new: Sequence[str],
+    page: Path | None,
+) -> None:
+    enable_double_precision()
+    enable_compilation_cache()
+    vehicle = next(iter(models.values()))
+    training = [seen(record) for record, _ in of_files(fitted, vehicle)]
+    rivals: dict[str, Rival] = {}
+    for label, make in RIVALS.items():
+        began = time.process_time()
+        rivals[label] = make(training)
+        print(f"{label}: trained in {time.process_time() - began:.0f} s of processor time", flush=True)
+    made: dict[str, str] = {}
+    lifted: list[Heave] = []
+    for name, flights in (("known kinds", held_out), ("new kinds", new)):
+        if flights:
+            found, slow = compare(models, rivals, of_files(flights, vehicle))
+            lifted += slow
+            starts = sum(len(one.errors) for one in found["hold"])
+            made[name] = f"{starts} starts.\n\n{mean_errors(found)}"
+            made[f"{name}, fit"] = mean_fits(found)
+    made["heave"] = table(HEADS, [one.cells for one in lifted])
+    for name, part in made.items():
+        print(f"\n{name}\n{part}")
+    if page is not None:
+        text = page.read_text()
+        for name, part in made.items():
+            text = into_page(text, name, part)
+        page.write_text(text)
 
 
 if __name__ == "__main__":
@@ -202,5 +294,8 @@ if __name__ == "__main__":
     parser.add_argument("--model", action="append", required=True, metavar="LABEL=MODEL.toml")
     parser.add_argument("--fit", nargs="+", required=True, metavar="FLIGHT")
     parser.add_argument("--on", nargs="+", required=True, metavar="FLIGHT")
+    parser.add_argument("--new", nargs="+", default=[], metavar="FLIGHT")
+    parser.add_argument("--page", type=Path, metavar="FILE")
     given = parser.parse_args()
-    main({m.split("=", 1)[0]: sp.vehicle(m.split("=", 1)[1]) for m in given.model}, given.fit, given.on)
+    chosen = {m.split("=", 1)[0]: sp.vehicle(m.split("=", 1)[1]) for m in given.model}
+    main(chosen, given.fit, given.on, given.new, given.page)

@@ -75,8 +75,9 @@ def identify(
             small, predicted from the filter's states; for methods with a filter (`core.multi_step`). Bounds are those
             of this criterion, corrected for predictions that overlap.
         residual: also fit accelerations that the equations lack, linear in motion and inputs (`models.residual`), as
-            far as blocks of these flights, left out, speak for them; to the innovations, or with `horizon` to the
-            errors ahead. `result.problems` says what it gained and its part of each acceleration.
+            far as blocks of these flights, left out, speak for them; to the innovations together with the physics, or
+            with `horizon` to the errors ahead, the physics held. `result.problems` says what it gained, its part of
+            each acceleration and which physics moved.
         progress: called with the iteration's number and cost.
 
     Returns:

@@ -58,6 +58,20 @@ def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
     )
 
 
+def speed_rates(par: Any, speeds: Any, commands: Any, voltage: Scalar) -> list[Scalar]:
+    """Accelerations of the rotors [rad/s^2]: eq. 15, and slower for what all do alike.
+
+    While rotors speed up together, their motors draw the current of it through one battery, whose voltage falls for as
+    long; of one against another the currents cancel. With motors of resistance Rm, n of them at a duty d on a battery
+    of resistance R, the time constant of what is common is longer by n d^2 R / Rm, as a share: `tau_shared` [s]. A
+    log of ten voltages a second shows the lower voltage of a new steady state, and not this.
+    """
+    away = [steady_speed(par, command, voltage) - omega for omega, command in zip(speeds, commands, strict=True)]
+    common = sum(away) / len(away)
+    together = common / (par.tau_drive + par.tau_shared)
+    return [drive_train.drive_train_rate(common, one, par.tau_drive) + together for one in away]
+
+
 def shaft_power(par: Any, speeds: Any, density_ratio: Scalar) -> Scalar:
     """Power that the rotors take in hover and near it [W]: torque times speed, all rotors."""
     return sum(
@@ -91,9 +105,8 @@ def loads(
         air, drag_x=par.drag_x, drag_y=par.drag_y, drag_z=par.drag_z, damping_w=0.0, xp=xp
     ).scaled(density)
     moment = fuselage.yaw_damping_moment(body.r, par.damping_r)
-    rates = []
-    for i, (omega, command, sense) in enumerate(zip(drive, inputs, senses, strict=True), start=1):
-        rate = drive_train.drive_train_rate(omega, steady_speed(par, command, voltage), par.tau_drive)
+    rates = speed_rates(par, drive, inputs, voltage)
+    for i, (omega, rate, sense) in enumerate(zip(drive, rates, senses, strict=True), start=1):
         gain, arm = getattr(par, f"gain_{i}"), place(par, i)
         flow = air + body.rates.cross(arm)
         across, through = par.rotor_drag * density * omega, par.thrust_damping * density * omega
@@ -109,7 +122,6 @@ def loads(
             + rotor.yaw_moment(torque, par.inertia_drive, rate, sense)
             + rotor.gyroscopic_moment(body.rates, par.inertia_drive, omega, sense)
         )
-        rates.append(rate)
     lost = None if battery is None else Battery(sag_rate(par, battery.voltage_sag, drive, env, xp))
     return MultirotorLoads(force, moment, type(drive)(*rates), lost)
 

@@ -39,6 +39,7 @@ UNITS: dict[str, str] = {
     "rotor_drag": "N s^2/(m rad)",
     "flap_back": "N s^2/rad",
     "tau_drive": "s",
+    "tau_shared": "s",
     "k_drive": "rad/s",
     "o_drive": "rad/s",
     "k_drive_voltage": "rad/s/V",
@@ -60,6 +61,7 @@ EFFECTS = (
     PhysicalEffect("drag of the rotors across", {"rotor_drag": 0.0}),
     PhysicalEffect("flap-back", {"flap_back": 0.0}),
     PhysicalEffect("reaction and gyroscopic moment of the motors", {"inertia_drive": 0.0}),
+    PhysicalEffect("rotors slower together, on one battery", {"tau_shared": 0.0}),
     PhysicalEffect("drag of the body", {"drag_x": 0.0, "drag_y": 0.0, "drag_z": 0.0}),
     PhysicalEffect("damping of yaw", {"damping_r": 0.0}),
 )
@@ -178,7 +180,7 @@ def axes(par: Any, senses: Sequence[float]) -> tuple[Axis, ...]:
         Axis("roll", roll),
         Axis("pitch", pitch),
         Axis("yaw", yaw, ("k_torque", "inertia_drive", "inertia_zz")),
-        Axis("heave", lift, ("thrust_damping", "o_drive", "k_drive_voltage")),
+        Axis("heave", lift, ("thrust_damping", "tau_shared", "o_drive", "k_drive_voltage")),
     )
 
 
@@ -204,6 +206,7 @@ def choices(card: Card) -> Mapping[str, Choice]:
         near("inertia_xx", 0.3 * at["inertia_xx"], "the card, three tenths"),
         near("inertia_yy", 0.3 * at["inertia_yy"], "the card, three tenths"),
         near("tau_drive", 0.5 * at["tau_drive"], "the card, half its value"),
+        near("tau_shared", at["tau_drive"], "one battery for all motors: the time constant of one, as much again"),
         near("o_drive", 0.3 * at["k_drive"], "the card, three tenths of the full speed"),
         near("k_drive_voltage", 0.3 * at["k_drive"] / at["voltage_nominal"], "a third of what a share of it does"),
         near("inertia_drive", at["inertia_drive"], "the card, as much again"),

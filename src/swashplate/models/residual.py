@@ -37,6 +37,11 @@ def coefficients(vehicle: Vehicle) -> dict[str, tuple[str, str]]:
     return {f"{PREFIX}{row}_{column}": (row, column) for row, column in pairs}
 
 
+def counted_from(vehicle: Vehicle) -> dict[str, float]:
+    """By input, the value from which the residual of a vehicle counts it."""
+    return {name: vehicle.card.parameters[f"{_AT}{name}"].value for name in vehicle.input_names}
+
+
 def has_residual(card: Card) -> bool:
     return any(name.startswith(PREFIX) for name in card.parameters)
 

@@ -73,6 +73,20 @@ def test_half_the_voltage_needs_twice_the_command() -> None:
     assert half == pytest.approx(2.0 * full, rel=1e-12)
 
 
+def test_rotors_are_slower_together_than_one_against_another() -> None:
+    """With `tau_shared` what is common dies away with both time constants, differences with one."""
+    vehicle = crazyflie(tau_drive=0.04, tau_shared=0.03)
+    par = vehicle.values()
+    command = [0.6] * 4
+    steady = par.k_drive * 0.6 + par.o_drive  # at the nominal voltage
+    alike, apart = np.full(4, 40.0), np.array([40.0, -40.0, 25.0, -25.0])
+    for away, tau in ((alike, 0.07), (apart, 0.04)):
+        found = rates(vehicle, [*[0.0] * 12, *(steady + away)], command)[12:16]
+        np.testing.assert_allclose(found, -away / tau, rtol=1e-9)
+    none = rates(crazyflie(tau_drive=0.04), [*[0.0] * 12, *(steady + alike)], command)[12:16]
+    np.testing.assert_allclose(none, -alike / 0.04, rtol=1e-9)
+
+
 def test_angular_momentum_stays_where_no_air_acts() -> None:
     """Rotors that speed up, in a tumbling body without air: what they gain the body loses, about every axis."""
     none = dict.fromkeys(("k_thrust", "k_torque", "thrust_damping", "rotor_drag", "flap_back"), 0.0)

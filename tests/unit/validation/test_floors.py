@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -257,3 +258,10 @@ def test_the_verdict_says_whether_the_model_or_the_flight_is_poor(
     assert found.level == level
     assert words in found.words
     assert f"[{fit - 4:.0f} to {fit + 4:.0f}]" in found.words
+
+
+def test_a_loss_to_the_past_is_no_proof_against_a_model_on_commands_that_answer() -> None:
+    lost = replace(_beside(12.0, 70.0), ceiling=float("nan"), past=66.0, leak=14.0, refused="inputs answer")
+    assert "The past alone predicts 66 %: on commands that answer the motion it may beat a model that is" in lost.words
+    assert "The model is poor" not in lost.words
+    assert "The model is poor: the past alone predicts 66 %" in replace(lost, leak=3.0).words

@@ -54,6 +54,11 @@ class Found:
         return self.criterion.row.places("parameter")
 
     @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle with what the search found."""
+        return self.table.vehicle.with_values(self.table.identified(self.numbers[: len(self.table.free)]))
+
+    @property
     def numbers(self) -> Array:
         return np.asarray(self.optimum.row * self.criterion.row.scale)
 

@@ -8,11 +8,13 @@ so the motion that follows then explains it better still, which it does not wher
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from swashplate.arrays import Array
+from swashplate.identification.core.parameters import Parameterization
 from swashplate.identification.core.records import Record
 from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.kinematics import PREDICTED
@@ -35,6 +37,8 @@ _BAND = (0.3, 8.0)
 _LAGS = 0.3
 _MOVED = 1e-4
 
+
+UNJUDGED = "the model names no axes: whether the flights move each by itself was not judged"
 
 MOTION: Mapping[str, tuple[tuple[str, ...], str]] = {
     "roll": (("phi", "p", "lateral", "v"), "p"),
@@ -96,6 +100,12 @@ def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array])
     )
 
 
+def by_itself(axis: AxisExcitation) -> bool:
+    """Whether a record moves an axis by more than weakly: what else it shows there may be the controller."""
+    follows = 1.0 - axis.explained > FOLLOWS * (1.0 - axis.explained_later)
+    return axis.identifiable and (axis.explained <= WEAK or follows)
+
+
 def _called(inputs: Mapping[str, float]) -> str:
     """A sum of inputs in words."""
     return "".join(f"{' - ' if share < 0.0 else ' + '}{name}" for name, share in inputs.items()).removeprefix(" + ")
@@ -150,3 +160,19 @@ def _words(
         f"{axis}: {share}: it is a controller's answer, and this record cannot tell the {axis} dynamics from the "
         f"controller. Add an independent sweep or multisine to the {axis} reference and log rotor speed and voltage."
     )
+
+
+def hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:
+    """Fix what only unexcited axes could tell, at its prior where it has one."""
+    notes = []
+    for axis in table.vehicle.traits.axes:
+        judged = [item for item in axes if item.axis == axis.name]
+        held = [item for item in table.free if item.name in axis.parameters]
+        if not held or any(item.identifiable for item in judged):
+            continue
+        at = {item.name: item.start if item.mean is None else item.mean for item in held}
+        table = replace(
+            table.without(at), vehicle=table.vehicle.with_values({k: v for k, v in at.items() if v is not None})
+        )
+        notes.append(f"{', '.join(at)} held: {judged[0].words}")
+    return table, notes

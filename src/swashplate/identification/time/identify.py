@@ -33,14 +33,16 @@ from swashplate.identification.responses.frequency_response import FrequencyResp
 from swashplate.identification.time import feedback, nelder_mead
 from swashplate.identification.time.belonging import unrelated
 from swashplate.identification.time.estimates import LAGS, Found, constants, estimates_of, found_at
-from swashplate.identification.time.flight_details import AxisExcitation, FlightDetails, moving_air
+from swashplate.identification.time.flight_details import FlightDetails, moving_air
 from swashplate.identification.time.following_error import FollowingError
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.identification.time.noise_entries import in_wind, with_line
 from swashplate.identification.time.output_error import OutputError
 from swashplate.identification.time.prediction_error import SETTLING, PredictionError
-from swashplate.identification.time.residual_fit import fit_residual
+from swashplate.identification.time.residual_fit import LinearResidual, fit_residual
+from swashplate.identification.time.residual_joint import begun, begun_where_it_ended, beside_physics, moved
 from swashplate.models.linear.state_space import StateSpaceModel
+from swashplate.models.residual import PREFIX
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
@@ -93,9 +95,9 @@ def identify_flight(
     axes = tuple(
         axis for piece in pieces for axis in feedback.excitation(vehicle, piece, measured_states(piece, Nuisance()))
     )
-    notes = [] if axes else [_UNJUDGED]
+    notes = [] if axes else [feedback.UNJUDGED]
     if by.method == "prediction-error" and not question.keep_unexcited:
-        table, held = hold_unexcited(table, axes)
+        table, held = feedback.hold_unexcited(table, axes)
         notes += held
     likelihood = by.likelihood_of(table, pieces, question)
     where = ", ".join(piece.name for piece in pieces)
@@ -103,15 +105,24 @@ def identify_flight(
     accuracy.refuse_unseen(likelihood.row, likelihood.constant.scores(likelihood.row.starts())[2], where=where)
     optimum = by.search(likelihood, _most(question), question.progress)
     found, row = by.conclude(table, likelihood, optimum, question)
+    residual, began, k = None, vehicle, len(table.free)
+    if isinstance(likelihood, PredictionError) and question.residual and not estimates_of(found, vehicle)[1]:
+        each = [Nuisance(*numbers) for numbers in np.array(likelihood.nuisances_of(row)).T.tolist()]
+        physics, air = found.table.without(found.optimum.at_bound), likelihood.noise_of(row)
+        residual = fit_residual(found.vehicle, pieces, each, air, horizon=horizon, axes=axes, physics=physics)
+        if residual.kept and horizon is None:
+            alone = found
+            likelihood, found, row = _together(by, likelihood, row, residual, question)
+            residual, began = residual.at(found.vehicle, moved(alone, found)), begun(vehicle, residual)
     optimum = found.optimum
-    parameters, problems = estimates_of(found, vehicle)
+    every, problems = estimates_of(found, began)
+    parameters = tuple(estimate for estimate in every if not estimate.name.startswith(PREFIX))
     noise = likelihood.noise_of(row)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
     if noise is not None:  # output error fits starts to its commands: others lose
-        apart = unrelated(lambda others: by.likelihood_of(table, others, question).constant.cost(row), pieces)
+        apart = unrelated(lambda others: by.likelihood_of(found.table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
-        air = moving_air(noise)
-        notes += [air] if air else []
+        notes += [told] if (told := moving_air(noise)) else []
         notes += [] if question.rotor_line is None else coloured_by_resampling(flights)
     notes += [
         f"{e.name}: the flight is {e.disagreement:+.1f} sigmas from the prior card"
@@ -120,21 +131,21 @@ def identify_flight(
     ]
     nuisances = likelihood.nuisances_of(row)
     nuisance = mean_nuisance(nuisances)
-    identified = _identified(found, noise, nuisance, vehicle, parameters, pieces, by.method)
+    identified = _identified(found, noise, nuisance, began, every, pieces, by.method)
     settings: dict[str, Any] = {}
     if isinstance(likelihood, PredictionError):
         settings["filter by"] = likelihood.compiled_by
-    if question.residual and noise is not None and not problems:
-        each = [Nuisance(*numbers) for numbers in np.array(nuisances).T.tolist()]
-        residual = fit_residual(identified, pieces, each, noise, horizon=_horizon(question))
-        wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}
-        card = residual.vehicle.card
-        identified = residual.vehicle.with_card(replace(card, observer={**card.observer, **wanders}))
+    if residual is not None:
+        if residual.kept and horizon is not None:
+            wanders = {"noise": {k: float(v) for k, v in residual.noise._asdict().items()}}
+            entries = {**residual.vehicle.card.parameters, **identified.card.parameters}
+            card = replace(identified.card, parameters=entries, observer={**identified.card.observer, **wanders})
+            identified = residual.vehicle.with_card(card)
         settings["residual"] = residual.told
         notes.append(residual.words)
-    told = constants(found)
+    own, plain = constants(found), found.scaled(found.plain)[:k, :k]
     if vehicle.traits.balance is not None:
-        trims = {name: [c.value for c in told if c.name == name] for name in {c.name for c in told}}
+        trims = {name: [c.value for c in own if c.name == name] for name in {c.name for c in own}}
         notes += vehicle.traits.balance(
             vehicle, identified, {name: sum(values) / len(values) for name, values in trims.items()}
         )
@@ -143,15 +154,15 @@ def identify_flight(
         solution=identified,
         start=vehicle,
         estimates=parameters,
-        constants=told,
+        constants=own,
         noise=noise,
         nuisance=nuisance,
         names=table.names,
-        covariance=found.scaled(found.plain),
-        covariance_corrected=found.scaled(found.corrected),
-        correlation=correlation_of(found.scaled(found.plain)),
+        covariance=plain,
+        covariance_corrected=found.scaled(found.corrected)[:k, :k],
+        correlation=correlation_of(plain),
         directions=accuracy.blind_directions(
-            table.names, accuracy.marginal_information(optimum.information, found.prior, found.places)
+            table.names, accuracy.marginal_information(optimum.information, found.prior, found.places[:k])
         ),
         details=FlightDetails(axes),
         history=optimum.history,
@@ -250,6 +261,18 @@ def _simplex(likelihood: OutputError, iterations: int, progress: Progress | None
     return nelder_mead.minimise_squares(likelihood, progress=progress)
 
 
+def _together(
+    by: FlightEstimator[L], alone: PredictionError, row: Array, residual: LinearResidual, question: Question
+) -> tuple[L, Found, Array]:
+    """The search that goes on with physics and residual free."""
+    table = beside_physics(alone.table, residual)
+    likelihood = by.likelihood_of(table, alone.pieces, question)
+    start = begun_where_it_ended(likelihood.row, alone.row, row, residual)
+    likelihood.refresh(start)
+    optimum = minimise(likelihood, start=start, iterations=_most(question), progress=question.progress)
+    return likelihood, *by.conclude(table, likelihood, optimum, question)
+
+
 def _horizon(question: Question) -> Horizon | None:
     return None if question.horizon is None else Horizon.of(question.horizon)
 
@@ -327,25 +350,6 @@ def _without(pieces: list[Record], left_out: Sequence[tuple[float, float]]) -> l
             f"leaves {kept:.1f} s of the longest record, expected at least {SHORTEST:g} s.", channel="leave_out"
         )
     return pieces
-
-
-_UNJUDGED = "the model names no axes: whether the flights move each by itself was not judged"
-
-
-def hold_unexcited(table: Parameterization, axes: Sequence[AxisExcitation]) -> tuple[Parameterization, list[str]]:
-    """Fix what only unexcited axes could tell, at its prior where it has one."""
-    notes = []
-    for axis in table.vehicle.traits.axes:
-        judged = [item for item in axes if item.axis == axis.name]
-        held = [item for item in table.free if item.name in axis.parameters]
-        if not held or any(item.identifiable for item in judged):
-            continue
-        at = {item.name: item.start if item.mean is None else item.mean for item in held}
-        table = replace(
-            table.without(at), vehicle=table.vehicle.with_values({k: v for k, v in at.items() if v is not None})
-        )
-        notes.append(f"{', '.join(at)} held: {judged[0].words}")
-    return table, notes
 
 
 def _identified(

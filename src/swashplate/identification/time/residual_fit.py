@@ -1,16 +1,20 @@
 """The linear residual of a fit: what its errors still tell, shrunk as far as flights left out demand.
 
-Physics, noise, filtered states and the records' constants stay where the fit has them; only the residual's coefficients
-move, by Gauss-Newton from zero on what the fit itself made small: its innovations, or its errors some time ahead. Each
-is held towards zero (ridge: Hoerl and Kennard 1970), in units in which one makes an acceleration as large as the
-disturbance that the filter saw. How hard, says cross-validation over blocks of the training flights, and no residual is
-kept where its gain on blocks left out may be chance (Student's t, 97.5 %). Nothing else is looked at.
+Noise, filtered states and the records' constants stay where the fit has them; the residual's coefficients move, by
+Gauss-Newton from zero on what the fit itself made small: its innovations, or its errors some time ahead. Of innovations
+the physics moves too: while it stood alone, it took over what the residual is for. Each coefficient is held towards
+zero, in units in which one makes an acceleration as large as the disturbance that the filter saw; how hard, blocks left
+out say (`residual_strength`).
+
+Blocks tell chance from what is always there, not what causes it. Of innovations, only accelerations of axes that a
+flight moves by itself have coefficients: elsewhere a steady error of a log looks like an effect of what the controller
+answers with. From what was found here, the search of a fit goes on with everything free (`residual_joint`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -24,9 +28,12 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.multi_step import Horizon
 from swashplate.identification.core.parameters import Free, Parameterization
 from swashplate.identification.core.records import Record
+from swashplate.identification.time.feedback import by_itself
+from swashplate.identification.time.flight_details import AxisExcitation
 from swashplate.identification.time.innovations import Filtered
 from swashplate.identification.time.prediction_error import PredictionError
 from swashplate.identification.time.record_filter import ahead_of
+from swashplate.identification.time.residual_strength import ALONE, LeftOutBlock, Physics, chosen_strength, shrunk
 from swashplate.models.residual import ROWS, coefficients, with_residual
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import ArrayBackend
@@ -38,15 +45,14 @@ BLOCK = 6.0
 FEWEST = 4
 """Blocks below which nothing can be left out to choose by."""
 
-STRENGTHS = np.geomspace(1e5, 1e-1, 25)
-"""Of the ridge, from strong to weak."""
-
-_SURE = 0.975
-"""Quantile of Student's t that the gain on blocks left out must exceed, in standard errors: a few blocks tell these
-badly."""
+_AXIS = {"u": "pitch", "v": "roll", "w": "heave", "p": "roll", "q": "pitch", "r": "yaw"}
+"""The axis whose commands move each acceleration."""
 
 _FASTER = (1.0, 3.0, 10.0, 30.0)
 """By what the drifts' wandering is multiplied to make errors ahead small."""
+
+_FAR = 2.0
+"""Standard deviations beyond which a parameter that moved is named."""
 
 _ROUNDS, _BETWEEN = 8, 1.0
 """Gauss-Newton steps towards small errors ahead, and the ridge that they are taken with."""
@@ -73,43 +79,36 @@ class LinearResidual:
     error: float
     shares: dict[str, float]
     noise: Noise
+    units: Mapping[str, float] = field(default_factory=dict)
+    along: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default=({}, {}), repr=False, compare=False)
+    moved: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def kept(self) -> bool:
+        return bool(np.isfinite(self.strength))
+
+    def at(self, vehicle: Vehicle, moved: Mapping[str, float]) -> LinearResidual:
+        """The same with what a search found for physics and residual together, and how far that moved the physics."""
+        return replace(self, vehicle=vehicle, moved=moved, shares=_shares(vehicle, *self.along))
 
     @property
     def told(self) -> dict[str, Any]:
         """For the settings of a result."""
         shares = {row: round(share, 1) for row, share in self.shares.items()}
-        return {"ridge": self.strength if np.isfinite(self.strength) else "none", "gain on blocks left out": self.gain,
-                "its standard error": self.error, "share of each acceleration [%]": shares}  # fmt: skip
+        joint = {"sigmas by which the physics moved": dict(self.moved)} if self.moved else {}
+        return {"ridge": self.strength if self.kept else "none", "gain on blocks left out": self.gain,
+                "its standard error": self.error, "share of each acceleration [%]": shares, **joint}  # fmt: skip
 
     @property
     def words(self) -> str:
         """For a reader, in a line or two."""
         gained = f"{self.gain:.0f} +- {self.error:.0f} of log-likelihood on blocks left out"
-        if not np.isfinite(self.strength):
+        if not self.kept:
             return f"residual: none, the best would gain {gained}"
         parts = ", ".join(f"{name} {share:.0f} %" for name, share in self.shares.items())
-        return f"residual: gains {gained} (ridge {self.strength:.3g}); its part of each acceleration: {parts}"
-
-
-@dataclass(frozen=True)
-class LeftOutBlock:
-    """A block's cost by the scaled coefficients, to second order about some.
-
-    Attributes:
-        start: cost without a residual.
-        at: the coefficients (k,). cost, gradient, information: there.
-    """
-
-    start: float
-    at: Array
-    cost: float
-    gradient: Array
-    information: Array
-
-    def gain(self, coefficients: Array) -> float:
-        """Log-likelihood that coefficients gain."""
-        away = coefficients - self.at
-        return self.start - self.cost - float(self.gradient @ away + 0.5 * away @ self.information @ away)
+        far = ", ".join(f"{name} by {by:+.0f} sigma" for name, by in self.moved.items() if abs(by) > _FAR)
+        joint = f"; with it the physics moves: {far}" if far else ""
+        return f"residual: gains {gained} (ridge {self.strength:.3g}); its part of each acceleration: {parts}{joint}"
 
 
 def fit_residual(
@@ -119,6 +118,8 @@ def fit_residual(
     noise: Noise,
     *,
     horizon: Horizon | None = None,
+    axes: Sequence[AxisExcitation] = (),
+    physics: Parameterization | None = None,
 ) -> LinearResidual:
     """The residual of an identified vehicle.
 
@@ -126,6 +127,9 @@ def fit_residual(
         vehicle: with the numbers that the fit found.
         pieces: its records. nuisances: constants of each. noise: of the filter.
         horizon: that of the fit; None: innovations.
+        axes: what each record moves; accelerations of axes that none moves by itself get none (with a horizon all do:
+            such a residual is the controller's answers on purpose). Empty: not judged.
+        physics: what of the vehicle moves with it (not with a horizon); None: nothing.
 
     Raises:
         IdentificationError: where the records make fewer than `FEWEST` blocks.
@@ -143,35 +147,63 @@ def fit_residual(
     means = np.concatenate([piece.inputs for piece in pieces]).mean(axis=0)
     about = dict(zip(vehicle.input_names, means.tolist(), strict=True))
     wider = with_residual(vehicle, about, ahead=0.0 if horizon is None else horizon.last)
-    names = coefficients(vehicle)
-    table = Parameterization(wider, tuple(Free(name, 1.0) for name in names))
+    still = set() if horizon else {row for row, axis in _AXIS.items() if not _moved(axis, axes)}
+    names = {name: pair for name, pair in coefficients(vehicle).items() if pair[0] not in still}
+    if not names:
+        return LinearResidual(vehicle, np.inf, 0.0, 0.0, dict.fromkeys(ROWS, 0.0), noise)
+    beside = () if physics is None or horizon else tuple(replace(free, start=None) for free in physics.free)
+    table = Parameterization(
+        wider,
+        (*beside, *(Free(name, 1.0) for name in names)),
+        physics.ties if physics and beside else (),
+        prior_card=physics.prior_card if physics and beside else None,
+    )
     likelihoods = [
         PredictionError(table, [block], noise=noise, estimate_noise=False, nuisance=nuisance) for block, nuisance in cut
     ]
     columns, seen = _seen(likelihoods)
     size = np.array([np.sqrt(np.mean(columns[c] ** 2)) / np.std(seen[r]) for r, c in names.values()])
-    told = _one_step(likelihoods, size) if horizon is None else _ahead(likelihoods, size, horizon)
-    strength, gain, error = chosen_strength(told)
+    told, others = (_one_step(likelihoods, size), _priors(likelihoods[0], len(beside))) if horizon is None else (
+        _ahead(likelihoods, size, horizon), ALONE)  # fmt: skip
+    strength, gain, error = chosen_strength(told, others)
     nothing = LinearResidual(vehicle, np.inf, gain, error, dict.fromkeys(ROWS, 0.0), noise)
     if not np.isfinite(strength):
         return nothing
-    scaled, covariance = shrunk(told, strength)
-    found, sigma = scaled / size, np.sqrt(np.diag(covariance)) / size
-    checked = [_AheadErrors(each, horizon).cost(found) if horizon else _cost(each, found) for each in likelihoods]
+    away, covariance = shrunk(told, strength, others)
+    k = len(beside)
+    found, sigma = away[k:] / size, np.sqrt(np.diag(covariance))[k:] / size
+    checked = [
+        _AheadErrors(each, horizon).cost(found) if horizon else _cost(each, np.concatenate([away[:k], found]))
+        for each in likelihoods
+    ]
     if not sum(checked) < sum(block.start for block in told):
         return nothing  # to second order it gained, and in fact it does not
-    card = wider.card
+    row = likelihoods[0].row
+    low, high = row.bounds()
+    at = np.clip(row.starts()[:k] + away[:k], low[:k], high[:k]) * row.scale[:k]
+    told_by = table.identified(np.concatenate([at, found]))
+    card = wider.card.with_values({name: value for name, value in told_by.items() if name not in names})
     for name, value, spread in zip(names, found.tolist(), sigma.tolist(), strict=True):
         source = f"residual by {len(told)} blocks, ridge {strength:.3g}"
         card = card.with_values({name: value}, status="identified", sigma=spread, source=source)
-    made = dict.fromkeys(ROWS, np.zeros(1))
-    for value, (row, column) in zip(found, names.values(), strict=True):
-        made[row] = made[row] + value * columns[column]
-    total = _accelerations(likelihoods)
-    shares = {row: 100.0 * float(np.std(part) / np.std(total[row])) for row, part in made.items()}
-    made_of = wider.with_card(card)
+    made_of, along = wider.with_card(card), (columns, _accelerations(likelihoods))
     noise = noise if horizon is None else _wandering(made_of, cut, likelihoods, noise, horizon)
-    return LinearResidual(made_of, strength, gain, error, shares, noise)
+    units = dict(zip(names, (1.0 / size).tolist(), strict=True))
+    return LinearResidual(made_of, strength, gain, error, _shares(made_of, *along), noise, units, along)
+
+
+def _moved(axis: str, judged: Sequence[AxisExcitation]) -> bool:
+    """Whether a record moves an axis by itself, or none was judged."""
+    mine = [one for one in judged if one.axis == axis]
+    return not mine or any(by_itself(one) for one in mine)
+
+
+def _shares(vehicle: Vehicle, columns: Mapping[str, Array], total: Mapping[str, Array]) -> dict[str, float]:
+    """Of each acceleration's root mean square, the residual's part [%]."""
+    card, made = vehicle.card.values(), dict.fromkeys(ROWS, np.zeros(1))
+    for name, (row, column) in coefficients(vehicle).items():
+        made[row] = made[row] + card[name] * columns[column]
+    return {row: 100.0 * float(np.std(part) / np.std(total[row])) for row, part in made.items()}
 
 
 def _blocks(piece: Record) -> list[Record]:
@@ -223,21 +255,29 @@ def _accelerations(likelihoods: Sequence[PredictionError]) -> dict[str, Array]:
 
 # ---- one step --------------------------------------------------------------------------------------------------------
 def _one_step(likelihoods: Sequence[PredictionError], size: Array) -> list[LeftOutBlock]:
-    """Innovations, linear in accelerations as small as these."""
+    """Innovations, linear in accelerations as small as these, and in the physics."""
     made = []
     for likelihood in likelihoods:
         cost, gradient, information = likelihood.scores(likelihood.row.starts())
-        places, scale = likelihood.row.places("parameter"), 1.0 / size
+        places = likelihood.row.places("parameter")
+        scale = np.concatenate([np.ones(places.size - size.size), 1.0 / size])
         hessian = information[np.ix_(places, places)] * np.outer(scale, scale)
-        made.append(LeftOutBlock(cost, np.zeros(size.size), cost, gradient[places] * scale, hessian))
+        made.append(LeftOutBlock(cost, np.zeros(places.size), cost, gradient[places] * scale, hessian))
     return made
 
 
-def _cost(likelihood: PredictionError, found: Array) -> float:
-    """Cost of the innovations at coefficients, whose scale in the row is one."""
+def _priors(likelihood: PredictionError, k: int) -> Physics:
+    """Of the first k parameters of a row, where they stand."""
+    _, pull, information = likelihood.row.prior(likelihood.row.starts())
+    return Physics(pull[:k], information[:k, :k])
+
+
+def _cost(likelihood: PredictionError, away: Array) -> float:
+    """Cost of the innovations with physics moved, and at coefficients, whose scale in the row is one."""
     row = likelihood.row.starts()
-    row[likelihood.row.places("parameter")] = found
-    return likelihood.cost(row)
+    row[likelihood.row.places("parameter")] += away
+    low, high = likelihood.row.bounds()
+    return likelihood.cost(np.clip(row, low, high))
 
 
 # ---- some time ahead -------------------------------------------------------------------------------------------------
@@ -321,29 +361,3 @@ def _wandering(
         return total, tried
 
     return min((cost(faster) for faster in _FASTER), key=lambda one: one[0])[1]
-
-
-# ---- how much of it --------------------------------------------------------------------------------------------------
-def shrunk(told: Sequence[LeftOutBlock], strength: float) -> tuple[Array, Array]:
-    """Scaled coefficients (k,) and their covariance (k, k) from some blocks."""
-    information = sum((block.information for block in told), start=np.zeros_like(told[0].information))
-    covariance: Array = np.asarray(np.linalg.inv(information + strength * np.eye(len(information))), dtype=np.float64)
-    slope = sum((block.gradient - block.information @ block.at for block in told), start=np.zeros(len(information)))
-    return -covariance @ slope, covariance
-
-
-def chosen_strength(told: Sequence[LeftOutBlock]) -> tuple[float, float, float]:
-    """Strength by blocks left out, what they gain, and its standard error; infinite where that is nothing."""
-    from scipy.stats import t as student
-
-    gains = np.array(
-        [
-            [block.gain(shrunk([*told[:i], *told[i + 1 :]], strength)[0]) for i, block in enumerate(told)]
-            for strength in STRENGTHS
-        ]
-    )
-    total, error = gains.sum(axis=1), np.std(gains, axis=1, ddof=1) * np.sqrt(len(told))
-    best = int(np.argmax(total))
-    if total[best] <= student.ppf(_SURE, len(told) - 1) * error[best]:
-        return np.inf, float(total[best]), float(error[best])
-    return float(STRENGTHS[best]), float(total[best]), float(error[best])

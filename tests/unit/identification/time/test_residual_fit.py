@@ -9,73 +9,13 @@ import pytest
 
 import swashplate as sp
 from simulated_flights import ten_seconds
-from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.records import records
 from swashplate.identification.time import residual_fit
-from swashplate.identification.time.residual_fit import (
-    LeftOutBlock,
-    LinearResidual,
-    chosen_strength,
-    fit_residual,
-    shrunk,
-)
-
-K = 20
-"""Coefficients."""
-
-
-def blocks(
-    truth: Array, *, seed: int, at: Array | None = None, samples: int = 300, number: int = 8
-) -> list[LeftOutBlock]:
-    """Blocks of white errors that a linear residual with these coefficients explains: e = X c + noise."""
-    rng = np.random.default_rng(seed)
-    place = np.zeros(K) if at is None else at
-    made = []
-    for _ in range(number):
-        X = rng.standard_normal((samples, K))
-        y = X @ truth + rng.standard_normal(samples)
-        off = X @ place - y
-        made.append(LeftOutBlock(0.5 * float(y @ y), place, 0.5 * float(off @ off), X.T @ off, X.T @ X))
-    return made
-
-
-def test_a_known_residual_is_recovered() -> None:
-    truth = np.where(np.arange(K) < 4, 0.5, 0.0)
-    told = blocks(truth, seed=1)
-    strength, gain, error = chosen_strength(told)
-    assert np.isfinite(strength)
-    assert gain > 5.0 * error
-    found, covariance = shrunk(told, strength)
-    assert np.max(np.abs(found - truth) / np.sqrt(np.diag(covariance))) < 4.0
-
-
-def test_the_place_about_which_the_cost_is_told_does_not_matter() -> None:
-    truth = np.linspace(-0.5, 0.5, K)
-    here, there = (blocks(truth, seed=2, at=at) for at in (None, np.full(K, 0.3)))
-    assert chosen_strength(here) == pytest.approx(chosen_strength(there))
-    np.testing.assert_allclose(shrunk(here, 3.0)[0], shrunk(there, 3.0)[0], atol=1e-9)
-    assert here[0].gain(truth) == pytest.approx(there[0].gain(truth))
-
-
-def kept_of_white_errors(seeds: int = 40) -> int:
-    return sum(np.isfinite(chosen_strength(blocks(np.zeros(K), seed=seed))[0]) for seed in range(seeds))
-
-
-def test_of_white_errors_nothing_is_kept() -> None:
-    assert kept_of_white_errors() <= 2  # of forty: two standard errors
-
-
-def test_gains_on_the_blocks_that_were_learnt_from_would_keep_chance(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The mutation: where nothing is left out, white errors seem to be worth a residual."""
-    kept = 0
-    for seed in range(10):
-        told = blocks(np.zeros(K), seed=seed)
-        monkeypatch.setattr(residual_fit, "shrunk", lambda _, strength, told=told: shrunk(told, strength))
-        kept += np.isfinite(chosen_strength(told)[0])
-    assert kept >= 5  # against one in twenty
+from swashplate.identification.time.flight_details import AxisExcitation
+from swashplate.identification.time.residual_fit import LinearResidual, fit_residual
 
 
 def test_words_say_what_was_gained_and_where() -> None:
@@ -86,6 +26,26 @@ def test_words_say_what_was_gained_and_where() -> None:
     assert "gains 120 +- 9" in some.words
     assert "p 14 %, q 3 %" in some.words
     assert some.told["share of each acceleration [%]"] == {"p": 14.2, "q": 3.0}
+
+
+def test_words_name_the_physics_that_moved_far() -> None:
+    vehicle = sp.vehicle("crazyflie")
+    shares = dict.fromkeys(("u", "v", "w", "p", "q", "r"), 0.0)
+    found = LinearResidual(vehicle, 2.0, 120.0, 9.0, shares, Noise(), moved={"tau_drive": 24.2, "inertia_xx": -1.4})
+    assert found.words.endswith("; with it the physics moves: tau_drive by +24 sigma")
+    assert found.told["sigmas by which the physics moved"] == {"tau_drive": 24.2, "inertia_xx": -1.4}
+
+
+def test_an_axis_that_its_controller_moves_has_no_residual() -> None:
+    def axis(explained: float, later: float, *, identifiable: bool = True) -> AxisExcitation:
+        return AxisExcitation("record", "heave", "", explained, 1.0, 0.0, 0.01, identifiable, "", later)
+
+    assert residual_fit._moved("heave", [])  # not judged
+    assert residual_fit._moved("heave", [axis(0.5, 0.5)])
+    assert residual_fit._moved("heave", [axis(0.97, 0.99)])  # the motion follows
+    assert not residual_fit._moved("heave", [axis(0.965, 0.971)])  # mostly an answer
+    assert not residual_fit._moved("heave", [axis(np.nan, np.nan, identifiable=False)])  # stands still
+    assert residual_fit._moved("heave", [axis(0.965, 0.971), axis(0.5, 0.5)])
 
 
 def test_too_few_blocks_are_refused_before_anything_is_computed() -> None:
