@@ -21,6 +21,7 @@ from swashplate.extras import library
 _CONNECT = 15.0  # s until a scheduler that does not answer is not there
 _COUNTED = 2.0  # s that a number of workers is believed
 _STARTS = 3
+_BRIEF = 10.0  # s from a worker's joining in which one that works here does not go
 _GONE = 20.0  # s without a scheduler until it is gone
 
 
@@ -58,6 +59,8 @@ class DaskEngine:
         self._tasks: dict[Any, CampaignTask] = {}
         self._cluster: Any = None
         self._client: Any = None
+        self.turned_away: dict[str, str] = {}
+        self._joined: dict[str, float] = {}
         self._lost_for, self._counted, self._count = 0.0, float("-inf"), 1
         self._killed = distributed.scheduler.KilledWorker
         try:
@@ -76,6 +79,7 @@ class DaskEngine:
             ) from None
         if scheduler is not None:
             self._check_workers()
+            self._client.subscribe_topic("all", self._heard)
 
     @property
     def workers(self) -> int:
@@ -86,12 +90,28 @@ class DaskEngine:
     @property
     def words(self) -> str:
         place = f"of the scheduler {self._address}" if self._address else "of Dask on this machine"
-        return f"{self.workers} workers {place}"
+        told = f" ({len(self.turned_away)} came and went)" if self.turned_away else ""
+        return f"{self.workers} workers {place}{told}"
 
     @property
     def processes(self) -> list[int]:
         """Numbers of the workers' processes."""
         return list(self._client.run(_number).values())
+
+    def _heard(self, event: tuple[float, Any]) -> None:
+        """What the scheduler says of a worker that joined late: one that cannot read a task closes without a word."""
+        at, told = event
+        if not isinstance(told, dict):
+            return
+        address = str(told.get("worker"))
+        if told.get("action") == "add-worker":
+            self._joined[address] = at
+        elif told.get("action") == "remove-worker" and address in self._joined:
+            lasted = at - self._joined.pop(address)
+            if lasted < _BRIEF and not told.get("expected"):
+                self.turned_away[address] = (
+                    f"went {lasted:.1f} s after it had joined; swashplate may be missing there: its own log says why"
+                )
 
     def _known(self) -> dict[str, Any]:
         found: dict[str, Any] = {}

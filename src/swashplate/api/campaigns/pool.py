@@ -50,6 +50,10 @@ class ProcessPool:
         return f"{self.workers} processes of this machine"
 
     @property
+    def turned_away(self) -> dict[str, str]:
+        return {}  # they are this program's own
+
+    @property
     def processes(self) -> list[int]:
         """Their numbers."""
         return [lane.process.pid or 0 for lane in self._lanes]

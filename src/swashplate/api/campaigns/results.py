@@ -38,6 +38,7 @@ class Campaign(Shown):
         names: of its tasks, in the order of their rows. done: those that are here.
         failed: tasks that were given up, by name.
         at_work: who computes it now, in words; "" for nobody.
+        turned_away: workers that joined and soon went, by address, in words.
     """
 
     folder: Path
@@ -47,6 +48,7 @@ class Campaign(Shown):
     done: frozenset[str]
     failed: Mapping[str, Mapping[str, Any]] = field(repr=False)
     at_work: str = ""
+    turned_away: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -100,6 +102,9 @@ class Campaign(Shown):
         told = f"{len(self.done)} of {len(self.names)} tasks done"
         if self.failed:
             told += f", {len(self.failed)} given up"
+        if self.turned_away:
+            address, words = next(iter(self.turned_away.items()))
+            told += f", {len(self.turned_away)} workers came and went (the first, {address}, {words})"
         left = len(self.names) - len(self.done) - len(self.failed)
         if left and not self.at_work:
             told += f"; `swash campaign resume {self.folder}` goes on"
@@ -203,7 +208,8 @@ def campaign_results(folder: str | Path) -> Campaign:
     names = tuple(task.name for task in plan.tasks)
     failed = {name: told for name, told in store.failed().items() if name in set(names)}
     done = store.done() & set(names)
-    return Campaign(Path(folder), plan.of, plan.document, names, done, failed, at_work=store.owner)
+    away = store.turned_away()
+    return Campaign(Path(folder), plan.of, plan.document, names, done, failed, at_work=store.owner, turned_away=away)
 
 
 def _cell(value: Any) -> str:

@@ -26,6 +26,7 @@ from swashplate.files import read_bytes
 
 FILE, PLAN, LOCK = "campaign.toml", "plan.json", "lock"
 RESULTS, FAILED, INPUTS = "results", "failed", "inputs"
+TURNED_AWAY = "turned-away.json"
 _SCHEMA = 1
 _LARGEST_RESULT = 2 << 30  # bytes
 
@@ -151,6 +152,16 @@ class CampaignStore:
         portion = task.portion
         told = {"first": portion.first, "count": portion.count, "seed": portion.seed, "of": portion.of}
         atomic.write_json(self.folder / FAILED / f"{task.name}.json", {**told, "tries": list(words)})
+
+    def turn_away(self, workers: Mapping[str, str]) -> None:
+        """Write which workers joined and went, beside those of earlier runs; nothing for none."""
+        if workers:
+            atomic.write_json(self.folder / TURNED_AWAY, {**self.turned_away(), **workers})
+
+    def turned_away(self) -> dict[str, str]:
+        """Workers that joined and went, by address, in words."""
+        path = self.folder / TURNED_AWAY
+        return documents.read_document(path, form="json") if path.is_file() else {}
 
     def columns(self, name: str) -> Columns:
         """The result of a task.

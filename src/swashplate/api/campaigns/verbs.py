@@ -18,7 +18,7 @@ from swashplate.api.campaigns.results import Campaign, campaign_results
 from swashplate.api.campaigns.store import FAILED, CampaignStore
 from swashplate.api.campaigns.tasks import CampaignTask
 from swashplate.api.saying import Say, silent
-from swashplate.errors import CampaignError
+from swashplate.errors import CampaignError, WriteError
 
 EngineName = Literal["dask", "processes"]
 
@@ -177,6 +177,8 @@ def _finish(made: CampaignPlan, store: CampaignStore, make: Callable[[Work, int]
     finally:
         with suppress(KeyboardInterrupt):
             engine.close()
+        with suppress(WriteError):  # a full disk has been said already
+            store.turn_away(engine.turned_away)
 
 
 def _told(say: Say, made: CampaignPlan, engine: TaskEngine, standing: CampaignStanding) -> None:

@@ -59,7 +59,16 @@ class Row:
         return len(self.entries)
 
     def column(self, field: str) -> Array:
-        return np.array([getattr(entry, field) for entry in self.entries], dtype=np.float64)
+        """A number of every entry; made once, for a search asks thousands of times."""
+        if field not in self._columns:
+            made = np.array([getattr(entry, field) for entry in self.entries], dtype=np.float64)
+            made.flags.writeable = False
+            self._columns[field] = made
+        return self._columns[field]
+
+    @cached_property
+    def _columns(self) -> dict[str, Array]:
+        return {}
 
     @property
     def scale(self) -> Array:

@@ -15,6 +15,7 @@ from swashplate.identification.responses.spectra import Signals
 
 _SPAN, _STEP = 0.3, 0.025  # s: of the outputs that a controller answers to, and between the samples of them
 _ANSWER = 0.99  # explained share from which an input is an answer
+_NEAR = 0.9  # ... and from which that is asked of all digits
 _LATER = 1.5  # times as much left unexplained by the past as by what follows: then the outputs follow the input
 
 
@@ -49,15 +50,18 @@ def _shares(piece: Signals, n_in: int, n_out: int) -> list[tuple[float, float] |
     if len(values) < 20 * reach:
         return [None] * n_in
     # A row for every step: those between say the same again.
-    targets = values[reach:-reach:step, :n_in]
+    targets, answers = values[reach:-reach:step, :n_in], np.ascontiguousarray(values[::step, n_in:])
+    span, rows = reach // step, len(targets)
 
     def shifted(shifts: Sequence[int]) -> Array:
-        last = len(values) - reach
-        return np.concatenate([values[reach + k : last + k : step, n_in:] for k in shifts], axis=1)
+        return np.concatenate([answers[span + k : span + k + rows] for k in shifts], axis=1)
 
-    past = _explained(targets, shifted(range(-reach, 1, step)))
+    before = shifted(range(-span, 1))
+    past = _nearly_explained(targets, before)
+    if np.any(past >= _NEAR):
+        past = _explained(targets, before)
     # What follows is asked only where the past explains an input.
-    later = _explained(targets, shifted(range(step, reach + 1, step))) if np.any(past >= _ANSWER) else past
+    later = _explained(targets, shifted(range(1, span + 1))) if np.any(past >= _ANSWER) else past
     still = np.ptp(targets, axis=0) == 0.0
     return [None if still[i] else (float(past[i]), float(later[i])) for i in range(n_in)]
 
@@ -69,3 +73,17 @@ def _explained(targets: Array, by: Array) -> Array:
     triangle = factor[:, by.shape[1] :] ** 2
     total = triangle.sum(axis=0)
     return np.asarray(triangle[: by.shape[1]].sum(axis=0) / np.where(total > 0.0, total, 1.0))
+
+
+def _nearly_explained(targets: Array, by: Array) -> Array:
+    """The same by covariances, in a tenth of the time; what varies by less than 1e-6 of all is left out."""
+    n = by.shape[1]
+    both = np.concatenate([by, targets], axis=1)
+    both -= both.mean(axis=0)
+    size = np.sqrt(np.einsum("ij,ij->j", both, both))
+    both /= np.where(size > 0.0, size, 1.0)
+    products = both.T @ both
+    values, vectors = np.linalg.eigh(products[:n, :n])
+    kept = values > 1e-12 * n
+    along = vectors[:, kept].T @ products[:n, n:]
+    return np.asarray((along**2 / values[kept, None]).sum(axis=0))

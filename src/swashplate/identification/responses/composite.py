@@ -56,8 +56,8 @@ def _solve(gxx: Array, gyy: Array, gxy: Complex, weight: Array) -> tuple[Array, 
     residual, slopes = _residuals(t, ratios, coherence, root)
     cost = np.sum(residual**2, axis=1)
     for _ in range(_ITERATIONS):
-        normal = np.einsum("prk,prl->pkl", slopes, slopes)
-        gradient = np.einsum("prk,pr->pk", slopes, residual)
+        turned = slopes.swapaxes(1, 2)
+        normal, gradient = turned @ slopes, (turned @ residual[..., None])[..., 0]
         normal = normal + (damping[:, None] * np.trace(normal, axis1=1, axis2=2)[:, None] / 4.0)[..., None] * np.eye(4)
         trial = t - np.linalg.solve(normal, gradient[..., None])[..., 0]
         trial[:, :2] = np.maximum(trial[:, :2], 1e-3)

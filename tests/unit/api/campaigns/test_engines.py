@@ -75,6 +75,14 @@ def test_dask_gives_the_bits_of_the_pool_and_finds_what_always_fails(
     good = tuple(task for task in every if task.portion.first != 4)
     assert bits(store) == expected(good, tmp_path / "here")
     assert [told["tries"] for told in store.failed().values()] == [["ValueError: row 4 cannot be done"] * TRIES]
+    for at, action, address in ((1.0, "add-worker", "a"), (2.5, "remove-worker", "a"), (3.0, "add-worker", "b"),
+                                (60.0, "remove-worker", "b"), (61.0, "remove-worker", "c")):  # fmt: skip
+        engine._heard((at, {"action": action, "worker": address, "expected": False}))
+    assert list(engine.turned_away) == ["a"], "one that worked for a minute, and one that was there before, are none"
+    assert engine.turned_away["a"].startswith("went 1.5 s after it had joined; swashplate may be missing there")
+    assert engine.words.endswith("(1 came and went)")
+    store.turn_away(engine.turned_away)
+    assert store.turned_away() == engine.turned_away
     other = tuple(replace(task, program=dict(task.program) | {"numpy": "1.0"}) for task in made_campaigns.tasks(2))
     monkeypatch.undo()
     with pytest.raises(CampaignError, match=r"another program: numpy is \S+, expected 1\.0"):
@@ -190,6 +198,7 @@ def test_a_worker_that_joins_late_without_the_package_costs_nothing_but_time(tmp
         finally:
             late.terminate()
             late.wait()
+    assert engine.turned_away, "nobody is told of it"
     assert store.failed() == {}
     assert bits(store) == expected(every, tmp_path / "here")
 
