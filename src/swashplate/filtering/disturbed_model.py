@@ -294,9 +294,19 @@ class StochasticModel:
         expected = expected + self.line_seen @ state.line if self.lined else expected
         innovation = _turn(y - expected, self.output_names, -psi)
         x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
+        return self._moved(state, x, gust, drift, gain.line @ innovation if self.lined else ()), innovation
+
+    def moved(self, state: FilterState, joined: Any) -> FilterState:
+        """A state and what is added to it, a joined row (states, gusts, drifts, line) with the nose north."""
+        ends = np.cumsum([len(self.vehicle.state_names), self.n_gusts, N_DISTURBANCES])
+        x, gust, drift, line = jnp.split(joined, ends)
+        return self._moved(state, x, gust, drift, line)
+
+    def _moved(self, state: FilterState, x: Any, gust: Any, drift: Any, line: Any) -> FilterState:
+        psi = state.x[self.vehicle.index("psi")]
         x, gust = _turn(x, self.vehicle.state_names, psi), _turn(gust, _GUST_NAMES[: self.n_gusts], psi)
-        line = state.line + gain.line @ innovation if self.lined else ()
-        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line), innovation
+        line = state.line + line if self.lined else ()
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
 
     def acting(self, state: FilterState) -> Any:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
