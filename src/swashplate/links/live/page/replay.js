@@ -61,6 +61,7 @@ function draw(now) {
         if (flight.moments[i][5]) scene.leaveTrail("ghost", flight.moments[i][5]);
       }
       leaveWholeFan(k);
+      dirty = !playing; // what was left behind is in the next picture
     }
   }
   draw.time = time;
