@@ -24,6 +24,7 @@ def live(
     controller: Controller | str | Path | None = None,
     estimate: Sequence[str] = (),
     truth: Mapping[str, float] | None = None,
+    draws: Sequence[Vehicle] = (),
     folder: str | Path = "live",
     host: str = "127.0.0.1",
     port: int = 8017,
@@ -41,6 +42,8 @@ def live(
         estimate: parameters ("mass") and equations ("q_dot = Mq*q + Md*servo_pitch + bias") that recursive estimators
             follow while you fly; the page shows each with two standard errors (`links.estimating`).
         truth: numbers of the card that what flies has instead, which the estimators have to find.
+        draws: models that a fit cannot tell from this one (`fit.draw(5, seed=1)`): they fly beside it under the same
+            law and sticks, from where it is, anew every two seconds.
         folder: for recordings and reports; made with the first one.
         host, port: where the page is; port 0 takes any free one.
         allow_remote: let other machines open the page and fly.
@@ -66,7 +69,7 @@ def live(
     with serving.listen(host, port, allow_remote=allow_remote) as listening:
         say("preparing (compiling takes longest the first time)")
         flown = vehicle.with_values(truth) if truth else vehicle
-        session = LiveSession(flown, controller=chosen, folder=place, estimate=estimate, model=vehicle)
+        session = LiveSession(flown, controller=chosen, folder=place, estimate=estimate, model=vehicle, draws=draws)
         session.clock.start()
         try:
             announce(serving.address_of(listening), open_page=open_page, ready=ready, say=say)

@@ -51,6 +51,13 @@ Switch = Annotated[
 ]
 
 
+Posterior = Annotated[
+    Path | None,
+    typer.Option("--posterior", metavar="FILE", help="A fit.json of this model: models drawn from it fly beside it."),
+]
+Draws = Annotated[int, typer.Option("--draws", help="With --posterior: how many.", min=2, max=40)]
+
+
 def checked_page(path: Path | None) -> Path | None:
     """The place for a page, if it is one."""
     if path is not None and path.suffix.lower() not in (".html", ".htm"):
@@ -219,3 +226,28 @@ def flown(verb: Callable[..., None]) -> Callable[..., None]:
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {entry.name: entry.annotation for entry in parameters}
     return command
+
+
+def drawn(vehicle: Vehicle, fit: Path, *, count: int, seed: int = 1) -> tuple[Vehicle, ...]:
+    """Models that a fit cannot tell from the one that it found.
+
+    Raises:
+        SwashError: where the file holds no fit, or one that found other numbers than this model has.
+    """
+    import swashplate as sp
+
+    found = sp.load(fit, equations=vehicle)
+    if not isinstance(found, sp.Result):
+        raise SwashError("holds no fit.", where=fit, channel="--posterior", hint="Give the fit.json beside the model.")
+    own = vehicle.card.values()
+    for name in found.names:
+        if not math.isclose(own.get(name, math.nan), found[name].value, rel_tol=1e-6, abs_tol=1e-12):
+            has = f"{own[name]:.6g}" if name in own else "none"
+            raise SwashError(
+                f"is of another model: it found {name} = {found[name].value:.6g}, {vehicle.card.title} has {has}.",
+                where=fit,
+                channel="--posterior",
+                hint="Give the model file that this fit wrote beside it.",
+            )
+    values = found.draw_values(count, seed=seed, within=vehicle)
+    return tuple(vehicle.with_values({n: float(v[k]) for n, v in values.items()}) for k in range(count))

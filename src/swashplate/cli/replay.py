@@ -28,6 +28,8 @@ def replay(
     ahead: Annotated[
         float, typer.Option("--ahead", help="Seconds after which the prediction starts again.", min=0.1, max=60.0)
     ] = 2.0,
+    posterior: given.Posterior = None,
+    draws: given.Draws = 8,
     hold_missing: Annotated[
         bool,
         typer.Option("--hold-missing", help="Hold the model's inputs that the log lacks at hover; the page says so."),
@@ -62,6 +64,8 @@ def replay(
     if frames is not None and frames.exists() and not frames.is_dir():
         raise SwashError("is a file, expected a folder.", where=frames, channel="--frames")
     chosen = None if model is None else given.vehicle_of(model, None, None)
+    if posterior is not None and chosen is None:
+        raise SwashError("is of no model: give it with --model.", channel="--posterior")
     film_place = video or frames
     with progress(quiet=quiet) as line:
 
@@ -73,7 +77,8 @@ def replay(
             clean = log.provenance.simulated and "phi" in log
             logged = log.condition(rate=rate, cutoff=cutoff, outliers=not clean, trim_ground=not clean)
             line.say("predicting (compiling takes longest the first time)" if chosen else "preparing")
-            shown = sp.replay(logged, model=chosen, ahead=ahead, hold_missing=hold_missing)
+            drawn = () if chosen is None or posterior is None else given.drawn(chosen, posterior, count=draws)
+            shown = sp.replay(logged, model=chosen, draws=drawn, ahead=ahead, hold_missing=hold_missing)
             for note in shown.notes:
                 typer.echo(note, err=True)
             return shown

@@ -95,6 +95,15 @@ def closed_table(validation: Validation) -> TextTable:
     return table(head, rows, keys=2)
 
 
+def bands_table(validation: Validation) -> TextTable:
+    """What the bands of the predictions hold, by channel and horizon."""
+    from swashplate.validation.bands import ROWS, pairs
+
+    head = ("channel", "ahead [s]", *(words for words, _ in ROWS))
+    rows = [(a.channel, f"{a.horizon:g}", *(cell(a, b) for _, cell in ROWS)) for a, b in pairs(validation.bands)]
+    return table(head, rows, keys=2)
+
+
 def parameter_table(vehicle: Vehicle) -> TextTable:
     """Every number of a card with its unit, status and source."""
     rows = [

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from swashplate.cli import conditions as given
 from swashplate.cli import flying, options
 from swashplate.errors import SwashError
 
@@ -33,6 +35,17 @@ def validate(
         ),
     ] = 5.0,
     close_loop: options.CloseLoop = "",
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            "--posterior",
+            metavar="FILE",
+            help="A fit.json of this model: bands of predictions by models drawn from it, held against the flights.",
+        ),
+    ] = None,
+    draws: Annotated[
+        int | None, typer.Option("--draws", help="With --posterior: how many, 39, 79, 119 and so on.", min=39)
+    ] = None,
     band: flying.BandOption = None,
     rate: options.Rate = 100.0,
     cutoff: options.Cutoff = 0.0,
@@ -52,7 +65,7 @@ def validate(
     from swashplate.cli.console import as_json, console, progress
     from swashplate.cli.outputs import folder_when_complete, told
     from swashplate.cli.reading import asked, conditioned, read_all
-    from swashplate.cli.tables import closed_table, floors_table, validation_table
+    from swashplate.cli.tables import bands_table, closed_table, floors_table, validation_table
     from swashplate.flights.overlap import check_disjoint
     from swashplate.identification.core.records import records
 
@@ -60,9 +73,13 @@ def validate(
     judged, other = sp.vehicle(model), None if published is None else sp.vehicle(published)
     names = flying.renamed(rename, option="--rename")
     closing = options.names(close_loop)
+    if draws is not None and posterior is None:
+        raise SwashError("is for --posterior.", channel="--draws", hint="Add --posterior fit.json.")
+    drawn = () if posterior is None else given.drawn(judged, posterior, count=draws or 39)
     if judged.structure is not None:
-        if closing:
-            raise SwashError(f"'{model}' is a state-space model: it flies along the inputs.", channel="--close-loop")
+        if closing or drawn:
+            channel = "--close-loop" if closing else "--posterior"
+            raise SwashError(f"'{model}' is a state-space model: it flies along the inputs.", channel=channel)
         linear = judged
         flying.carried_out(
             lambda say: sp.validate_linear(
@@ -100,6 +117,7 @@ def validate(
                 every=every,
                 calibration=calibration,
                 close_loop=closing,
+                draws=drawn,
                 progress=lambda done, total: line.say("predicting", done=done, total=total),
             )
             assert isinstance(validation, sp.Validation)  # `records` has found the pose
@@ -118,6 +136,9 @@ def validate(
         if validation.loop_closed:
             typer.echo("\nWith the controller in the place of the recorded command")
             screen.print(closed_table(validation))
+        if validation.bands:
+            typer.echo(f"\nWhat the bands of {len(drawn)} drawn models hold [%]")
+            screen.print(bands_table(validation))
         for words in (*(one.words for one in validation.contacts), *(law.words for law in validation.laws)):
             typer.echo(f"\n{words}")
         typer.echo("\n" + "\n".join(f"{axis.axis}: {axis.level}. {axis.words}" for axis in validation.verdict))

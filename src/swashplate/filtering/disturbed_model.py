@@ -19,6 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from swashplate.filtering.block_matrices import blocks, diagonal
 from swashplate.filtering.disturbances import DISTURBED, Noise, on_axes
 from swashplate.filtering.filter_loop import filtered
 from swashplate.filtering.nuisance import Nuisance
@@ -189,10 +190,10 @@ class StochasticModel:
         by_gust = self.dt * held @ by_gust
         by_push = by_gust[..., :d]
         moves = xp.concatenate([by_gust, by_push, xp.zeros((*by_push.shape[:-1], k))], axis=-1)
-        A = _blocks([[by_x, moves], [None, self.lasting(noise, xp)]], (n, g + d + k), xp)
+        A = blocks([[by_x, moves], [None, self.lasting(noise, xp)]], (n, g + d + k), xp)
         shaken = xp.broadcast_to(self.line_seen, (*by_state.shape[:-1], k))
         C = xp.concatenate([by_state, xp.zeros((*by_state.shape[:-1], g + d)), shaken], axis=-1)
-        return A, C, self.process_noise(by_push, noise, xp), _diagonal(self.sensor_variances(noise, xp), xp)
+        return A, C, self.process_noise(by_push, noise, xp), diagonal(self.sensor_variances(noise, xp), xp)
 
     def rates(self, x: Any, gust: Any, *, u: Any, parameters: Any, voltage: Any) -> Any:
         """Rates of a state row under commands and disturbances."""
@@ -225,11 +226,11 @@ class StochasticModel:
         drift = xp.stack(on_axes(*_shared_or_own(noise, "drift", xp)), axis=-1)
         # White acceleration noise enters as by_push does, for one sample; the floor keeps unexcited states observable.
         spread = (by_push * (white**2 / self.dt)[..., None, :]) @ xp.swapaxes(by_push, -1, -2) + self._floor(n)
-        gusts, drifts = (_diagonal(row**2 * self.dt, xp) for row in (gust, drift))
+        gusts, drifts = (diagonal(row**2 * self.dt, xp) for row in (gust, drift))
         rms = xp.stack([noise.line_angle, noise.line_angle, noise.line_height, noise.line_height], axis=-1)
-        line = _diagonal((1.0 - self._line_kept(noise, xp) ** 2)[..., None] * rms[..., : self.n_line] ** 2, xp)
+        line = diagonal((1.0 - self._line_kept(noise, xp) ** 2)[..., None] * rms[..., : self.n_line] ** 2, xp)
         rows = [[spread, None, None, None], [None, gusts, None, None], [None, None, drifts, None], [None] * 3 + [line]]
-        return _blocks(rows, (n, g, d, self.n_line), xp)
+        return blocks(rows, (n, g, d, self.n_line), xp)
 
     def gain(self, x: Any, u: Any, parameters: Any, voltage: Any, noise: Noise, nuisance: Nuisance) -> FilterGain:
         """Steady gain at an equilibrium with the nose north."""
@@ -250,9 +251,9 @@ class StochasticModel:
 
     def lasting(self, noise: Noise, xp: Any = jnp) -> Any:
         """How gusts, drifts and the line together go on for one sample (..., all three, all three)."""
-        fade, turn = _diagonal(self.fade(noise, xp), xp), self.line_turn(noise, xp)
+        fade, turn = diagonal(self.fade(noise, xp), xp), self.line_turn(noise, xp)
         rows = [[fade, None, None], [None, np.eye(N_DISTURBANCES), None], [None, None, turn]]
-        return _blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line), xp)
+        return blocks(rows, (self.n_gusts, N_DISTURBANCES, self.n_line), xp)
 
     def line_turn(self, noise: Noise, xp: Any = jnp) -> Any:
         """The line one sample later (..., n_line, n_line): pairs that turn by its frequency, and forget their phase."""
@@ -300,9 +301,19 @@ class StochasticModel:
         expected = expected + self.line_seen @ state.line if self.lined else expected
         innovation = _turn(y - expected, self.output_names, -psi, xp)
         x, gust, drift = (rows @ innovation for rows in (gain.state, gain.gust, gain.drift))
+        return self._moved(state, x, gust, drift, gain.line @ innovation if self.lined else (), xp), innovation
+
+    def moved(self, state: FilterState, joined: Any) -> FilterState:
+        """A state and what is added to it, a joined row (states, gusts, drifts, line) with the nose north."""
+        ends = np.cumsum([len(self.vehicle.state_names), self.n_gusts, N_DISTURBANCES])
+        x, gust, drift, line = jnp.split(joined, ends)
+        return self._moved(state, x, gust, drift, line, jax_backend())
+
+    def _moved(self, state: FilterState, x: Any, gust: Any, drift: Any, line: Any, xp: Backend) -> FilterState:
+        psi = state.x[self.vehicle.index("psi")]
         x, gust = _turn(x, self.vehicle.state_names, psi, xp), _turn(gust, _GUST_NAMES[: self.n_gusts], psi, xp)
-        line = state.line + gain.line @ innovation if self.lined else ()
-        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line), innovation
+        line = state.line + line if self.lined else ()
+        return FilterState(state.x + x, state.gust + gust, state.drift + drift, line)
 
     def acting(self, state: FilterState, xp: Backend | None = None) -> Any:
         """The disturbances that act: gusts and drifts together, and perhaps the wind."""
@@ -341,27 +352,6 @@ class StochasticModel:
             correct=lambda state, measured, _: self.correct(state, measured, gain, nuisance),
             predict=lambda state, now: self.predict(state, noise, advance, now),
         )
-
-
-def _diagonal(rows: Any, xp: Any) -> Any:
-    """Diagonal matrices of rows (..., n)."""
-    return rows[..., None] * xp.eye(rows.shape[-1])
-
-
-def _blocks(rows: Any, sizes: tuple[int, ...], xp: Any) -> Any:
-    """Matrices of blocks of these sizes, with any axes in front; None is zeros."""
-    front = np.broadcast_shapes(*(block.shape[:-2] for row in rows for block in row if block is not None))
-    whole = [
-        xp.concatenate(
-            [
-                xp.zeros((*front, high, wide)) if block is None else xp.broadcast_to(block, (*front, high, wide))
-                for block, wide in zip(row, sizes, strict=True)
-            ],
-            axis=-1,
-        )
-        for row, high in zip(rows, sizes, strict=True)
-    ]
-    return xp.concatenate(whole, axis=-2)
 
 
 def _shared_or_own(noise: Noise, kind: str, xp: Any = jnp) -> tuple[Any, Any, Any, Any]:

@@ -17,6 +17,8 @@ from swashplate.reporting.glossary import meaning
 from swashplate.reporting.structure import Block, Cell, Section, Table, Text
 from swashplate.reporting.theme import unit_words
 from swashplate.reporting.words import counted, percent, sigma_words, value_words
+from swashplate.validation.bands import NEAR, pairs
+from swashplate.validation.bands import ROWS as BAND_ROWS
 from swashplate.validation.floors import CLOSED_ROWS
 from swashplate.validation.validation import PREDICTORS, Example, Score, Validation
 
@@ -55,21 +57,60 @@ def prediction(validation: Validation) -> Section:
     blocks: list[Block] = [
         Text(
             "At each start point a causal observer knew the flight up to there and nothing after it; from there on "
-            "the model ran on the recorded inputs. The shaded band is ±2σ of what the model promises."
+            f"the model ran on the recorded inputs. The shaded band is ±2σ of {_band_of(validation)}."
         )
     ]
     for i, source in enumerate(sorted(names)):
         blocks += _pictures(validation, source, identifier=f"prediction-{i + 1}")
     blocks += [Text(one.words, tone="caution") for one in validation.contacts]
     blocks += [Text(law.words[0].upper() + law.words[1:]) for law in validation.laws]
+    blocks += [Text(words, tone="caution" if "narrow" in words else "plain") for words in validation.bands_told]
     blocks += _told(validation)
     blocks.append(fit_over_horizon(validation))
     for horizon in horizons(validation):
         blocks.append(_table(validation, horizon))
+        blocks += _bands(validation, horizon)
         blocks += _beside(validation, horizon)
         blocks += _without_contact(validation, horizon)
         blocks += _loop_closed(validation, horizon)
     return Section("prediction", "Prediction", tuple(blocks))
+
+
+def _band_of(validation: Validation) -> str:
+    count = validation.settings.get("draws", 0)
+    if not count:
+        return "what the model promises"
+    return (
+        f"{count} flights that models drawn from the posterior might have made from there, each with gusts and "
+        "sensors' noise of its own"
+    )
+
+
+def _bands(validation: Validation, horizon: float) -> tuple[Block, ...]:
+    """How much of the flights the bands hold."""
+    rows = {half.channel: (half, most) for half, most in pairs(validation.bands) if half.horizon == horizon}
+    if not rows:
+        return ()
+    return (
+        Table(
+            f"What the bands {horizon:g} s ahead hold",
+            ("channel", *(words for words, _ in BAND_ROWS)),
+            tuple(
+                (Cell(name), *(_band_cell(words, cell(*rows[name])) for words, cell in BAND_ROWS))
+                for name in JUDGED
+                if name in rows
+            ),
+            note="Percent of the starts whose measured motion lies inside, with its 95 % interval (block bootstrap "
+            f"over 4 s of flight). A band holds within {NEAR:g} points of its promise. In it: the parameters by their "
+            "posterior, the observer's error at the start, gusts and drifts to come, the sensors' noise. By "
+            "parameters: part of the variance. Not in it: a wrong structure, and how sure the fit is of the gusts.",
+        ),
+    )
+
+
+def _band_cell(words: str, text: str) -> Cell:
+    tone = "caution" if text.startswith("too ") else "quiet" if text.startswith("cannot") else "plain"
+    return Cell(text, number=words not in ("so", "unit"), tone=tone)
 
 
 def _told(validation: Validation) -> tuple[Block, ...]:

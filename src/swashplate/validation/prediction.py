@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.arrays import Array
 from swashplate.filtering.arriving_commands import commands_moved
 from swashplate.filtering.disturbances import Noise
-from swashplate.filtering.disturbed_model import N_DISTURBANCES, stochastic_model
+from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState, StochasticModel, stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.filtering.riccati import gain_at, steady_gain
 from swashplate.identification.core.records import Record
@@ -59,6 +60,19 @@ class Predictions:
     laws: tuple[Law, ...] = ()
 
 
+class Observed(NamedTuple):
+    """What an observer made of a record: its model and numbers, the states after each reading, innovations (n, outputs)
+    with their covariance, and commands as they arrive with the voltage, some samples longer than the record."""
+
+    model: StochasticModel
+    numbers: FilterNumbers
+    filtered: FilterState
+    innovations: Array
+    covariance: Array
+    commands: Array
+    voltage: Array
+
+
 def predict(
     vehicle: Vehicle,
     record: Record,
@@ -76,31 +90,39 @@ def predict(
     run on the recorded inputs; gusts fade and drifts stay as the observer last saw them. `close_loop` names axes that
     are predicted again with their controller, as the seconds before tell it, in the place of their recorded command.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
+    seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=round(horizon / record.dt))
     n, ahead = record.time.size, round(horizon / record.dt)
     starts = np.arange(round(settling / record.dt), max(n - 1, 0), max(1, round(every / record.dt)))
-    inputs, voltage = (lengthened(rows, n + ahead) for rows in (record.inputs, record.voltage))
+    kept = [vehicle.index(name) for name in PREDICTED]
+    laws = learnt(vehicle, record, seen.filtered.x[:, kept], axes=close_loop, seconds=settling)
+    closed = None
+    if laws:
+        given = (seen.model, seen.filtered, seen.numbers, laws, record.inputs)
+        answered = closed_ahead(*given, seen.commands, seen.voltage, starts, ahead)
+        closed = answered[..., kept]
+    return Predictions(
+        starts=starts,
+        states=ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)[..., kept],
+        filtered=seen.filtered.x[:, kept],
+        innovations=seen.innovations,
+        covariance=np.asarray(seen.covariance),
+        disturbances=seen.filtered.gust[:, :N_DISTURBANCES] + seen.filtered.drift,
+        closed=closed,
+        laws=laws,
+    )
+
+
+def observed(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance, beyond: int) -> Observed:
+    """The causal observer of a vehicle along a record, whose last commands hold for `beyond` samples more."""
+    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
+    n = record.time.size
+    inputs, voltage = (lengthened(rows, n + beyond) for rows in (record.inputs, record.voltage))
     reaching, _ = commands_moved(vehicle, record.dt, inputs, nuisance, np)
     starting = reaching[: starting_samples(record.dt)].mean(axis=0)
     numbers = FilterNumbers(*(np.array(row, dtype=np.float64) for row in (vehicle.values(), noise, nuisance, starting)))
     begin = begun(model, numbers, seen_at_start(vehicle, record))
     innovations, filtered, _ = along(model, begin, numbers, record.outputs, reaching[:n], record.voltage)
-    kept = [vehicle.index(name) for name in PREDICTED]
-    laws = learnt(vehicle, record, filtered.x[:, kept], axes=close_loop, seconds=settling)
-    closed = None
-    if laws:
-        answered = closed_ahead(model, filtered, numbers, laws, record.inputs, reaching, voltage, starts, ahead)
-        closed = answered[..., kept]
-    return Predictions(
-        starts=starts,
-        states=ahead_of(model, filtered, numbers, reaching, voltage, starts, ahead)[..., kept],
-        filtered=filtered.x[:, kept],
-        innovations=innovations,
-        covariance=np.asarray(begin.gain.covariance),
-        disturbances=filtered.gust[:, :N_DISTURBANCES] + filtered.drift,
-        closed=closed,
-        laws=laws,
-    )
+    return Observed(model, numbers, filtered, innovations, begin.gain.covariance, reaching, voltage)
 
 
 def naive(states: Array, starts: NDArray[np.intp], ahead: int, dt: float, *, kind: str) -> Array:
@@ -124,13 +146,21 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
 
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
-    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
-    rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
-    A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
-    predicted = steady_gain(A, C, Q, R)[2]
-    P = predicted - gain_at(predicted, C, R, np) @ C @ predicted
+    A, _, Q, _, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
     kept, found = [vehicle.index(name) for name in PREDICTED], []
     for _ in range(round(horizon / record.dt)):
         P = A @ P @ A.T + Q
         found.append(np.sqrt(np.maximum(np.diag(P)[kept], 0.0)))
     return np.array(found)
+
+
+def uncertainty(
+    vehicle: Vehicle, record: Record, *, noise: Noise, nuisance: Nuisance
+) -> tuple[Array, Array, Array, Array, Array]:
+    """A, C, Q, R of the joined system about the mean flight, nose north, and the covariance of what an observer makes
+    of a reading."""
+    model = stochastic_model(vehicle, record.output_names, record.dt, noise=noise)
+    rows = FilterNumbers(*(np.array([row], dtype=np.float64) for row in (vehicle.values(), noise, nuisance, [0.0])))
+    A, C, Q, R = (part[0] for part in joined_at(model, rows, seen_at_start(vehicle, record)))
+    predicted = steady_gain(A, C, Q, R)[2]
+    return A, C, Q, R, predicted - gain_at(predicted, C, R, np) @ C @ predicted

@@ -27,12 +27,14 @@ from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.simulation.record import monitored
 from swashplate.validation import innovations
+from swashplate.validation.bands import BandedRecord, bands, check_draws
 from swashplate.validation.black_box import FilteredMotion
 from swashplate.validation.calibration import calibrate
 from swashplate.validation.contact import Contact, contact
 from swashplate.validation.controller_law import Law, check_closed
 from swashplate.validation.flight_floors import ClosedRecord, ScoredRecord, closed_floors, flight_floors, motion_of
 from swashplate.validation.metrics import fit_percent, rms, theil
+from swashplate.validation.paths import spread
 from swashplate.validation.prediction import Predictions, naive, predict, prediction_sigma
 from swashplate.validation.spans import CALIBRATION, HORIZONS, SHORTEST_CALIBRATION
 from swashplate.validation.validation import Example, Score, Validation
@@ -65,6 +67,7 @@ def validate(
     every: float = 0.1,
     calibration: float = CALIBRATION,
     close_loop: Sequence[str] = (),
+    draws: Sequence[Vehicle] = (),
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation:
     """Predict unseen flights from many start points and judge the result.
@@ -83,11 +86,14 @@ def validate(
         calibration: seconds at the start of each record.
         close_loop: axes ("yaw", "heave") whose controller, as those seconds tell it, also predicts in the place of the
             recorded command, which answers gusts that no prediction knows.
+        draws: models that the fit cannot tell from this one (`fit.draw(20, seed=1)`). Each predicts too; bands of their
+            spread, of the start, of the gusts to come and of the sensors' noise are held against the flights.
         progress: called with the number of records done and their number.
 
     Raises:
         FlightError: where no record is long enough for calibration and the shortest horizon.
-        SwashError: for a calibration that is too short to tell anything, or an axis whose loop cannot be closed.
+        SwashError: for a calibration that is too short to tell anything, an axis whose loop cannot be closed, or draws
+            that are too few or of another model.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     enable_double_precision()
@@ -103,6 +109,7 @@ def validate(
     if not calibration >= SHORTEST_CALIBRATION:
         raise SwashError(f"calibration is {calibration:g} s, expected at least {SHORTEST_CALIBRATION:g} s.")
     check_closed(vehicle, close_loop)
+    check_draws(vehicle, draws)
     shortest = calibration + _STARTS + min(horizons)
     all_pieces = records(flights, vehicle)
     pieces = [piece for piece in all_pieces if piece.time[-1] - piece.time[0] > shortest]
@@ -120,6 +127,7 @@ def validate(
     judged: list[AxisExcitation] = []
     measured: list[Array] = []
     looped: dict[float, list[ClosedRecord]] = {}
+    banded: dict[float, list[BandedRecord]] = {}
     laws: list[Law] = []
     examples: list[Example] = []
     checks: list[tuple[Array, Array]] = []
@@ -152,6 +160,9 @@ def validate(
         judged.extend(excitation(vehicle, piece, measured_states(piece, Nuisance())))
         measured.append(truth)
         sigma = prediction_sigma(vehicle, piece, noise=noise, nuisance=own.nuisance, horizon=ahead)
+        fan = None
+        if draws:
+            fan = spread(draws, piece, noise=noise, nuisance=own.nuisance, predictions=own.predictions, truth=truth)
         for horizon in horizons:
             if horizon <= ahead:
                 starts, made = _at_horizon(piece, rivals, horizon)
@@ -161,10 +172,13 @@ def validate(
                     predicted = own.predictions.closed[: len(starts), round(horizon / piece.dt) - 1]
                     looped.setdefault(horizon, []).append(ClosedRecord(piece.time[starts], predicted, *made["model"]))
                 promised = sigma[round(horizon / piece.dt) - 1]
+                if fan is not None:
+                    banded.setdefault(horizon, []).append(fan.at(horizon, piece, starts))
                 scored.setdefault(horizon, []).append(
                     ScoredRecord(piece.name, motion_of(piece, truth, starts), promised)
                 )
-        examples.extend(_examples(piece, own, sigma[: round(_EXAMPLE / piece.dt)]))
+        shown = np.broadcast_to(sigma, own.predictions.states.shape) if fan is None else fan.sigma
+        examples.extend(_examples(piece, own, shown[:, : round(_EXAMPLE / piece.dt)]))
         settled = round(calibration / piece.dt)
         pushed = contact(piece.name, piece.time[settled:], truth[settled:], own.predictions.disturbances[settled:])
         contacts.append(pushed)
@@ -205,6 +219,7 @@ def validate(
             "calibration": calibration,
             "records": [piece.name for piece in pieces],
             "noise": {k: float(v) for k, v in noise._asdict().items()},
+            "draws": len(draws),
         },
         calibrated=tuple(calibrated),
         floors=beside,
@@ -212,6 +227,7 @@ def validate(
         without_contact=_scores(_without_contact(parts, scored, contacts)),
         loop_closed=closed_floors(looped),
         laws=tuple(laws),
+        bands=bands(banded),
         not_logged=tuple(
             name
             for name in (*(s for s in vehicle.state_names if s.startswith("omega")), "voltage")
@@ -321,8 +337,8 @@ def _scores(parts: Mapping[tuple[str, float], Sequence[tuple[Array, Array, Array
 
 
 def _examples(piece: Record, own: _Rival, sigma: Array) -> list[Example]:
-    """A few predictions spread over the record, as long as their standard deviations (n, 12)."""
-    ahead = sigma.shape[0]
+    """A few predictions spread over the record, as long as their standard deviations (starts, n, 12)."""
+    ahead = sigma.shape[1]
     usable = np.flatnonzero(own.predictions.starts + ahead < piece.time.size)
     chosen = usable[np.linspace(0, usable.size - 1, min(_EXAMPLES, usable.size)).astype(int)] if usable.size else usable
     made = []
@@ -334,7 +350,7 @@ def _examples(piece: Record, own: _Rival, sigma: Array) -> list[Example]:
                 start=float(piece.time[start]),
                 time=piece.time[start + 1 : start + 1 + ahead],
                 states=own.predictions.states[place, :ahead],
-                sigma=sigma,
+                sigma=sigma[place],
             )
         )
     return made

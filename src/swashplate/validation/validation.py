@@ -14,6 +14,7 @@ from swashplate.identification.core.records import Record
 from swashplate.identification.core.sources import DataSource
 from swashplate.models.vehicle import Vehicle
 from swashplate.shown import Shown
+from swashplate.validation.bands import Band, in_brief
 from swashplate.validation.contact import Contact
 from swashplate.validation.controller_law import Law
 from swashplate.validation.floors import ROWS, Floor
@@ -111,6 +112,8 @@ class Validation(Shown):
         without_contact: the model's scores from starts that no mask touches.
         loop_closed: fits with controllers in the place of recorded commands, and their lead over the model's on those;
             nothing where no loop was closed. `laws`: the controllers.
+        bands: how much of the flights the bands of the predictions hold; nothing where no draws were given. Then the
+            examples' sigmas have the parameters' part and the sensors' noise in them too.
         not_logged: rotor speeds and voltage that the model has and some flight does not.
     """
 
@@ -132,6 +135,7 @@ class Validation(Shown):
     without_contact: tuple[Score, ...] = ()
     loop_closed: tuple[Floor, ...] = ()
     laws: tuple[Law, ...] = ()
+    bands: tuple[Band, ...] = ()
     not_logged: tuple[str, ...] = ()
 
     def score(self, channel: str, horizon: float, predictor: str = "model") -> Score:
@@ -146,6 +150,11 @@ class Validation(Shown):
         """What the model's score on one channel at one horizon stands beside."""
         return next(f for f in self.floors if f.channel == channel and abs(f.horizon - horizon) < 1e-9)
 
+    @property
+    def bands_told(self) -> list[str]:
+        """Which bands hold and which do not, a sentence by horizon."""
+        return [in_brief(self.bands, horizon) for horizon in dict.fromkeys(band.horizon for band in self.bands)]
+
     def as_dict(self) -> dict[str, Any]:
         """Numbers and words as JSON types (no time histories)."""
         return {
@@ -157,6 +166,7 @@ class Validation(Shown):
             "scores_without_contact": [vars(score) for score in self.without_contact],
             "loop_closed": [vars(floor) for floor in self.loop_closed],
             "laws": [vars(law) for law in self.laws],
+            "bands": [vars(band) | {"level": band.level, "words": band.words} for band in self.bands],
             "innovations": [vars(check) for check in self.innovations],
             "log_likelihood": dict(self.log_likelihood),
             "verdict": [vars(axis) for axis in self.verdict],
@@ -197,5 +207,5 @@ class Validation(Shown):
             for words, cell in ROWS if beside else ():
                 row_of = (cell(beside[channel]) if channel in beside else "" for channel in channels)
                 lines.append(f"  {words:16s}" + "".join(f"{text:>9s}" for text in row_of))
-        told = [*(c.words for c in self.contacts), *(law.words for law in self.laws)]
+        told = [*(c.words for c in self.contacts), *(law.words for law in self.laws), *self.bands_told]
         return "\n".join([*lines, *told, *(f"{v.axis}: {v.level}. {v.words}" for v in self.verdict)])

@@ -28,6 +28,7 @@ def validate(
     every: float = 0.1,
     calibration: float = CALIBRATION,
     close_loop: Sequence[str] = (),
+    draws: Sequence[Vehicle] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation: ...
@@ -43,6 +44,7 @@ def validate(
     every: float = 0.1,
     calibration: float = CALIBRATION,
     close_loop: Sequence[str] = (),
+    draws: Sequence[Vehicle] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation | Verification: ...
@@ -57,6 +59,7 @@ def validate(
     every: float = 0.1,
     calibration: float = CALIBRATION,
     close_loop: Sequence[str] = (),
+    draws: Sequence[Vehicle] = (),
     outputs: Sequence[str] | None = None,
     progress: Callable[[int, float], None] | None = None,
 ) -> Validation | Verification:
@@ -75,6 +78,7 @@ def validate(
         every: seconds between starts.
         calibration: seconds at the start of each record that tell its delays and trims.
         close_loop: axes ("yaw", "heave") whose controller also predicts in the place of the recorded command.
+        draws: models that the fit cannot tell from this one (`fit.draw(20, seed=1)`), for bands of what is not known.
         outputs: channels to compare, for models that are flown along the inputs; all that both have where None.
         progress: called with the number of records done and their number.
 
@@ -83,8 +87,8 @@ def validate(
 
     Raises:
         FlightError: where no record is long enough, or the flights lack what the model needs.
-        SwashError: for a calibration that is too short, an axis whose loop cannot be closed, or `published` beside a
-            model that has no card to compare with.
+        SwashError: for a calibration that is too short, an axis whose loop cannot be closed, draws that are too few or
+            of another model, or `published` or `draws` beside a model that is flown along the inputs.
         CardError: for an identified model that does not say what it was identified from, and no `published`.
     """
     model, flown = fitted(model), as_flights(flights)
@@ -102,10 +106,13 @@ def validate(
             every=every,
             calibration=calibration,
             close_loop=close_loop,
+            draws=draws,
             progress=progress,
         )
     if close_loop:
         raise SwashError("closes nothing: such a model is flown along the recorded inputs alone.", channel="close_loop")
+    if draws:
+        raise SwashError("have no bands here: such a model is flown along the recorded inputs alone.", channel="draws")
     if published is not None:
         raise SwashError(
             "is compared with nothing: such a model is flown along the recorded inputs alone.", channel="published"

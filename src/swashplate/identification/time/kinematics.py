@@ -14,7 +14,16 @@ PREDICTED = ("x", "y", "z", "u", "v", "w", "phi", "theta", "psi", "p", "q", "r")
 """The body states in the order of every (n, 12) table."""
 
 
-def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13) -> Array:
+WINDOW = 0.13
+"""Seconds over which the pose is smoothed."""
+
+
+def samples_smoothed(dt: float, window: float = WINDOW) -> int:
+    """How many samples the pose is smoothed over, an odd number."""
+    return max(5, 2 * round(window / dt / 2) + 1)
+
+
+def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDOW) -> Array:
     """Body states (n, 12) of the centre of gravity from the measured pose, in the order of `PREDICTED`.
 
     Rates and velocities are slopes of a cubic fitted to the samples within `window` seconds (Savitzky and Golay 1964),
@@ -30,11 +39,11 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = 0.13)
     if float(nuisance.level_psi):
         tracked = Rotation.from_euler("ZYX", pose[:, [5, 4, 3]])
         turned = (tracked * Rotation.from_euler("Z", -float(nuisance.level_psi))).as_euler("ZYX")
-        pose[:, 3:] = np.stack([turned[:, 2], turned[:, 1], np.unwrap(turned[:, 0])], axis=1)
-        pose[:, 5] += 2.0 * np.pi * np.round((record.outputs[0, names.index("psi")] - pose[0, 5]) / (2.0 * np.pi))
+        pose[:, 3:] = turned[:, ::-1]
+        pose[:, 5] += 2.0 * np.pi * np.round((record.outputs[:, names.index("psi")] - pose[:, 5]) / (2.0 * np.pi))
     lever = np.array([nuisance.lever_x, nuisance.lever_y, nuisance.lever_z], dtype=np.float64)
     pose[:, :3] -= Rotation.from_euler("ZYX", pose[:, [5, 4, 3]]).apply(lever)
-    length = max(5, 2 * round(window / record.dt / 2) + 1)
+    length = samples_smoothed(record.dt, window)
     smooth = savgol_filter(pose, length, 3, axis=0)
     slope = savgol_filter(pose, length, 3, deriv=1, delta=record.dt, axis=0)
     phi, theta = smooth[:, 3], smooth[:, 4]

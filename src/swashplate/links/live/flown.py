@@ -18,6 +18,10 @@ class Craft:
     memory: Array
     inputs: Array
 
+    def copied(self) -> Craft:
+        """Another one, there where this one is."""
+        return Craft(self.x.copy(), self.past.copy(), self.memory.copy(), self.inputs.copy())
+
 
 @dataclass(frozen=True)
 class Moment:
@@ -30,6 +34,7 @@ class Moment:
         target: the place, height and heading that are held (x, y, z, psi).
         stick_number: number of the last stick message that is in it.
         trouble: why it stands still, "" where it flies.
+        fan: state rows of the drawn models, None of one that is lost. fan_begun: when they began where it was [s].
     """
 
     time: float
@@ -38,6 +43,8 @@ class Moment:
     target: Array
     stick_number: int
     trouble: str
+    fan: tuple[Array | None, ...] = ()
+    fan_begun: float = 0.0
 
 
 @dataclass

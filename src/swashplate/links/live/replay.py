@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -50,6 +50,8 @@ class Replay:
         predicted: body states (n, 12) of the model, NaN where there is no prediction; None without a model.
         ahead: seconds after which a prediction starts anew.
         simulated: whether no aircraft flew.
+        drawn: the same of drawn models, shape (models, n, 12), NaN where there is none; None where none were asked for.
+        begun: when the prediction that is shown began [s], shape (n,), NaN where there is none.
         notes: what the log does not have and what stands in for it, in sentences.
     """
 
@@ -62,6 +64,8 @@ class Replay:
     ahead: float
     simulated: bool
     notes: tuple[str, ...] = ()
+    drawn: Array | None = None
+    begun: Array | None = None
 
 
 def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
@@ -86,12 +90,20 @@ def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
     )
 
 
-def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, hold_missing: bool = False) -> Replay:
+def replay(
+    flight: Flight,
+    *,
+    model: Vehicle | None = None,
+    draws: Sequence[Vehicle] = (),
+    ahead: float = 2.0,
+    hold_missing: bool = False,
+) -> Replay:
     """What is shown of a conditioned flight.
 
     Args:
         flight: at one rate, see `Flight.condition`.
         model: predicts the flight from its own inputs; None for no prediction.
+        draws: models that a fit cannot tell from this one (`fit.draw(8, seed=1)`), predicted from the same moments.
         ahead: how long each prediction runs [s]; then the next one starts from what an observer knew by then.
         hold_missing: hold inputs of the model that the log lacks at the hover's, and say so in `Replay.notes`.
 
@@ -102,6 +114,8 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
     enable_double_precision()
     if not ahead > 0.0:
         raise SwashError(f"is {ahead:g} s, expected more than zero.", channel="--ahead")
+    if draws and model is None:
+        raise SwashError("are of no model: none was given.", channel="draws")
     missing = [name for name in PREDICTED if name not in flight]
     if missing:
         raise FlightError(
@@ -116,6 +130,7 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
     vehicle = drawn_as(flight, model)
     if model is not None and model.traits.linear:
         vehicle = model = _about_the_flight(model, flight)
+        draws = [_about_the_flight(one, flight) for one in draws]
     rate = flight.rate("phi")
     stride = max(1, round(rate / RATE), int(np.ceil(flight.time("phi").size / MOST)))
     body, time = flight.array(PREDICTED)[::stride], flight.time("phi")[::stride]
@@ -127,12 +142,13 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
         if name in flight:
             states[:, i] = np.interp(time, flight.time(name), flight.values(name))
     inputs = np.stack([np.interp(time, flight.time(n), flight.values(n)) for n in vehicle.input_names], axis=1)
-    predicted = None
+    predicted, begun = None, None
     if model is not None and model.traits.observed:
-        predicted = _predicted(flight, model, ahead, time)
+        predicted, begun = _predicted(flight, (model, *draws), ahead, time)
     elif model is not None:
         around = {n: np.interp(time, flight.time(n), flight.values(n)) for n in SURROUNDINGS if n in flight}
-        predicted = _flown(model, time, states, inputs, around, ahead)
+        flown = [_flown(one, time, states, inputs, around, ahead) for one in (model, *draws)]
+        predicted, begun = np.array([rows for rows, _ in flown]), flown[0][1]
         if unknown:
             notes.append(f"The log has no {', '.join(unknown)}: every prediction starts with them as at hover.")
     if unknown and (model is None or model.traits.observed):
@@ -143,10 +159,12 @@ def replay(flight: Flight, *, model: Vehicle | None = None, ahead: float = 2.0, 
         time,
         states,
         inputs,
-        predicted,
+        None if predicted is None else predicted[0],
         ahead,
         flight.provenance.simulated,
         tuple(notes),
+        drawn=None if predicted is None or not draws else predicted[1:],
+        begun=begun,
     )
 
 
@@ -199,10 +217,12 @@ def _about_the_flight(model: Vehicle, flight: Flight) -> Vehicle:
     return from_card(replace(card, options={**card.options, **ranges}))
 
 
-def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Array:
-    """The model's body states at the shown times, NaN before the first start and between pieces."""
+def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Array) -> tuple[Array, Array]:
+    """The models' body states (models, n, 12) at the shown times, and when each prediction began (n,); NaN before the
+    first start and between pieces. Delays, trims and lever arm are what the log tells the first."""
+    model = models[0]
     noise, prior = observer_of(model)
-    found = np.full((time.size, len(PREDICTED)), np.nan)
+    found, begun = np.full((len(models), time.size, len(PREDICTED)), np.nan), np.full(time.size, np.nan)
     longest = 0.0
     for piece in records(flight, model):
         length = float(piece.time[-1] - piece.time[0])
@@ -211,29 +231,33 @@ def _predicted(flight: Flight, model: Vehicle, ahead: float, time: Array) -> Arr
         if length < settling + 1.0:
             continue
         nuisance = calibrate(model, piece, noise=noise, prior=prior, seconds=settling)
-        made = predict(model, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
-        rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
-        start = made.starts[0]
-        chain = made.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]
-        rows[start + 1 : start + 1 + len(chain)] = chain
-        # The prediction is of the centre of gravity; the log shows the tracked point.
-        rows += flight_at(flight, piece.time) - measured_states(piece, nuisance)
         inside = (time >= piece.time[0]) & (time <= piece.time[-1])
         nearest = np.clip(np.searchsorted(piece.time, time[inside] - 1e-6), 0, piece.time.size - 1)
-        found[inside] = rows[nearest]
+        # The prediction is of the centre of gravity; the log shows the tracked point.
+        carried = flight_at(flight, piece.time) - measured_states(piece, nuisance)
+        for one, own in zip(models, found, strict=True):
+            made = predict(one, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
+            rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
+            start = made.starts[0]
+            chain = made.states.reshape(-1, len(PREDICTED))[: piece.time.size - start - 1]
+            rows[start + 1 : start + 1 + len(chain)] = chain
+            own[inside] = (rows + carried)[nearest]
+        place = np.searchsorted(made.starts, nearest) - 1  # a start itself belongs to the prediction before it
+        begun[inside] = np.where(place >= 0, piece.time[made.starts[place]], np.nan)
     if not np.any(np.isfinite(found)):
         raise FlightError(
             f"the longest unbroken piece has {longest:.1f} s, expected at least {SHORTEST_CALIBRATION + 1:g} s for a "
             "prediction.",
             where=flight.provenance.source,
         )
-    return found
+    return found, begun
 
 
 def _flown(
     model: Vehicle, time: Array, states: Array, inputs: Array, around: Mapping[str, Array], ahead: float
-) -> Array:
-    """The model from the logged state on, anew every `ahead` seconds, on the logged inputs, voltage and wind.
+) -> tuple[Array, Array]:
+    """The model from the logged state on, anew every `ahead` seconds, on the logged inputs, voltage and wind; and when
+    each prediction began.
 
     For vehicles that the observer of the validation is not made for; delays and trims of the log are not looked for. A
     linear model's own delays are flown.
@@ -243,6 +267,7 @@ def _flown(
     inputs = np.stack([np.interp(time - d, time, u) for d, u in zip(waits, inputs.T, strict=True)], axis=1)
     step = float(np.median(np.diff(time)))
     length, found = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
+    begun = np.full(time.size, np.nan)
     for first in range(0, time.size - length, length):
         part = slice(first, first + length + 1)
         if time[first + length] - time[first] > (length + 0.5) * step:
@@ -259,7 +284,8 @@ def _flown(
         except DivergenceError:
             continue  # where the model leaves what it is good for, nothing is shown
         found[first + 1 : first + length + 1] = flown.array(PREDICTED)[1:]
-    return found
+        begun[first + 1 : first + length + 1] = time[first]
+    return found, begun
 
 
 def flight_at(flight: Flight, time: Array) -> Array:
@@ -288,7 +314,8 @@ def as_json(shown: Replay) -> dict[str, Any]:
         ghost = None
         if shown.predicted is not None and np.all(np.isfinite(shown.predicted[k])):
             ghost = _short(shown.predicted[k])
-        moments.append([_short(x[: len(PREDICTED)]), _short(u), *(_nested(parts[key]) for key in PARTS), ghost])
+        fan = None if shown.drawn is None or ghost is None else [_or_none(rows[k]) for rows in shown.drawn]
+        moments.append([_short(x[: len(PREDICTED)]), _short(u), *(_nested(parts[key]) for key in PARTS), ghost, fan])
     return {
         "title": shown.title,
         "vehicle": vehicle.card.title,
@@ -297,6 +324,8 @@ def as_json(shown: Replay) -> dict[str, Any]:
         "picture": {**picture(vehicle), "floor": floor(shown)},
         "inputs": inputs_of(vehicle),
         "notes": list(shown.notes),
+        "drawn": 0 if shown.drawn is None else len(shown.drawn),
+        "begun": None if shown.begun is None else _short(np.nan_to_num(shown.begun, nan=-1.0)),
         "time": _short(shown.time - shown.time[0]),
         "moments": moments,
     }
@@ -307,6 +336,10 @@ PARTS = ("rotors", "bar", "tail")
 
 def _short(row: Array) -> list[float]:
     return [float(f"{value:.6g}") for value in np.nan_to_num(row)]
+
+
+def _or_none(row: Array) -> list[float] | None:
+    return _short(row) if np.all(np.isfinite(row)) else None
 
 
 def _nested(part: Any) -> Any:

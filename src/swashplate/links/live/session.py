@@ -20,7 +20,7 @@ from swashplate.links.live.clock import Clock
 from swashplate.links.live.identifying import HOWS, How, Identifying, Job, Window, busiest
 from swashplate.links.live.picture import Pose, inputs_of, picture, pose_of
 from swashplate.links.live.recording import save_recording
-from swashplate.links.live.world import World
+from swashplate.links.live.world import FAN_SECONDS, World
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.rigid_body import RigidBody
@@ -52,6 +52,7 @@ class LiveSession:
         folder: where recordings and results go; made with the first one.
         estimate: parameters and equations that are estimated in flight (`Estimating`).
         model: what the pilot's law is made for and estimates begin with; the vehicle where None.
+        draws: models that a fit cannot tell from it, which fly beside it (`World`).
     """
 
     def __init__(
@@ -62,7 +63,9 @@ class LiveSession:
         folder: Path,
         estimate: Sequence[str] = (),
         model: Vehicle | None = None,
+        draws: Sequence[Vehicle] = (),
     ) -> None:
+        self._draws = tuple(draws)
         self.folder, self._controller = folder, controller
         self._estimate, self._model = tuple(estimate), model
         self.lock = threading.Lock()
@@ -78,7 +81,8 @@ class LiveSession:
         self._watched = -1, ""
 
     def _make(self, vehicle: Vehicle) -> tuple[World, Pose, Estimating | None]:
-        world = World(vehicle, controller=self._controller, believed=self._believed(vehicle))
+        draws = [_switched(one, vehicle) for one in self._draws]
+        world = World(vehicle, controller=self._controller, believed=self._believed(vehicle), draws=draws)
         world.step()  # compiles, so that the first second of flight does not
         world.reset()
         return world, pose_of(vehicle), self._estimator(vehicle, world) if self._estimate else None
@@ -89,10 +93,7 @@ class LiveSession:
 
     def _believed(self, vehicle: Vehicle) -> Vehicle:
         """The pilot's model of a vehicle, with the options that the page has switched since."""
-        model, options = self._model, vehicle.card.options
-        if model is None or model.card.options == options:
-            return model or vehicle
-        return from_card(replace(model.card, options=options))
+        return vehicle if self._model is None else _switched(self._model, vehicle)
 
     def _step(self) -> None:
         world, estimating = self.world, self.estimating
@@ -269,6 +270,8 @@ class LiveSession:
             "rate": 1.0 / world.period,
             "folder": str(self.folder),
             "estimates": [[k.name, k.unit] for k in self.estimating.known] if self.estimating else [],
+            "fan": len(self._draws),
+            "fan_seconds": FAN_SECONDS,
             "learns": any(k.model is not None for k in self.estimating.known) if self.estimating else False,
         }
 
@@ -299,6 +302,9 @@ class LiveSession:
             "version": self.version,
             "t": round(now.time, 4),
             **crafts,
+            "fan": {"begun": now.fan_begun, "x": [None if x is None else _short(x[:_BODY]) for x in now.fan]}
+            if now.fan
+            else None,
             "target": _short(now.target),
             "stick": now.stick_number,
             "trouble": now.trouble or ("" if failed is None else f"The simulation stopped: {failed}"),
@@ -325,6 +331,12 @@ class LiveSession:
                 "voltage": setting.voltage,
             },
         }
+
+
+def _switched(model: Vehicle, vehicle: Vehicle) -> Vehicle:
+    """A model with the options of a vehicle."""
+    options = vehicle.card.options
+    return model if model.card.options == options else from_card(replace(model.card, options=options))
 
 
 def _told(job: Job) -> list[Any]:

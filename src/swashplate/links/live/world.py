@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -43,6 +44,8 @@ from swashplate.simulation.wind import Gusts, Turbulence
 
 PHYSICS_RATE = 500.0
 """Runge-Kutta steps per second [Hz], in the air."""
+FAN_SECONDS = 2.0
+"""How long drawn models fly on their own."""
 _GUST_LENGTH, _GUST_SPEED = 5.0, 2.0
 _LEAN = np.radians(60.0)
 _HELD_WITHIN = 3.0
@@ -102,6 +105,8 @@ class World:
         vehicle: what flies.
         controller: a designed controller, or None for the default ones.
         believed: what the pilot's law is made for; the vehicle where None.
+        draws: models that a fit cannot tell from this one. They fly beside it under the same law and sticks, and begin
+            anew where it is every `FAN_SECONDS`.
         seed: of the gusts.
     """
 
@@ -111,6 +116,7 @@ class World:
         *,
         controller: Controller | None = None,
         believed: Vehicle | None = None,
+        draws: Sequence[Vehicle] = (),
         seed: int = 0,
     ) -> None:
         enable_double_precision()
@@ -131,6 +137,7 @@ class World:
         # A linear model's angles are small ones, and their rates its own.
         self._equations = equations_of(vehicle if self._linear else tumbling(vehicle))
         self._p = parameter_row(vehicle, around)
+        self._drawn = [parameter_row(one, around) for one in draws]
         self._limits = np.array(vehicle.input_limits).T
         # Skids and stopped rotors need the step that links and gym take.
         self._rate = 1.0 / LONGEST_STEP if vehicle.card.options.get("ground") else PHYSICS_RATE
@@ -161,6 +168,11 @@ class World:
         self._turbulence: Turbulence | None = None
         self.set_gusts(self.setting.gusts)
         self._target = np.array(self.trim.state[[0, 1, 2, 8]])
+        self._begin_fan()
+
+    def _begin_fan(self) -> None:
+        self._fan: list[Craft | None] = [self._crafts["own"].copied() for _ in self._drawn]
+        self._fan_begun = self.ticks
 
     def _fresh(self) -> Craft:
         inputs = np.array(self.trim.inputs)
@@ -179,6 +191,7 @@ class World:
             self.setting.mode = mode
             for craft in self._crafts.values():
                 craft.memory = np.array(self.pilot.memory)
+            self._begin_fan()
             self._target = self._crafts["own"].x[[0, 1, 2, 8]].copy()
 
     def set_ghost(self, on: bool) -> None:
@@ -187,7 +200,7 @@ class World:
         own = self._crafts["own"]
         self._crafts.pop("ghost", None)
         if on:
-            self._crafts["ghost"] = Craft(own.x.copy(), own.past.copy(), own.memory.copy(), own.inputs.copy())
+            self._crafts["ghost"] = own.copied()
 
     def set_gusts(self, sigma: float) -> None:
         """Turbulence of a standard deviation [m/s] across the wind; none at zero."""
@@ -221,8 +234,11 @@ class World:
             return
         wanted, around, added = self._wanted(), self._around(), self._added()
         before = self._crafts["own"].x
-        for name, craft in self._crafts.items():
-            decoupled = self.setting.decoupled if name == "own" else not self.setting.decoupled
+        if self._fan and (self.ticks - self._fan_begun) * self.period >= FAN_SECONDS:
+            self._begin_fan()
+        flying = [(craft, self._p, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
+        flying += [(c, p, self.setting.decoupled) for c, p in zip(self._fan, self._drawn, strict=True) if c is not None]
+        for craft, p, decoupled in flying:
             found = advance(
                 self._equations,
                 self.pilot.step,
@@ -236,12 +252,13 @@ class World:
                 around,
                 added,
                 self.pilot.gains[self.setting.mode, decoupled],
-                self._p,
+                p,
                 self._limits,
                 1.0 / self._rate,
             )
             row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in found)
             craft.x = row if self._linear else to_euler(row, craft.x)
+        self._fan = [None if c is None or self._lost(c.x) else c for c in self._fan]
         own = self._crafts["own"]
         self._check(own, before)
         if self.trouble:
@@ -323,7 +340,9 @@ class World:
         crafts = {name: (craft.x, craft.inputs) for name, craft in self._crafts.items()}
         around = np.array([*self.setting.wind, self.setting.voltage])
         target, number = self._target.copy(), self.setting.stick_number
-        return Moment(self.ticks * self.period, crafts, around, target, number, self.trouble)
+        fan = tuple(None if craft is None else craft.x for craft in self._fan)
+        begun = self._fan_begun * self.period
+        return Moment(self.ticks * self.period, crafts, around, target, number, self.trouble, fan, begun)
 
     def doubts(self) -> tuple[str, ...]:
         """What the flight is not that the pilot may take it for, now: a place that is not held, a speed or a state

@@ -188,6 +188,16 @@ def test_estimates_follow_the_flight_and_begin_anew_after_a_reset(tmp_path: Path
     session.close()
 
 
+def test_the_page_is_told_of_the_drawn_models(tmp_path: Path) -> None:
+    model = sp.vehicle("coax")
+    session = LiveSession(model, controller=None, folder=tmp_path, draws=[model, model])
+    assert session.hello()["fan"] == 2
+    session._step()
+    told = json.loads(json.dumps(session.moment()))
+    assert told["fan"] == {"begun": 0.0, "x": [told["own"]["x"]] * 2}
+    session.close()
+
+
 def test_sticks_fly_and_a_lost_page_lets_them_go(running: Running) -> None:
     with running.socket() as page:
         page.send(json.dumps({"type": "stick", "roll": 0, "pitch": 0.4, "yaw": 0, "heave": 0, "number": 41}))

@@ -24,7 +24,7 @@ from swashplate.links.live.clock import Clock
 from swashplate.links.live.picture import picture, pose_of
 from swashplate.links.live.pilots import MODES
 from swashplate.links.live.recording import save_recording
-from swashplate.links.live.world import Setting, World
+from swashplate.links.live.world import FAN_SECONDS, Setting, World
 from swashplate.links.web.priority import come_first
 from swashplate.models.card import packaged_cards
 from swashplate.simulation.wind import Gusts, Turbulence, dryden
@@ -78,6 +78,21 @@ def test_the_ghost_is_the_aircraft_with_the_decoupling_the_other_way(coax: World
     # Fankhauser et al., Fig. 10: without the decoupling the path bends away.
     assert abs(ghost[Y] - own[Y]) > 0.3
     assert own[X] > 3.0
+
+
+def test_drawn_models_fly_beside_it_and_begin_anew_where_it_is(coax: World) -> None:
+    values = coax.vehicle.card.values()
+    heavy = coax.vehicle.with_values({"mass": 1.05 * values["mass"]})
+    world = World(coax.vehicle, draws=[coax.vehicle, heavy])
+    own = fly(world, 1.0, pitch=0.4).copy()
+    same, other = (row for row in world.moment().fan if row is not None)
+    np.testing.assert_array_equal(same, own)
+    assert other[Z] > own[Z] + 0.02, "it is heavier and sinks"
+    fly(world, FAN_SECONDS - 1.0 + world.period, pitch=0.4)
+    now = world.moment()
+    assert now.fan_begun == pytest.approx(FAN_SECONDS)
+    assert now.fan[1] is not None
+    assert abs(now.fan[1][Z] - now.crafts["own"][0][Z]) < 2e-3
 
 
 def test_decoupling_of_a_single_rotor_is_the_matrix_of_its_linear_model() -> None:

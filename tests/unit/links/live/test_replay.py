@@ -62,6 +62,28 @@ def test_a_prediction_starts_anew(shown: Replay) -> None:
         replay(Flight({}), ahead=0.0)
 
 
+def test_drawn_models_fan_out_from_where_the_prediction_begins(flight: Flight, shown: Replay) -> None:
+    raptor = sp.vehicle("raptor50")
+    inertia = raptor.card.values()["inertia_xx"]
+    draws = [raptor.with_values({"inertia_xx": share * inertia}) for share in (0.8, 1.0, 1.2)]
+    found = replay(flight, model=raptor, draws=draws, ahead=1.0)
+    assert found.drawn is not None
+    assert found.begun is not None
+    np.testing.assert_array_equal(found.predicted, shown.predicted)
+    np.testing.assert_array_equal(found.drawn[1], shown.predicted)
+    k = np.flatnonzero(np.isfinite(found.begun))
+    ahead = (found.time - found.begun)[k]
+    assert (ahead.min(), ahead.max()) == (pytest.approx(0.02), pytest.approx(1.0))
+    apart = np.abs(found.drawn[2] - found.drawn[0])[k, 9]
+    assert apart[np.isclose(ahead, 0.02)].max() < 0.25 * apart.max()
+    told = as_json(found)
+    assert told["drawn"] == 3
+    assert [len(row) for row in told["moments"][60][6]] == [12, 12, 12]
+    assert told["begun"][60] == pytest.approx(found.begun[60])
+    with pytest.raises(SwashError, match="draws: are of no model"):
+        replay(flight, draws=draws)
+
+
 def without(flight: Flight, *names: str) -> Flight:
     return flight.with_streams({key: data.drop_vars(names) for key, data in flight.streams.items()})
 
@@ -112,8 +134,9 @@ def test_a_coax_is_predicted_by_its_observer(monkeypatch: pytest.MonkeyPatch) ->
     coax = sp.vehicle("coax")
     flown = sp.simulate_maneuver(coax, "doublet:pitch,0.5s,0.1", controller=sp.hover_hold, lead=3, tail=3)
     log = sp.observe(flown, coax, sensors=QUIET, seed=1).condition(rate=100, cutoff=0)
-    found = replay(log, model=coax, ahead=1.0)
+    found = replay(log, model=coax, draws=[coax], ahead=1.0)
     assert found.predicted is not None
+    np.testing.assert_array_equal(found.drawn, found.predicted[None])
     assert any("drawn as at hover" in note for note in found.notes)
     assert any("no battery voltage" in note for note in found.notes) == ("voltage" not in log)
     there = np.isfinite(found.predicted[:, 0])
@@ -140,7 +163,8 @@ def test_the_page_gets_everything_it_draws(shown: Replay) -> None:
     assert told["time"][0] == 0.0
     low, high = shown.vehicle.input_limits[0]
     assert told["inputs"][0] == {"name": "theta0", "unit": "rad", "low": low, "high": high}
-    body, inputs, rotors, bar, tail, ghost = told["moments"][60]
+    body, inputs, rotors, bar, tail, ghost, fan = told["moments"][60]
+    assert (fan, told["drawn"]) == (None, 0)
     assert body == pytest.approx(shown.states[60, :12].tolist(), rel=1e-4, abs=1e-6)
     assert (len(inputs), len(rotors), bar, len(tail), len(ghost)) == (4, 1, None, 2, 12)
     assert floor(shown) > np.max(shown.states[:, 2])

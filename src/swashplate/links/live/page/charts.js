@@ -49,10 +49,11 @@ function drawnPlainly(make) {
 }
 
 class Chart {
-  constructor(home, panel, plain) {
+  constructor(home, panel, plain, fan) {
     this.panel = panel;
     const n = panel.names.length;
-    this.data = Array.from({ length: 1 + n * (panel.ghost ? 2 : 1) }, () => []);
+    this.fan = fan && panel.ghost;
+    this.data = Array.from({ length: 1 + n * (this.fan ? 4 : panel.ghost ? 2 : 1) }, () => []);
     this.box = document.createElement("figure");
     this.box.className = "chart";
     this.box.dataset.chart = panel.title.toLowerCase();
@@ -75,15 +76,23 @@ class Chart {
     const dash = (i) => (!panel.band || i === 0 ? undefined : i === 3 ? [2, 3] : [6, 3]);
     for (let i = 0; i < n; i++) series.push(line(panel.band && i < 3 ? 0 : i, dash(i)));
     if (panel.ghost) for (let i = 0; i < n; i++) series.push(line(i, [5, 4]));
+    if (this.fan) for (let i = 0; i < 2 * n; i++) series.push({ points: { show: false } }); // lowest and highest of all
     const axis = { stroke: "#444", font: "11px system-ui", grid: { stroke: "#e3e6e8" }, ticks: { show: false } };
     const make = () => new uPlot({
       width: 300, height: 110, legend: { show: false }, cursor: { show: false }, series,
-      bands: panel.band ? [{ series: [3, 2], fill: `${COLORS[0]}2e` }] : [],
+      bands: panel.band ? [{ series: [3, 2], fill: `${COLORS[0]}2e` }]
+        : this.fan ? panel.names.map((_, i) => ({ series: [3 * n + 1 + i, 2 * n + 1 + i], fill: `${COLORS[i]}40` })) : [],
       scales: { x: { time: false }, y: { range: (_, low, high) => this.fixed ?? spread(low, high, panel.band ? 1e-9 : 0.05) } },
       hooks: { draw: [(plot) => this.#mark(plot)] },
       axes: [{ ...axis, size: 22, space: 60 }, { ...axis, size: 46, space: 24 }],
     }, this.data, this.canvas);
     this.plot = plain ? drawnPlainly(make) : make();
+  }
+  // Lowest and highest of the drawn models, by line.
+  spread(rows) {
+    const { panel } = this, here = rows?.filter(Boolean).map((x) => panel.read({ x })) ?? [];
+    const most = (pick) => panel.names.map((_, i) => (here.length ? pick(...here.map((values) => values[i])) : null));
+    return [...most(Math.min), ...most(Math.max)];
   }
   resize() {
     const width = this.canvas.clientWidth, height = Math.max(80, this.box.clientHeight - this.box.firstChild.clientHeight - 2);
@@ -116,10 +125,10 @@ function spread(low, high, floor = 0.05) {
 }
 
 export class Charts {
-  constructor(home, inputs, { seconds = 20, whole = false, plain = false, estimates = [] } = {}) {
+  constructor(home, inputs, { seconds = 20, whole = false, plain = false, estimates = [], fan = false } = {}) {
     home.replaceChildren();
     this.seconds = seconds;
-    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped, estimates).map((panel) => new Chart(home, panel, plain));
+    this.charts = panels(inputs, whole ? (v) => DEG * v : wrapped, estimates).map((panel) => new Chart(home, panel, plain, fan));
     this.pending = false;
     new ResizeObserver(() => this.charts.forEach((chart) => chart.resize())).observe(home);
   }
@@ -127,7 +136,7 @@ export class Charts {
     for (const { data } of this.charts) data.forEach((column) => (column.length = 0));
   }
   // One more sample at time t; drawn when `draw` is called.
-  add(t, own, ghost, estimates = []) {
+  add(t, own, ghost, estimates = [], fan = null) {
     for (const chart of this.charts) {
       const { data, panel } = chart, n = panel.names.length;
       if (data[0].length && t <= data[0].at(-1)) continue;
@@ -137,6 +146,7 @@ export class Charts {
         const values = ghost ? panel.read(ghost) : Array(n).fill(null);
         values.forEach((value, i) => data[1 + n + i].push(value));
       }
+      if (chart.fan) chart.spread(fan).forEach((value, i) => data[1 + 2 * n + i].push(value));
       let old = 0;
       while (data[0][old] < t - this.seconds) old += 1;
       if (old > 30) data.forEach((column) => column.splice(0, old));
@@ -154,7 +164,7 @@ export class Charts {
     }
   }
   // A whole flight; a craft that is null is a gap. What is predicted does not widen the scale.
-  fill(times, crafts, ghosts) {
+  fill(times, crafts, ghosts, fans = []) {
     for (const chart of this.charts) {
       const { panel } = chart, n = panel.names.length;
       const own = crafts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null)));
@@ -164,6 +174,10 @@ export class Charts {
       const other = panel.ghost ? ghosts.map((craft) => (craft ? panel.read(craft) : Array(n).fill(null))) : [];
       chart.data = [times, ...panel.names.map((_, i) => own.map((row) => row[i]))];
       if (panel.ghost) chart.data.push(...panel.names.map((_, i) => other.map((row) => row[i])));
+      if (chart.fan) {
+        const rows = fans.map((fan) => chart.spread(fan));
+        chart.data.push(...Array.from({ length: 2 * n }, (_, i) => rows.map((row) => row[i])));
+      }
       chart.plot.setData(chart.data);
     }
   }

@@ -20,6 +20,7 @@ try {
 }
 const instruments = new Instruments($("instruments")), pace = new Pace(Boolean(scene?.software));
 let charts = null, hello = null, now = null, before = null, arrived = 0, drawn = 0, drawnTime = 0, chartsAt = 0;
+let fanBegun = null;
 let number = 0, sent = "", latency = null;
 const underway = new Map(); // stick messages by number and when they were sent
 
@@ -32,7 +33,7 @@ function heard(message) {
     hello = message;
     $("title").textContent = hello.title;
     document.title = `${hello.title} · swash live`;
-    charts = new Charts($("charts"), hello.inputs, { plain: Boolean(scene?.software), estimates: hello.estimates });
+    charts = new Charts($("charts"), hello.inputs, { plain: Boolean(scene?.software), estimates: hello.estimates, fan: hello.fan > 0 });
     scene?.show(hello.picture);
     panel.hello(hello);
     now = before = null;
@@ -52,8 +53,10 @@ function heard(message) {
     for (const old of underway.keys()) if (old <= now.stick) underway.delete(old);
   }
   if (!before || now.t > before.t) {
-    charts.add(now.t, now.own, now.ghost, now.estimates);
+    charts.add(now.t, now.own, now.ghost, now.estimates, now.fan?.x);
     for (const name of ["own", "ghost"]) if (now[name]) scene?.leaveTrail(name, now[name].x);
+    if (now.fan) scene?.leaveFan(now.fan.x, { anew: now.fan.begun !== fanBegun });
+    fanBegun = now.fan?.begun ?? null;
   }
   panel.now = now; // what buttons act on is never older than what was heard
   pace.told(now);
@@ -73,6 +76,7 @@ function draw() {
   drawnTime = time;
   const rows = {};
   for (const name of ["own", "ghost"]) if (now[name]) rows[name] = ahead(name, late);
+  rows.fan = now.fan?.x;
   scene?.draw(rows, now, elapsed);
   panel.show(now, latency);
   instruments.show(now.own, hello.voltages ? `${now.setting.voltage.toFixed(2)} V` : "", hello.picture.rpm);

@@ -102,6 +102,8 @@ export class Panel {
     $("learn-row").hidden = !hello.learns;
     $("about").hidden = !hello.about;
     $("about").textContent = hello.about;
+    $("fan").hidden = !hello.fan;
+    $("fan").textContent = `Thin lines and shaded: ${hello.fan} models that the fit cannot tell from this one, under the same sticks, anew every ${hello.fan_seconds} s.`;
     if (hello.voltages) [$("voltage").min, $("voltage").max] = hello.voltages;
     $("controller").textContent = `Controller: ${hello.controller}, ${hello.rate.toFixed(0)} Hz.`;
     $("trust").textContent = `Where the card may be trusted: ${hello.trust}`;

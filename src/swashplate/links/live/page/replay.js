@@ -46,7 +46,7 @@ function play(on) {
 
 function draw(now) {
   const k = at(time), own = craft(flight.moments[k]), ghost = flight.moments[k][5];
-  const rows = { own: own.x }, moment = { own };
+  const rows = { own: own.x, fan: flight.moments[k][6] }, moment = { own };
   if (ghost) {
     rows.ghost = ghost;
     moment.ghost = own; // its discs are not predicted for drawing
@@ -60,6 +60,8 @@ function draw(now) {
         scene.leaveTrail("own", flight.moments[i][0]);
         if (flight.moments[i][5]) scene.leaveTrail("ghost", flight.moments[i][5]);
       }
+      leaveWholeFan(k);
+      dirty = !playing; // what was left behind is in the next picture
     }
   }
   draw.time = time;
@@ -69,6 +71,16 @@ function draw(now) {
     chartsAt = now;
     charts.mark(time, own);
   }
+}
+
+// All of the lines that began together, also what is still ahead.
+function leaveWholeFan(k) {
+  const begun = flight.begun?.[k] ?? -1;
+  if (!flight.drawn) return;
+  let first = k, last = k;
+  while (first > 0 && flight.begun[first - 1] === begun) first -= 1;
+  while (last + 1 < flight.begun.length && flight.begun[last + 1] === begun) last += 1;
+  for (let i = first; i <= last; i++) if (flight.moments[i][6]) scene.leaveFan(flight.moments[i][6]);
 }
 
 function frame(now) {
@@ -99,7 +111,8 @@ $("title").textContent = flight.title;
 document.title = `${flight.title} · swash replay`;
 $("simulated").hidden = !flight.simulated;
 $("state").textContent = flight.vehicle;
-$("told").textContent = flight.ahead ? `Blue and dashed: the model, anew every ${flight.ahead} s.` : "";
+const fan = flight.drawn ? ` Thin lines and shaded: ${flight.drawn} models that the fit cannot tell from it.` : "";
+$("told").textContent = flight.ahead ? `Blue and dashed: the model, anew every ${flight.ahead} s.${fan}` : "";
 $("notes").replaceChildren(
   ...flight.notes.map((words) => Object.assign(document.createElement("p"), { textContent: words })),
 );
@@ -113,7 +126,7 @@ window.addEventListener("keydown", (event) => {
   else return;
   event.preventDefault();
 });
-charts = new Charts($("charts"), flight.inputs, { whole: true, plain: Boolean(scene?.software) });
+charts = new Charts($("charts"), flight.inputs, { whole: true, plain: Boolean(scene?.software), fan: flight.drawn > 0 });
 scene?.show(flight.picture);
 const step = flight.time.length > 1 ? flight.time[Math.floor(flight.time.length / 2)] - flight.time[Math.floor(flight.time.length / 2) - 1] : 1;
 const broken = (k) => k > 0 && flight.time[k] - flight.time[k - 1] > 2.5 * step;
@@ -121,6 +134,7 @@ charts.fill(
   flight.time,
   flight.moments.map((moment, k) => (broken(k) ? null : craft(moment))),
   flight.moments.map((moment) => moment[5] && { x: moment[5] }),
+  flight.moments.map((moment) => moment[6]),
 );
 charts.onPick(go);
 go(0);

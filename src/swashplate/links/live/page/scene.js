@@ -1,8 +1,9 @@
 // The scene: ground and grid, one or two helicopters with trails and shadows, and three cameras.
 import * as THREE from "./vendor/three.module.min.js";
+import { Fan } from "./fan.js";
 import { Helicopter } from "./helicopter.js";
+import { Trail } from "./trail.js";
 
-const TRAIL = 900;
 const COLORS = { own: 0xd55e00, ghost: 0x56b4e9 };
 const SOFTWARE = /swiftshader|llvmpipe|software/i;
 
@@ -14,32 +15,6 @@ function drawnInSoftware() {
   const name = String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
   gl.getExtension("WEBGL_lose_context")?.loseContext();
   return SOFTWARE.test(name);
-}
-
-class Trail {
-  constructor(color) {
-    this.points = new Float32Array(3 * TRAIL);
-    this.count = 0;
-    this.geometry = new THREE.BufferGeometry();
-    this.geometry.setAttribute("position", new THREE.BufferAttribute(this.points, 3));
-    this.line = new THREE.Line(this.geometry, new THREE.LineBasicMaterial({ color }));
-    this.line.frustumCulled = false;
-    this.clear();
-  }
-  clear() {
-    this.count = 0;
-    this.geometry.setDrawRange(0, 0);
-  }
-  add(x, y, z) {
-    if (this.count === TRAIL) {
-      this.points.copyWithin(0, 3);
-      this.count -= 1;
-    }
-    this.points.set([x, y, z], 3 * this.count);
-    this.count += 1;
-    this.geometry.setDrawRange(0, this.count);
-    this.geometry.attributes.position.needsUpdate = true;
-  }
 }
 
 export class Scene {
@@ -99,6 +74,8 @@ export class Scene {
   // Another vehicle: everything that is drawn of the last one goes.
   show(picture) {
     for (const name of Object.keys(this.crafts)) this.#remove(name);
+    this.fan?.remove();
+    this.fan = null;
     this.picture = picture;
     this.size = picture.size;
     if (this.grid) this.scene.remove(this.grid, this.ground);
@@ -141,9 +118,17 @@ export class Scene {
 
   clearTrails() {
     for (const craft of Object.values(this.crafts)) craft.trail.clear();
+    this.fan?.clear();
   }
 
-  // `rows` are body states by name, `moment` tells the discs; `elapsed` seconds of simulation since the last picture.
+  // Body states of the drawn models at one more moment; `anew` where they begin again.
+  leaveFan(rows, { anew = false } = {}) {
+    this.fan ??= new Fan(this.world, this.size, rows.length);
+    if (anew) this.fan.clear();
+    this.fan.add(rows);
+  }
+
+  // `rows` are body states by name (of "fan" one of each drawn model), `moment` tells the discs; `elapsed` seconds of simulation since the last picture.
   draw(rows, moment, elapsed) {
     for (const name of ["own", "ghost"]) {
       if (!rows[name]) {
@@ -157,6 +142,7 @@ export class Scene {
       plumb.position.set(x[0], x[1], x[2]);
       plumb.scale.z = Math.max(this.floor - x[2], 1e-3);
     }
+    this.fan?.pose(rows.fan);
     this.#look(rows.own);
     this.renderer.render(this.scene, this.camera);
   }

@@ -1,0 +1,182 @@
+"""Bands of predictions: where a model's flights may go, and how much of an unseen flight they hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from swashplate.arrays import Array
+from swashplate.errors import SwashError
+from swashplate.flights.schema import channel as known
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.models.vehicle import Vehicle
+from swashplate.validation import block_bootstrap
+
+SHARES = (50.0, 95.0)
+"""Percent of the flights that each band promises to hold."""
+FEWEST_DRAWS = 39
+"""Between the outermost of so many paths lie 95 % of the flights that the same law made, exactly."""
+NEAR = 3.0
+"""Points between what a band promises and what it holds that are called kept."""
+_WORDS = {
+    "holds": "as promised",
+    "too narrow": "too narrow: neither the model nor gusts as in the flights of its fit explain this motion",
+    "too wide": "wider than this flight needs",
+    "cannot be judged": "the flights are too short to tell",
+}
+
+
+class BandedRecord(NamedTuple):
+    """A record at one horizon, from starts at `time` [s] (s,).
+
+    Attributes:
+        below: how many of the `paths` lie below what came (s, 12).
+        variance: of the paths about the prediction, and `by_parameters`, that of drawn models without gusts (s, 12).
+    """
+
+    time: Array
+    below: Array
+    paths: int
+    variance: Array
+    by_parameters: Array
+
+
+@dataclass(frozen=True)
+class Band:
+    """How much of the unseen flights one band of one channel holds.
+
+    Attributes:
+        channel, unit: which. horizon: seconds ahead.
+        promised, held: percent of the starts inside; low, high: 95 % interval of `held` (block bootstrap over the
+            flight; NaN with fewer than three blocks).
+        sigma: root mean square of the paths about the prediction [unit].
+        by_parameters: percent of its square that the draws of the parameters brought; the rest is the start, the gusts
+            to come and the sensors' noise.
+        starts: how many.
+    """
+
+    channel: str
+    unit: str
+    horizon: float
+    promised: float
+    held: float
+    low: float
+    high: float
+    sigma: float
+    by_parameters: float
+    starts: int
+
+    @property
+    def level(self) -> str:
+        """ "holds" within `NEAR` points; "too narrow" or "too wide" where the interval lies wholly beyond them;
+        otherwise, and without an interval, "cannot be judged"."""
+        if not math.isfinite(self.low):
+            return "cannot be judged"
+        if abs(self.held - self.promised) <= NEAR:
+            return "holds"
+        if self.high < self.promised - NEAR:
+            return "too narrow"
+        return "too wide" if self.low > self.promised + NEAR else "cannot be judged"
+
+    @property
+    def words(self) -> str:
+        """What the band holds, and so."""
+        scatter = f" ({self.low:.0f} to {self.high:.0f})" if math.isfinite(self.low) else ""
+        told = f"the {self.promised:g} % band holds {self.held:.0f} %{scatter}"
+        return f"{self.channel}, {self.horizon:g} s ahead: {told}, {_WORDS[self.level]}"
+
+
+def _told(band: Band) -> str:
+    scatter = f" [{band.low:.0f} to {band.high:.0f}]" if math.isfinite(band.low) else ""
+    return f"{band.held:.0f}{scatter}"
+
+
+ROWS: tuple[tuple[str, Callable[[Band, Band], str]], ...] = (
+    ("50 % band holds", lambda half, _: _told(half)),
+    ("so", lambda half, _: half.level),
+    ("95 % band holds", lambda _, most: _told(most)),
+    ("so", lambda _, most: most.level),
+    ("sigma", lambda half, _: f"{half.sigma * known(half.channel).shown_factor:.3g}"),
+    ("unit", lambda half, _: known(half.channel).shown_unit),
+    ("% by parameters", lambda half, _: f"{half.by_parameters:.0f}"),
+)
+"""What is told of the two bands of a channel: words, and the cell."""
+
+
+def pairs(found: Sequence[Band]) -> list[tuple[Band, Band]]:
+    """The narrow and the wide band of each channel and horizon."""
+    narrow, wide = ([band for band in found if band.promised == share] for share in SHARES)
+    return list(zip(narrow, wide, strict=True))
+
+
+def check_draws(vehicle: Vehicle, draws: Sequence[Vehicle]) -> None:
+    """That drawn models are as many as the bands need, and of the model's equations.
+
+    Raises:
+        SwashError: where not.
+    """
+    if draws and (len(draws) + 1) % (FEWEST_DRAWS + 1):
+        raise SwashError(
+            f"are {len(draws)}, expected {FEWEST_DRAWS}, {2 * FEWEST_DRAWS + 1}, {3 * FEWEST_DRAWS + 2} and so on.",
+            channel="draws",
+            hint="Then a whole number of paths lies outside each band.",
+        )
+    if any(one.state_names != vehicle.state_names or one.input_names != vehicle.input_names for one in draws):
+        raise SwashError("are of another model than the one that is validated.", channel="draws")
+
+
+def bands(by_horizon: Mapping[float, Sequence[BandedRecord]]) -> tuple[Band, ...]:
+    """How much the bands hold, by horizon, promised share and channel.
+
+    A band goes from the k-th lowest path to the k-th highest. A flight by the law of the paths has any rank among n of
+    them with equal probability, so that it lies in the band with 1 - 2k/(n + 1), however few paths there are.
+    """
+    made = []
+    for horizon, records in by_horizon.items():
+        times = [record.time for record in records]
+        variance, own = (
+            np.concatenate([getattr(r, part) for r in records]).mean(axis=0) for part in ("variance", "by_parameters")
+        )
+        share = 100.0 * own / np.maximum(variance, 1e-300)
+        for promised in SHARES:
+            inside = [np.stack([_inside(r, promised), np.ones(r.below.shape)], axis=1) for r in records]
+            sums, drawn = np.concatenate(inside).sum(axis=0), block_bootstrap.drawn(times, inside, horizon=horizon)
+            held = 100.0 * sums[0] / sums[1]
+            for i, name in enumerate(PREDICTED):
+                low, high = block_bootstrap.interval(None if drawn is None else 100.0 * drawn[:, 0, i] / drawn[:, 1, i])
+                sigma, starts = math.sqrt(variance[i]), int(sums[1, i])
+                made.append(
+                    Band(
+                        channel=name,
+                        unit=known(name).unit,
+                        horizon=horizon,
+                        promised=promised,
+                        held=float(held[i]),
+                        low=low,
+                        high=high,
+                        sigma=sigma,
+                        by_parameters=float(share[i]),
+                        starts=starts,
+                    )
+                )
+    return tuple(made)
+
+
+def _inside(record: BandedRecord, promised: float) -> Array:
+    outside = round((record.paths + 1) * (0.5 - 0.005 * promised))
+    return ((record.below >= outside) & (record.below <= record.paths - outside)).astype(float)
+
+
+def in_brief(found: Sequence[Band], horizon: float) -> str:
+    """Which bands at one horizon hold and which do not, in a sentence."""
+    rows = [band for band in found if abs(band.horizon - horizon) < 1e-9]
+    said = []
+    for level, words in _WORDS.items():
+        named = [f"{b.channel} {b.held:.0f} of {b.promised:g} %" for b in rows if b.level == level]
+        if named:
+            said.append(f"{words[0].upper()}{words[1:]}: {', '.join(named)}.")
+    return f"Bands {horizon:g} s ahead. {' '.join(said)}"

@@ -1,0 +1,161 @@
+"""Flights that a model and its gusts might have gone on to make from a start, as the sensors would have shown them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import NDArray
+
+from swashplate.arrays import Array
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.disturbed_model import FilterState, StochasticModel
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.records import Record
+from swashplate.identification.time.beginning import FilterNumbers
+from swashplate.identification.time.kinematics import PREDICTED, measured_states, samples_smoothed
+from swashplate.identification.time.record_filter import RUNS, ahead_of
+from swashplate.models.vehicle import Vehicle
+from swashplate.validation.bands import BandedRecord
+from swashplate.validation.prediction import Predictions, observed, uncertainty
+
+
+class Fan(NamedTuple):
+    """Paths of drawn models about the predictions of one record, by start, samples ahead and body state.
+
+    Attributes:
+        below: how many of the `paths` lie below what came (starts, n, 12); nonsense beyond the record's end.
+        variance: mean square of the paths about the prediction; by_parameters: that of the drawn models' predictions.
+    """
+
+    paths: int
+    below: Array
+    variance: Array
+    by_parameters: Array
+
+    @property
+    def sigma(self) -> Array:
+        """Root mean square of the paths about the prediction (starts, n, 12)."""
+        return np.sqrt(self.variance)
+
+    def at(self, horizon: float, record: Record, starts: NDArray[np.intp]) -> BandedRecord:
+        """One horizon [s], from the first `starts` (those whose horizon lies within the record)."""
+        rows, last = slice(len(starts)), round(horizon / record.dt) - 1
+        parts = (part[rows, last] for part in (self.below, self.variance, self.by_parameters))
+        below, variance, own = parts
+        return BandedRecord(record.time[starts], below, self.paths, variance, own)
+
+
+def spread(
+    draws: Sequence[Vehicle],
+    record: Record,
+    *,
+    noise: Noise,
+    nuisance: Nuisance,
+    predictions: Predictions,
+    truth: Array,
+) -> Fan:
+    """The fan of drawn models about a model's predictions.
+
+    Args:
+        draws, record, noise, nuisance: of `paths`. predictions: of the model itself.
+        truth: body states (n, 12) that came.
+    """
+    starts, about = predictions.starts, predictions.states
+    ahead = about.shape[1]
+    places = np.minimum(starts[:, None] + np.arange(1, ahead + 1), len(truth) - 1)
+    came = truth[places]
+    below, variance, own = (np.zeros(about.shape) for _ in range(3))
+    for path, plain in paths(draws, record, noise=noise, nuisance=nuisance, starts=starts, ahead=ahead):
+        below += path < came
+        variance += (path - about) ** 2 / len(draws)
+        own += (plain - about) ** 2 / len(draws)
+    return Fan(len(draws), below, variance, own)
+
+
+def paths(
+    draws: Sequence[Vehicle],
+    record: Record,
+    *,
+    noise: Noise,
+    nuisance: Nuisance,
+    starts: NDArray[np.intp],
+    ahead: int,
+    seed: int = 0,
+) -> Iterator[tuple[Array, Array]]:
+    """Of each drawn model a path and its prediction from each start: body states (starts, ahead, 12), those of the path
+    as `measured_states` would show them.
+
+    A path begins where the drawn model's own observer saw the aircraft, a draw of that observer's error aside. Gusts,
+    drifts and white accelerations are drawn anew along it, and so is the noise of the sensors. Delays, trims and lever
+    arm are what the record told the model.
+
+    Args:
+        draws: models that a fit cannot tell apart. record: what is predicted.
+        noise: of the model. nuisance: of the record. starts: samples. ahead: how many samples.
+        seed: of all that is random.
+    """
+    random, half = np.random.default_rng(seed), samples_smoothed(record.dt) // 2
+    length = ahead + half
+    for vehicle in draws:
+        seen = observed(vehicle, record, noise=noise, nuisance=nuisance, beyond=length)
+        _, _, Q, R, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
+        roots = [_root(part) for part in (P, Q, R)]
+        parts = []
+        for first in range(0, len(starts), RUNS):
+            here = np.pad(starts[first : first + RUNS], (0, max(0, first + RUNS - len(starts))), mode="edge")
+            aside, kicks, shaken = (
+                random.standard_normal((RUNS, *count, len(root))) @ root.T
+                for root, count in zip(roots, ((), (length,), (length,)), strict=True)
+            )
+            rows = here[:, None] + np.arange(length)
+            begin = jax.tree.map(lambda part, at=here: np.asarray(part)[at], seen.filtered)
+            shown = _shown(seen.model, begin, seen.numbers, seen.commands[rows], seen.voltage[rows], aside, kicks)
+            parts.append(np.asarray(shown) + shaken)
+        readings = np.concatenate(parts)[: len(starts)]
+        before = record.outputs[np.maximum(starts[:, None] + np.arange(1 - half, 1), 0)]  # what the smoothing reaches
+        whole = np.concatenate([before, readings], axis=1)
+        flat = whole.reshape(-1, whole.shape[-1])
+        side_by_side = replace(record, time=np.linspace(0.0, record.dt * (len(flat) - 1), len(flat)), outputs=flat)
+        states = measured_states(side_by_side, nuisance).reshape(*whole.shape[:2], len(PREDICTED))
+        plain = ahead_of(seen.model, seen.filtered, seen.numbers, seen.commands, seen.voltage, starts, ahead)
+        # Where the smoothing reaches no neighbour.
+        yield states[:, half : half + ahead], plain[..., [vehicle.index(name) for name in PREDICTED]]
+
+
+def _root(covariance: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+@partial(jax.jit, static_argnums=0)
+def _shown(
+    model: StochasticModel,
+    begin: FilterState,
+    numbers: FilterNumbers,
+    commands: Float[jax.Array, "runs samples inputs"],
+    voltage: Float[jax.Array, "runs samples"],
+    aside: Float[jax.Array, "runs joined"],
+    kicks: Float[jax.Array, "runs samples joined"],
+) -> Any:
+    """Readings without the sensors' noise (runs, samples, outputs)."""
+    parameters = model.vehicle.parameters(*numbers.parameters)
+    noise, nuisance = Noise(*numbers.noise), Nuisance(*numbers.nuisance)
+
+    def advance(x: Any, acting: Any, now: tuple[Any, Any]) -> Any:
+        return model.step(x, acting, now[0], parameters, now[1])
+
+    def sample(state: FilterState, now: tuple[Any, Any, Any]) -> tuple[FilterState, Any]:
+        following = model.moved(model.predict(state, noise, advance, now[:2]), now[2])
+        seen = model.measure(following.x, nuisance)
+        return following, seen + model.line_seen @ following.line if model.lined else seen
+
+    def run(state: FilterState, aside: Any, told: tuple[Any, Any, Any]) -> Any:
+        return jax.lax.scan(sample, model.moved(state, aside), told)[1]
+
+    return jax.vmap(run)(begin, aside, (commands, voltage, kicks))

@@ -1,0 +1,103 @@
+"""Bands: where the law holds, any rank among the paths is as likely as any other; the words say where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import swashplate as sp
+from simulated_flights import ten_seconds
+from swashplate.errors import SwashError
+from swashplate.filtering.disturbances import Noise
+from swashplate.filtering.nuisance import Nuisance
+from swashplate.identification.core.records import records
+from swashplate.identification.time.kinematics import PREDICTED
+from swashplate.validation.bands import ROWS, BandedRecord, bands, check_draws, in_brief, pairs
+from swashplate.validation.paths import paths
+from swashplate.validation.prediction import predict
+
+
+def _record(width: float, *, seconds: float = 300.0, shift: float = 0.0) -> BandedRecord:
+    """Truths by a standard normal law, a start every second, among 39 paths of another width."""
+    random, starts = np.random.default_rng(3), round(seconds)
+    ways = shift + width * random.standard_normal((39, starts, len(PREDICTED)))
+    below = np.sum(ways < random.standard_normal((starts, len(PREDICTED))), axis=0)
+    ones = np.full(below.shape, width**2)
+    return BandedRecord(np.arange(starts) * 1.0, below, 39, ones, 0.25 * ones)
+
+
+def _levels(record: BandedRecord) -> dict[float, set[str]]:
+    found = bands({0.5: [record]})
+    return {share: {band.level for band in found if band.promised == share} for share in (50.0, 95.0)}
+
+
+def test_bands_of_the_law_itself_hold_what_they_promise_however_few_the_paths() -> None:
+    found = bands({0.5: [_record(1.0, seconds=3000.0)]})
+    for share in (50.0, 95.0):
+        held = np.mean([band.held for band in found if band.promised == share])
+        assert held == pytest.approx(share, abs=0.8)
+    assert {band.level for band in found} == {"holds"}
+    assert {round(band.by_parameters) for band in found} == {25}
+
+
+@pytest.mark.parametrize(
+    ("record", "level"),
+    [
+        (_record(0.5), "too narrow"),
+        (_record(2.0), "too wide"),
+        (_record(1.0, shift=1.5), "too narrow"),
+        (_record(1.0, seconds=5.0), "cannot be judged"),
+    ],
+)
+def test_other_laws_and_flights_that_are_too_short_are_told(record: BandedRecord, level: str) -> None:
+    assert _levels(record)[50.0] == {level}
+
+
+def test_what_a_band_says() -> None:
+    found = bands({0.5: [_record(0.5)]})
+    band = next(one for one in found if (one.channel, one.promised) == ("p", 95.0))
+    assert band.words.startswith(f"p, 0.5 s ahead: the 95 % band holds {band.held:.0f} % ({band.low:.0f} to ")
+    assert "neither the model nor gusts as in the flights of its fit explain" in band.words
+    assert in_brief(found, 0.5).startswith("Bands 0.5 s ahead. Too narrow: ")
+    half, most = next(pair for pair in pairs(found) if pair[0].channel == "p")
+    cells = [cell(half, most) for _, cell in ROWS]
+    assert cells[1] == cells[3] == "too narrow"
+    assert cells[4:6] == [f"{np.degrees(0.5):.3g}", "deg/s"]
+
+
+def test_draws_that_leave_no_whole_number_of_paths_outside_are_refused() -> None:
+    coax = sp.vehicle("coax")
+    check_draws(coax, ())
+    check_draws(coax, [coax] * 79)
+    with pytest.raises(SwashError, match="draws: are 20, expected 39, 79, 119 and so on"):
+        check_draws(coax, [coax] * 20)
+    with pytest.raises(SwashError, match="of another model than the one that is validated"):
+        check_draws(coax, [sp.vehicle("raptor50")] * 39)
+
+
+def test_paths_are_the_models_predictions_with_gusts_and_noise_of_their_own() -> None:
+    coax = sp.vehicle("coax")
+    (record,) = records(ten_seconds().condition(rate=100.0, cutoff=0.0), coax)
+    noise, nuisance = Noise(), Nuisance()
+    made = predict(coax, record, noise=noise, nuisance=nuisance, horizon=1.0, every=0.1, settling=3.0)
+
+    def fan(noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+        given = {"noise": noise, "nuisance": nuisance, "starts": made.starts, "ahead": 100}
+        return next(paths([coax], record, **given, seed=2))  # type: ignore[arg-type]
+
+    path, plain = fan(noise)
+    np.testing.assert_allclose(plain, made.states, atol=1e-9)
+    np.testing.assert_array_equal(fan(noise)[0], path)
+    away = np.std((path - plain)[:-10], axis=0)
+    at = PREDICTED.index
+    assert np.all(away[99, [at("x"), at("phi"), at("r")]] > 2.0 * away[5, [at("x"), at("phi"), at("r")]])
+    assert away[99, at("phi")] > 0.01
+    still = scaled(noise, 0.1)
+    calmer = fan(still)
+    assert np.std(calmer[0] - calmer[1], axis=0)[99, at("r")] < 0.3 * away[99, at("r")]
+
+
+def scaled(noise: Noise, share: float) -> Noise:
+    """Gusts, white accelerations and drifts of another size."""
+    sizes = {n: share * v for n, v in noise._asdict().items() if n.startswith(("gust", "white", "drift"))}
+    return noise._replace(**sizes)
