@@ -16,7 +16,7 @@ import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from swashplate.arrays import Array
+from swashplate.arrays import Array, Complex
 from swashplate.errors import ControllerError
 from swashplate.identification.frequency.handling import delay_words
 from swashplate.identification.responses.crossing_delays import crossing_delays
@@ -177,14 +177,14 @@ def _crossings(w: Array, loop: NDArray[np.complex128]) -> tuple[Array, Array, Ar
     """
     between = CubicSpline(w, loop)
 
-    def roots(of: Callable[[Any], Any], at: NDArray[np.int_]) -> Array:
+    def roots(of: Callable[[Complex], Array], at: NDArray[np.int_]) -> Array:
         return np.array([scipy.optimize.brentq(lambda v: float(of(between(v))), w[i], w[i + 1]) for i in at])
 
-    def turned(value: Any) -> Any:
-        return np.angle(-value)
+    def turned(value: Complex) -> Array:
+        return np.asarray(np.angle(-value))
 
-    def grown(value: Any) -> Any:
-        return np.abs(value) - 1.0
+    def grown(value: Complex) -> Array:
+        return np.asarray(np.abs(value) - 1.0)
 
     opposed = np.flatnonzero(np.diff(np.sign(turned(loop))))
     opposed = opposed[loop[opposed].real <= 0.0]

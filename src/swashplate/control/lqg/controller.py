@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -139,7 +139,13 @@ def _drawn_compiled(count: int, seed: Int[jax.Array, ""], samples: Int[jax.Array
     return each(seed, samples)
 
 
-def true_readings(plan: ObserverPlan, x: Any, force: Any, bias: Any, xp: Backend) -> list[Any]:
+class Readable(Protocol):
+    """A row of a backend's numbers."""
+
+    def __getitem__(self, place: int, /) -> Any: ...
+
+
+def true_readings(plan: ObserverPlan, x: Readable, force: Readable, bias: Readable, xp: Backend) -> list[Any]:
     """All channels of a true state row, without noise; x (states, ...), force (3, ...) and bias (biases, ...) are rows
     of the backend's numbers."""
     body, felt = RigidBody(*(x[i] for i in range(_BODY))), Vector(force[0], force[1], force[2])

@@ -89,7 +89,7 @@ class LqgKind(ControllerKind[Lqg]):
             return traced
         return replace(
             traced,
-            function=sensed_function(controller, traced.function),
+            function=sensed_function(controller, traced),
             start=tuple(controller.memory.tolist()),
             measured=(*RigidBody._fields, *FELT, "voltage", *draw_names(controller.drawn)),
         )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from swashplate.control.kinds import TracedStep
 from swashplate.control.lqg.controller import Lqg, true_readings
 from swashplate.control.lqg.controller_step import Carried, lqg_step, sizes
 from swashplate.control.lqg.law import LAW_MEMORY
@@ -109,8 +110,8 @@ def lqg_function(controller: Lqg) -> Any:
     return casadi.Function("swash_traced", [memory, measured, reference], [result])
 
 
-def sensed_function(controller: Lqg, step: Any) -> Any:
-    """`step` of `lqg_function` behind the simulated sensors, as `SensedStep` flies it.
+def sensed_function(controller: Lqg, traced: TracedStep) -> Any:
+    """The step of `lqg_function` behind the simulated sensors, as `SensedStep` flies it.
 
     Its memory has the sensors' behind it; `measured` is the body's state row, the specific force, the voltage and the
     draws.
@@ -146,7 +147,7 @@ def sensed_function(controller: Lqg, step: Any) -> Any:
     memory, reference = casadi.MX.sym("memory", inner + own.shape[0]), casadi.MX.sym("reference", len(REFERENCES))
     measured = casadi.MX.sym("measured", body + 3 + 1 + controller.drawn)
     y, carried = sensing(memory[inner:], measured[:body], measured[body : body + 3], measured[body + 4 :])
-    found = step(memory[:inner], casadi.vertcat(y, measured[body + 3]), reference)
+    found = traced.function(memory[:inner], casadi.vertcat(y, measured[body + 3]), reference)
     result = casadi.vertcat(found[:inner], carried, found[inner:])
     return casadi.Function("swash_traced", [memory, measured, reference], [result])
 
