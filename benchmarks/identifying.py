@@ -29,7 +29,7 @@ from swashplate.identification.time.output_error import OutputError
 
 WARM = {"output-error": 5.0, "prediction-error": 12.0}
 COLD = 60.0
-FIRST = {"identify, cold": 17.0, "identify, warm": 13.0, "validate, cold": 10.0, "validate, warm": 8.5}
+FIRST = {"identify, cold": 10.0, "identify, warm": 8.0, "validate, cold": 8.0, "validate, warm": 7.0}
 """Seconds of processor time of whole commands, from the start of the program to its report."""
 FIRST_MEMORY = 0.8
 MEMORY = 2.0

@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ import swashplate as sp
 from rolling import OUTPUTS_OF_ROLL, SAME, TRUTH, gusty, rolling
 from simulated_flights import FREE, ten_seconds
 from swashplate.errors import IdentificationError
+from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import POSE, records
 from swashplate.identification.time.output_error import OutputError
@@ -38,7 +40,11 @@ def test_the_cost_that_jax_differentiates_is_the_cost(method: str) -> None:
         )
 
 
-@pytest.mark.parametrize("kind", [PredictionError, OutputError])
+class _TracedError(PredictionError):
+    compiled_by = "XLA"  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize("kind", [PredictionError, _TracedError, OutputError])
 def test_the_traced_cost_of_a_tracked_flight_is_its_cost(kind: Any) -> None:
     coax = sp.vehicle("coax")
     likelihood = kind(
@@ -48,6 +54,12 @@ def test_the_traced_cost_of_a_tracked_flight_is_its_cost(kind: Any) -> None:
     likelihood.refresh(row)
     traced = likelihood.traced()
     np.testing.assert_allclose(traced.function(traced.plan, traced.data, row), likelihood.cost(row), rtol=1e-9)
+    if traced.function is called_cost:
+        cost, gradient = jax.jit(jax.value_and_grad(lambda row: traced.function(traced.plan, traced.data, row)))(row)
+        assert float(cost) == pytest.approx(likelihood.cost(row), rel=1e-12)
+        np.testing.assert_allclose(gradient, likelihood.scores(row)[1], rtol=1e-9)
+        lost = traced.function(traced.plan, traced.data, np.full_like(row, np.nan))
+        assert not np.isfinite(lost)
 
 
 @pytest.mark.proof

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.signal import detrend
-from scipy.stats import f as fisher
+from scipy.special import fdtri
 
 from swashplate.arrays import Array
 from swashplate.errors import IdentificationError
@@ -122,14 +122,14 @@ def stepwise(measured: Array, candidates: Array, names: Sequence[str]) -> Equati
         rest = [i for i in range(len(names)) if i not in chosen]
         gains = [(_partial_f(measured, candidates, chosen, i), i) for i in rest]
         best = max(gains, default=(0.0, -1))
-        limit = float(fisher.ppf(ENTER, 1, n - len(chosen) - 2))
+        limit = float(fdtri(1, n - len(chosen) - 2, ENTER))
         if best[1] < 0 or best[0] < limit or f"+{names[best[1]]}" == (history[-2:] or [""])[0]:
             break
         chosen.append(best[1])
         history.append(f"+{names[best[1]]}")
         for i in list(chosen):
             others = [j for j in chosen if j != i]
-            if _partial_f(measured, candidates, others, i) < float(fisher.ppf(LEAVE, 1, n - len(others) - 2)):
+            if _partial_f(measured, candidates, others, i) < float(fdtri(1, n - len(others) - 2, LEAVE)):
                 chosen.remove(i)
                 history.append(f"-{names[i]}")
     columns = np.column_stack([candidates[:, chosen], np.ones(n)])

@@ -13,6 +13,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
@@ -20,6 +21,7 @@ from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.filter_library import filter_library
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core import robust
+from swashplate.identification.core.called_cost import called_cost
 from swashplate.identification.core.comparison import Comparison
 from swashplate.identification.core.multi_step import Ahead, Places
 from swashplate.identification.core.parameter_row import Entry, Row
@@ -228,7 +230,9 @@ class PredictionError:
         return self._cost(runs), gradient, information
 
     def traced(self) -> TracedCost:
-        """The cost as a function that JAX differentiates."""
+        """The cost as a function that JAX differentiates; in C, as one that it calls."""
+        if self.compiled_by == "C":
+            return TracedCost(called_cost, self, {})
         plan, data = self.traced_at()
         counted = np.zeros(data["voltage"].shape, dtype=bool)
         for padded, here in zip(counted, self.counted, strict=True):
@@ -246,6 +250,30 @@ class PredictionError:
             self._last = asked, self._accumulated(row)
         return self._last[1]
 
+    def slope(self, row: Array) -> tuple[float, Array]:
+        """Cost and gradient, and nothing kept: for samplers, from several threads too."""
+        given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
+        runs, gradient = [run.filtered(*given) for run in self._runs], np.zeros(len(self.row))
+        cost = self._cost(runs)
+        if np.isfinite(cost):
+            for mine, run, counted in zip(self._runs, runs, self.counted, strict=True):
+                gradient += self._gradient(run, counted, *self._moved(mine, run, row))
+        return cost, gradient
+
+    def _gradient(self, run: Filtered, counted: NDArray[np.bool_], d_nu: Array, dS: Array) -> Array:
+        """A record's part, from the slopes of all its innovations and of their covariance."""
+        Li = np.linalg.inv(np.linalg.cholesky(np.asarray(run.begin.gain.covariance)))
+        white = run.innovations[counted] @ Li.T
+        weighted = white * robust.weights(white)
+        pull = np.zeros_like(run.innovations)
+        pull[counted] = weighted @ Li
+        dM = Li @ dS @ Li.T
+        gradient = d_nu.reshape(len(d_nu), -1) @ pull.ravel()
+        gradient += 0.5 * white.shape[0] * np.trace(dM, axis1=1, axis2=2)
+        # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
+        gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(Li))), weighted.T @ white)
+        return np.asarray(gradient)
+
     def _accumulated(self, row: Array) -> _Accumulated:
         p, runs = len(self.row), self.runs(row)
         moved: list[tuple[Array, Array]] = []
@@ -256,18 +284,12 @@ class PredictionError:
             if not np.isfinite(nu).all():
                 return gradient, information, runs, moved
             d_nu, dS = self._moved(mine, run, row)
+            gradient += self._gradient(run, counted, d_nu, dS)
             Li = np.linalg.inv(np.linalg.cholesky(S))
-            white = nu @ Li.T
-            weight = robust.weights(white)
-            d_white = (d_nu[:, counted].reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             dM = Li @ dS @ Li.T
-            gradient += d_white.reshape(p, -1) @ (white * weight).ravel()
-            gradient += 0.5 * nu.shape[0] * np.trace(dM, axis1=1, axis2=2)
-            # d(L^-1) = -L^-1 Phi(dM), Phi: the lower triangle with half the diagonal.
-            gradient -= np.einsum("pij,ij->p", np.tril(dM) * (1.0 - 0.5 * np.eye(len(S))), (white * weight).T @ white)
             told = (self._foreseen(d_nu[:, counted], nu, mine.log).reshape(-1, len(S)) @ Li.T).reshape(p, -1, len(S))
             moved.append((told, dM))
-            weighted = told.reshape(p, -1) * np.sqrt(weight).ravel()
+            weighted = told.reshape(p, -1) * np.sqrt(robust.weights(nu @ Li.T)).ravel()
             information += weighted @ weighted.T
             information += _by_covariance(dM, nu.shape[0])
         return gradient, information, runs, moved
