@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -26,7 +27,7 @@ _ARGUMENTS = {
     "run_along": "ld" + 9 * "*",
     "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*",
     "run_ahead": "lld" + 5 * "*" + "i*",
-    "rates_and_slopes": 6 * "*",
+    "rates_and_slopes": "l" + 6 * "*",
 }
 
 
@@ -50,10 +51,10 @@ class FilterLibrary:
         self.directions, self.roots = int(self._c.directions()), int(self._c.roots())
 
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
-        """As `dynamics.rates_and_slopes`; slopes by the voltage are left at zero."""
-        n = len(x)
-        found = np.empty(n), np.empty((n, n)), np.empty((n, len(w)))
-        self._c.rates_and_slopes(*map(flat, (x, w, p)), *found)
+        """As `dynamics.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""
+        front, n, m = x.shape[:-1], x.shape[-1], w.shape[-1]
+        found = np.empty((*front, n)), np.empty((*front, n, n)), np.empty((*front, n, m))
+        self._c.rates_and_slopes(math.prod(front), *map(flat, (x, w, p)), *found)
         return found
 
 
