@@ -11,12 +11,18 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.errors import ExportError
+from swashplate.errors import SwashError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
 
 _OPTIONS = ("-O1", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
-_QUIET = ("-Wno-unused-variable", "-Wno-unused-but-set-variable", "-Wno-psabi", "-Wno-unknown-warning-option")
+_QUIET = (
+    "-Wno-unused-variable",
+    "-Wno-unused-but-set-variable",
+    "-Wno-psabi",
+    "-Wno-missing-braces",
+    "-Wno-unknown-warning-option",
+)
 _KINDS = {
     "l": ctypes.c_long,
     "d": ctypes.c_double,
@@ -70,5 +76,8 @@ def filter_library(model: StochasticModel) -> FilterLibrary | None:
         return None
     try:
         return FilterLibrary(model)
-    except ExportError:
+    except (
+        SwashError,
+        OSError,
+    ):  # equations that are not printed, a compiler that refuses, a library that does not load
         return None
