@@ -221,7 +221,8 @@ void run_moved(long n, double dt, const double *start, const double *g, const do
                const double *d_commands, double *out);
 void run_ahead(long runs, long ahead, double dt, const double *states, const double *g, const double *p,
                const double *commands, const double *voltage, const long *starts, double *out);
-void rates_and_slopes(const double *x, const double *w, const double *p, double *k, double *by_x, double *by_w);
+void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
+                      double *by_w);
 int directions(void);
 int roots(void);
 
@@ -288,8 +289,7 @@ void run_ahead(long runs, long ahead, double dt, const double *states, const dou
   }
 }
 
-/* The rates (N), and their slopes by the states (N, N) and by inputs and wind (N, W). */
-void rates_and_slopes(const double *x, const double *w, const double *p, double *k, double *by_x, double *by_w) {
+static void slopes_at(const double *x, const double *w, const double *p, double *k, double *by_x, double *by_w) {
   double c[C], cp[CP], root[R];
   vec dx[N], dw[W], dp[P], dcp[CP], dc[C], dk[N];
   of_card(p, cp), of_inputs(w, p, cp, c), moving(x, w, p, cp, c, root, 0, k);
@@ -306,6 +306,13 @@ void rates_and_slopes(const double *x, const double *w, const double *p, double 
         if (first + l < N) by_x[i * N + first + l] = dk[i][l];
         else by_w[i * W + first + l - N] = dk[i][l];
   }
+}
+
+/* By row: the rates (N), and their slopes by the states (N, N) and by inputs and wind (N, W). */
+void rates_and_slopes(long rows, const double *x, const double *w, const double *p, double *k, double *by_x,
+                      double *by_w) {
+  for (long i = 0; i < rows; ++i)
+    slopes_at(x + i * N, w + i * W, p + i * P, k + i * N, by_x + i * N * N, by_w + i * N * W);
 }
 
 int directions(void) { return V; }

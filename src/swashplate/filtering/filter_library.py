@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -10,12 +11,18 @@ import numpy as np
 
 from swashplate.arrays import Array
 from swashplate.compiled import NATIVE, can_compile, loaded
-from swashplate.errors import ExportError
+from swashplate.errors import SwashError
 from swashplate.filtering.disturbed_model import StochasticModel
 from swashplate.filtering.filter_c import filter_source
 
 _OPTIONS = ("-O1", NATIVE, "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
-_QUIET = ("-Wno-unused-variable", "-Wno-unused-but-set-variable", "-Wno-psabi", "-Wno-unknown-warning-option")
+_QUIET = (
+    "-Wno-unused-variable",
+    "-Wno-unused-but-set-variable",
+    "-Wno-psabi",
+    "-Wno-missing-braces",
+    "-Wno-unknown-warning-option",
+)
 _KINDS = {
     "l": ctypes.c_long,
     "d": ctypes.c_double,
@@ -26,7 +33,7 @@ _ARGUMENTS = {
     "run_along": "ld" + 9 * "*",
     "run_moved": "ld" + 7 * "*" + "ll" + 3 * "*" + "ll" + 2 * "*",
     "run_ahead": "lld" + 5 * "*" + "i*",
-    "rates_and_slopes": 6 * "*",
+    "rates_and_slopes": "l" + 6 * "*",
 }
 
 
@@ -50,10 +57,10 @@ class FilterLibrary:
         self.directions, self.roots = int(self._c.directions()), int(self._c.roots())
 
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
-        """As `dynamics.rates_and_slopes`; slopes by the voltage are left at zero."""
-        n = len(x)
-        found = np.empty(n), np.empty((n, n)), np.empty((n, len(w)))
-        self._c.rates_and_slopes(*map(flat, (x, w, p)), *found)
+        """As `dynamics.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""
+        front, n, m = x.shape[:-1], x.shape[-1], w.shape[-1]
+        found = np.empty((*front, n)), np.empty((*front, n, n)), np.empty((*front, n, m))
+        self._c.rates_and_slopes(math.prod(front), *map(flat, (x, w, p)), *found)
         return found
 
 
@@ -69,5 +76,8 @@ def filter_library(model: StochasticModel) -> FilterLibrary | None:
         return None
     try:
         return FilterLibrary(model)
-    except ExportError:
+    except (
+        SwashError,
+        OSError,
+    ):  # equations that are not printed, a compiler that refuses, a library that does not load
         return None

@@ -179,9 +179,10 @@ def joined_at(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) ->
 
 
 def numbers_and_constants(vehicle: Vehicle, parameters: Array) -> Array:
-    """Parameters and constant surroundings, as the equations take them."""
-    around = environment_of(vehicle, parameters=vehicle.parameters(*parameters.tolist()))
-    return np.array([*parameters, *(getattr(around, name) for name in CONSTANTS)])
+    """Parameters (..., parameters) and constant surroundings behind them, as the equations take them."""
+    around = environment_of(vehicle, parameters=vehicle.parameters(*np.moveaxis(parameters, -1, 0)))
+    constants = [np.broadcast_to(getattr(around, name), parameters.shape[:-1]) for name in CONSTANTS]
+    return np.concatenate([parameters, np.stack(constants, axis=-1)], axis=-1)
 
 
 def _rates_and_slopes(model: StochasticModel) -> Slopes:
@@ -197,14 +198,17 @@ def _driving(inputs: Array, voltage: float) -> Array:
 
 def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, voltage: float) -> tuple[Array, Array]:
     """Slopes of the rates by states and disturbances, by row."""
-    vehicle, by_x, by_gust, taken = model.vehicle, [], [], _rates_and_slopes(model)
-    pushes = np.eye(len(vehicle.state_names))[:, model.disturbed]
+    vehicle, library = model.vehicle, filter_library(model)
+    driving = np.column_stack([inputs, np.zeros((len(x), 3)), np.full(len(x), voltage)])
+    rows = x, driving, numbers_and_constants(vehicle, parameters)
+    if library is None:
+        each = [rates_and_slopes(model.equations, *row) for row in zip(*rows, strict=True)]
+        _, by_x, by_driving = (np.array(parts) for parts in zip(*each, strict=True))
+    else:
+        _, by_x, by_driving = library.rates_and_slopes(*rows)
+    pushes = np.broadcast_to(np.eye(len(vehicle.state_names))[:, model.disturbed], (*by_x.shape[:2], N_DISTURBANCES))
     wind = len(vehicle.input_names) + np.arange(model.n_gusts - N_DISTURBANCES)
-    for state, u, p in zip(x, inputs, parameters, strict=True):
-        _, by_state, by_driving = taken(state, _driving(u, voltage), numbers_and_constants(vehicle, p))
-        by_x.append(np.asarray(by_state))
-        by_gust.append(np.concatenate([pushes, np.asarray(by_driving)[:, wind]], axis=1))
-    return np.array(by_x), np.array(by_gust)
+    return by_x, np.concatenate([pushes, by_driving[:, :, wind]], axis=2)
 
 
 def _measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
