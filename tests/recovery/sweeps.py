@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from one_step import one_step
 from scipy.signal import lfilter
 
 import swashplate as sp
 from swashplate.arrays import Array
 from swashplate.flights.flight import Flight
+from swashplate.identification.core.parameters import parameterize
+from swashplate.identification.core.records import records
+from swashplate.identification.time.following_error import FollowingError
+from swashplate.identification.time.identify import SHORTEST
+from swashplate.identification.time.noise_entries import in_wind
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.sensors import MotionCapture
+from swashplate.simulation.trim import Trim
+
+Hold = Callable[[Vehicle, Trim], Any]
 
 MANEUVER = "sweep:pitch,0.5-8Hz,34s"
 """The band that Fankhauser et al. flew; 40 s with the hover before and after it."""
@@ -39,14 +50,19 @@ def flown() -> Flight:
     return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold)
 
 
-def flown_in_gusts(seed: int, *, sigma: float, fade: float = 1.0, rate: float = 100.0) -> Flight:
-    """The same in horizontal gusts: Ornstein-Uhlenbeck, standard deviation `sigma` [m/s], fading in `fade` [s]."""
+def flown_in_gusts(
+    seed: int, *, sigma: float, fade: float = 1.0, rate: float = 100.0, controller: Hold = sp.hover_hold
+) -> Flight:
+    """The same in horizontal gusts: Ornstein-Uhlenbeck, standard deviation `sigma` [m/s], fading in `fade` [s].
+
+    `hover_hold` leaves roll and pitch to themselves, an open loop in what is identified; `state_hold` keeps all states.
+    """
     random = np.random.default_rng(seed)
     keep = np.exp(-1.0 / (rate * fade))
     steps = sigma * np.sqrt(1.0 - keep**2) * random.standard_normal((2, SAMPLES))
     north, east = (lfilter([1.0], [1.0, -keep], row) for row in steps)
     wind = {"wind_north": north, "wind_east": east}
-    return sp.simulate_maneuver(truth(), MANEUVER, controller=sp.hover_hold, wind=wind, rate=rate)
+    return sp.simulate_maneuver(truth(), MANEUVER, controller=controller, wind=wind, rate=rate)
 
 
 @dataclass(frozen=True)
@@ -57,11 +73,13 @@ class Recovery:
         names: parameters.
         error: estimate less truth.
         sigma: predicted standard deviation (corrected for coloured residuals).
+        noise: numbers of the noise, where they were estimated.
     """
 
     names: tuple[str, ...]
     error: Array
     sigma: Array
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def distance(self) -> Array:
@@ -89,4 +107,15 @@ def recover(
         names=tuple(estimate.name for estimate in free),
         error=np.array([estimate.value - known[estimate.name] for estimate in free]),
         sigma=np.array([estimate.sigma_corrected for estimate in free]),
+        noise={} if fit.noise is None else {name: float(value) for name, value in fit.noise._asdict().items()},
     )
+
+
+def step_from_truth(flight: Flight, *, seed: int, noise: Mapping[str, float]) -> Recovery:
+    """Where `recover` with a wind would end, to first order (see `one_step`): a tenth of its cost."""
+    vehicle = truth()
+    logged = sp.observe(flight, vehicle, seed=seed).condition(rate=100.0, cutoff=0.0)
+    pieces = [piece for piece in records(logged, vehicle) if piece.time[-1] - piece.time[0] >= SHORTEST]
+    table = parameterize(vehicle, "flight")
+    found = one_step(FollowingError(table, pieces, noise=in_wind(pieces)), vehicle.card.values(), noise)
+    return Recovery(table.names, found.error, found.sigma)

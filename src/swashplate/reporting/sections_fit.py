@@ -33,6 +33,7 @@ def parameters(fit: Result[Any, Any]) -> Section:
     """Every estimated number, with where it comes from."""
     rows = tuple(_row(fit, estimate) for estimate in fit.estimates)
     blocks: list[Block] = [Text(problem, tone="bad") for problem in fit.problems]
+    blocks += [Text(f"{text}.") for text in fit.settings.get("set by the choice", ())]
     blocks += [Text(fit.beside_truth)] if fit.beside_truth else []
     asked_for = in_words(one_step_effects(fit))
     if asked_for:

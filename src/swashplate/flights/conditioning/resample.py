@@ -13,7 +13,7 @@ from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import interpolate
 from swashplate.flights.conditioning.filters import filtered, shortest
 from swashplate.flights.flight import Flight, stream
-from swashplate.flights.schema import QUATERNION
+from swashplate.flights.schema import ATTITUDE, POSITION, QUATERNION
 
 Interval = tuple[float, float]
 _FASTER = 1.02  # how much faster than the new rate a stream is that needs a filter: more than its stamps' jitter
@@ -55,6 +55,9 @@ METHODS = ("linear", "pchip", "spline")
 _QUINTIC = 5
 _SAME = 1e-10
 """s: closer stamps are the same."""
+
+_HOLE = 1.5
+"""Steps of a pose's own stream, or of the new rate, that leave no sample of the new rate without a reading near it."""
 
 _OWN_STEPS = 2.5
 """Steps of a stream's own that are never a gap: one sample may go missing from a slow channel."""
@@ -132,6 +135,23 @@ def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
         pieces = here if pieces is None else common(pieces, here)
     found = pieces or []
     return common(found, list(flight.segments)) if flight.segments else found
+
+
+def _bridges(flight: Flight, pieces: list[Interval], *, rate: float, margin: float) -> list[Interval]:
+    """Stretches inside the pieces in which the pose was not seen for so long that samples there are lines, no readings.
+
+    Args:
+        rate: of the new samples [Hz]. margin: how far a filter carries such a line to either side [s].
+    """
+    found = []
+    for data in flight.streams.values():
+        if {str(name) for name in data.data_vars} & {*POSITION, *ATTITUDE, *QUATERNION}:
+            time = np.asarray(data["time"].values, dtype=np.float64)
+            steps = np.diff(time)
+            holes = np.flatnonzero(steps > _HOLE * max(float(np.median(steps)), 1.0 / rate))
+            found += [(float(time[k]), float(time[k + 1])) for k in holes]
+    inside = [hole for hole in sorted(found) if any(a <= hole[0] and hole[1] <= b for a, b in pieces)]
+    return [(first - margin, last + margin) for first, last in inside]
 
 
 def _check(flight: Flight, *, rate: float, max_gap: float, method: str) -> None:
@@ -251,6 +271,7 @@ def resample(
         },
         anti_alias=ANTI_ALIAS * rate if factor > 1 else None,
         segments=len(segments),
+        bridged=[list(hole) for hole in _bridges(flight, kept, rate=rate, margin=1.0 / rate if factor > 1 else 0.0)],
         dropped_pieces=dropped,
         dropped_seconds=round(sum(b - a for a, b in dropped), 3),
     )

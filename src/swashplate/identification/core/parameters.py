@@ -14,6 +14,7 @@ from swashplate.errors import CardError, ExpressionError, IdentificationError
 from swashplate.filtering.disturbances import SEPARATE
 from swashplate.filtering.nuisance import PUSHES, USUAL_PUSH, Nuisance
 from swashplate.models.card import Card
+from swashplate.models.choices import Choice
 from swashplate.models.choices import Free as Free
 from swashplate.models.linear.expressions import Expression, parse_tie
 from swashplate.models.vehicle import Vehicle
@@ -58,6 +59,7 @@ class Parameterization:
         prior_card: whose correlations the priors have (None: they are independent).
         of_records: constants that every log has of its own, beside the usual ones.
         noises: numbers of the noise that yaw or heave have for themselves.
+        switched: in words, what a ready choice set to another value than the card's.
     """
 
     vehicle: Vehicle
@@ -67,10 +69,16 @@ class Parameterization:
     prior_card: Card | None = None
     of_records: tuple[Free, ...] = ()
     noises: tuple[str, ...] = ()
+    switched: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(free.name for free in self.free)
+
+    @property
+    def switches(self) -> dict[str, list[str]]:
+        """`switched` as a fit's settings have it; empty where there is nothing to say."""
+        return {"set by the choice": list(self.switched)} if self.switched else {}
 
     @property
     def layout(self) -> Layout:
@@ -154,6 +162,7 @@ def parameterize(
     """
     held = dict(fixed or {})
     ready = vehicle.choices
+    switched: tuple[str, ...] = ()
     if isinstance(free, str) and free not in ready and free not in vehicle.parameter_names:
         raise IdentificationError(
             f"'{vehicle.called}' has neither a ready choice nor a parameter '{free}'.",
@@ -165,6 +174,7 @@ def parameterize(
         given = {parse_tie(text)[0] for text in ties} | held.keys()
         wanted = list(choice.free)
         texts = [*(text for text in choice.ties if parse_tie(text)[0] not in given), *ties]
+        switched = _switched(vehicle, choice, held)
         vehicle = vehicle.with_values(dict(choice.fixed))
     else:
         names = [free] if isinstance(free, str) else list(free)
@@ -195,9 +205,20 @@ def parameterize(
         prior_card,
         tuple(item for item in beside if item.name not in SEPARATE),
         tuple(item.name for item in beside if item.name in SEPARATE),
+        switched,
     )
     _check_ties(table)
     return table
+
+
+def _switched(vehicle: Vehicle, choice: Choice, held: Mapping[str, float]) -> tuple[str, ...]:
+    """In words, what a choice sets and the user does not, where the card says something else."""
+    card = vehicle.card.values()
+    return tuple(
+        f"choice '{choice.name}' sets {name} = {value:g} (card: {card[name]:g})"
+        for name, value in choice.fixed
+        if name not in held and value != card[name]
+    )
 
 
 def _from_card(

@@ -37,6 +37,7 @@ class Record:
         voltage_known: False where the flight has no such channel and the card's nominal voltage stands in.
         log: the flight it is a piece of; the pieces of one log share their delays, trims and lever arm.
         left_out: stamps (start, stop) [s] that a filter passes and no criterion counts.
+        bridged: stamps (start, stop) [s] between which the pose was not seen: outputs there are lines.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Record:
     voltage_known: bool
     log: str = ""
     left_out: tuple[tuple[float, float], ...] = ()
+    bridged: tuple[tuple[float, float], ...] = ()
 
     @property
     def dt(self) -> float:
@@ -60,6 +62,14 @@ class Record:
         for first, last in self.left_out:
             counted &= (self.time < first) | (self.time > last)
         return counted
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Samples (n,) whose outputs are readings and no bridge over a gap."""
+        measured = np.ones(self.time.size, dtype=bool)
+        for first, last in self.bridged:
+            measured &= (self.time <= first + _CLOCK) | (self.time >= last - _CLOCK)
+        return measured
 
 
 def seen_of(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[str, ...]:
@@ -174,7 +184,18 @@ def _record(flight: Flight, vehicle: Vehicle, outputs: tuple[str, ...], *, log: 
         output_names=outputs,
         voltage_known=known,
         log=log,
+        bridged=_bridged(flight),
     )
+
+
+def _bridged(flight: Flight) -> tuple[tuple[float, float], ...]:
+    """Where conditioning drew lines over gaps of the pose."""
+    told = [step.details.get("bridged", ()) for step in flight.history if step.operation == "resample"]
+    return tuple((float(first), float(last)) for holes in told for first, last in holes)
+
+
+_CLOCK = 1e-6
+"""Stamps closer than this are the same [s]."""
 
 
 def _refuse_steep(time: Array, pitch: Array, source: str) -> None:

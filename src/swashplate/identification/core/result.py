@@ -329,6 +329,7 @@ class Result(Shown, Generic[Model, Details]):
     def __repr__(self) -> str:
         responses = f", J_ave = {self.cost:.1f} over {len(self.costs)} responses" if self.costs else ""
         lines = [f"{self.name} by {self.method}: {self.state}{responses}"]
+        lines += [f"  {text}" for text in self.settings.get("set by the choice", ())]
         told = getattr(self.details, "lines", None)
         lines += told(self) if told is not None else []
         columns = [(head, cells) for head, cells in self.columns() if any(cells)]

@@ -179,6 +179,7 @@ def identify_flight(
             "free": list(table.names),
             "ties": [f"{name} = {expression.text}" for name, expression in table.ties],
             "held at the prior card": list(table.held),
+            **table.switches,
             **({"constants of every record": [f.name for f in table.of_records]} if table.of_records else {}),
             **({"noise of its own": list(table.noises)} if table.noises else {}),
             **told_horizon(horizon),

@@ -160,7 +160,7 @@ def vehicle_result(
         ties=[Estimate(n, card[n].unit, card[n].value, values[n], tie=tie.text) for n, tie in table.ties],
         method=method,
         data=data,
-        settings={**asked, **settings, "records": sources},
+        settings={**asked, **table.switches, **settings, "records": sources},
         seconds=seconds,
     )
 

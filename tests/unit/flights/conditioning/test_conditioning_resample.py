@@ -46,6 +46,23 @@ def test_short_gaps_are_bridged_and_long_ones_split() -> None:
     assert len(out.split()) == 2
 
 
+def test_bridges_over_holes_in_the_pose_are_told() -> None:
+    """With the sample to either side into which the filter carries them. A frame that the rate does not miss is no
+    hole, nor is one of the commands."""
+
+    def bridged(flight: Flight) -> list[list[float]]:
+        return [list(bridge) for bridge in resample(flight, rate=100.0).history[-1].details["bridged"]]
+
+    t = np.arange(2001) / 200.0
+    whole = Flight({"motion": stream(t, {"x": np.sin(t)}), "inputs": stream(t, {"servo_roll": np.cos(t)})})
+    (bridge,) = bridged(without(without(whole, 3.0 - 1e-9, 3.04 + 1e-9), 6.0, 6.5))
+    np.testing.assert_allclose(bridge, [2.985, 3.055], atol=1e-9)
+    assert bridged(whole) == []
+    assert bridged(without(whole, 3.0 - 1e-9, 3.0 + 1e-9)) == []
+    commands = whole.with_streams({**whole.streams, "inputs": without(whole, 3.0, 3.04).streams["inputs"]})
+    assert bridged(commands) == []
+
+
 def test_pieces_that_are_too_short_are_dropped_and_recorded() -> None:
     flight = without(without(sweep(12.0, 2), 6.0, 6.5), 7.0, 7.5)
     out = resample(flight, rate=100.0)

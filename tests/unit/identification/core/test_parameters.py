@@ -41,7 +41,12 @@ def test_every_choice_starts_inside_what_physics_allows(coax: Vehicle, name: str
 
 def test_a_choice_sets_the_switches_that_it_needs(coax: Vehicle) -> None:
     assert coax.card.values()["bar_heading_transport"] == 0.0
-    assert parameterize(coax, "full").vehicle.card.values()["bar_heading_transport"] == 1.0
+    table = parameterize(coax, "full")
+    assert table.vehicle.card.values()["bar_heading_transport"] == 1.0
+    assert table.switches == {"set by the choice": ["choice 'full' sets bar_heading_transport = 1 (card: 0)"]}
+    assert parameterize(table.vehicle, "full").switches == {}
+    assert parameterize(coax, "full", fixed={"bar_heading_transport": 0.0}).switches == {}
+    assert parameterize(coax, "flight").switches == {}
 
 
 def test_a_name_alone_is_free_without_a_prior(coax: Vehicle) -> None:

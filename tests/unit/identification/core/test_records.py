@@ -29,6 +29,16 @@ def _flight(time: np.ndarray = TIME, **changes: np.ndarray | None) -> Flight:
     return Flight({"uniform": stream(time, channels)}, Provenance(source="a.mat"))
 
 
+def test_samples_on_a_bridge_over_a_gap_are_not_measured() -> None:
+    (record,) = records(_flight(), COAX)
+    assert record.bridged == ()
+    assert record.measured.all()
+    (record,) = records(_flight().done("resample", rate=50.0, bridged=[[1.0, 1.08], [2.99, 3.03]]), COAX)
+    assert record.bridged == ((1.0, 1.08), (2.99, 3.03))
+    np.testing.assert_allclose(record.time[~record.measured], [1.02, 1.04, 1.06, 3.0, 3.02])
+    assert record.counts.all()
+
+
 def test_columns_stand_in_the_vehicles_order() -> None:
     (record,) = records(_flight(), COAX)
     made = _channels()

@@ -18,6 +18,8 @@ from swashplate.identification.core.result import Result
 from swashplate.models.linear.state_space import StateSpaceModel
 from swashplate.models.linear.state_space_file import to_toml
 from swashplate.models.vehicle import Vehicle
+from swashplate.reporting.sections_fit import parameters
+from swashplate.reporting.structure import Text
 
 COVARIANCE = np.array([[0.01, 0.0008], [0.0008, 0.0001]])
 VALUES = {"tau_f_upper": 1.5, "linkage_lower": 0.13}
@@ -127,6 +129,15 @@ def test_draws_are_models_that_the_data_cannot_tell_apart() -> None:
         replace(fit, failed=True).draw(1, seed=0)
     with pytest.raises(IdentificationError, match="linkage_lower: has no standard deviation"):
         result(coax, VALUES, np.diag([0.01, np.inf])).draw(1, seed=0)
+
+
+def test_a_result_says_what_its_choice_set() -> None:
+    told = "choice 'full' sets bar_heading_transport = 1 (card: 0)"
+    fit = report_samples.fit()
+    assert told not in repr(fit)
+    fit = replace(fit, settings={**fit.settings, "set by the choice": [told]})
+    assert f"\n  {told}\n" in repr(fit)
+    assert Text(f"{told}.") in parameters(fit).blocks
 
 
 def test_a_result_shows_itself_in_notebooks() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.special import erf
 
 import swashplate as sp
 from simulated_flights import FREE, TIE, ten_seconds
@@ -16,7 +18,16 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
-from swashplate.identification.time.following_error import FollowingError, _predicted
+from swashplate.identification.time.following_error import (
+    _AWAY,
+    _BODY,
+    _SHARES,
+    FollowingError,
+    _begun,
+    _corrected,
+    _predicted,
+    _spread_inside,
+)
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
 from swashplate.validation.calibration import first_part
 
@@ -62,6 +73,63 @@ def test_a_step_carries_the_covariance_by_the_slopes_of_the_equations() -> None:
     np.testing.assert_allclose(np.concatenate(after), step(whole), rtol=1e-8, atol=1e-10)
     expected = F @ root @ root.T @ F.T
     np.testing.assert_allclose(P - still, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_averages_over_the_air_speed_are_those_of_a_normal_distribution() -> None:
+    """x |x| about any mean: its average and its average slope (by parts: 2 |x|), in units of the spread."""
+    mean = np.linspace(-4.0, 4.0, 81)
+    inside, density = erf(mean / np.sqrt(2.0)), np.exp(-0.5 * mean**2) / np.sqrt(2.0 * np.pi)
+    places = np.append(_AWAY, 0.0) + mean[:, None]
+    values = places * np.abs(places) @ np.append(_SHARES, 1.0 - _SHARES.sum())
+    slopes = places[:, :-1] * np.abs(places[:, :-1]) @ (_SHARES * _AWAY)
+    np.testing.assert_allclose(values, (mean**2 + 1.0) * inside + 2.0 * mean * density, atol=0.012)
+    np.testing.assert_allclose(slopes, 2.0 * (mean * inside + 2.0 * density), rtol=0.007)
+    np.testing.assert_allclose(_SHARES @ _AWAY**2, 1.0, atol=1e-4)  # and parabolas are exact
+
+
+def test_what_was_not_read_tells_nothing() -> None:
+    """A bridge over a gap is no reading: it moves neither state nor covariance, and is not counted."""
+    likelihood = _likelihood()
+    run, (piece,) = likelihood._runs[0], likelihood.pieces
+    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
+    states = likelihood.constant.runs(likelihood.row.starts())[0].states
+    state = jax.tree.map(lambda rows: jnp.asarray(rows[100]), states)
+    joined = sum(len(part) for part in state)
+    P = 1e-4 * jnp.eye(joined)
+
+    @partial(jax.jit, compiler_options=QUICK_TO_COMPILE)
+    def corrected(y: jax.Array) -> tuple[FilterState, jax.Array, jax.Array, jax.Array]:
+        return _corrected(likelihood.model, state, P, y, numbers)
+
+    reading = jnp.asarray(piece.outputs[100])
+    after, told, _, _ = corrected(reading)
+    same, still, nu, _ = corrected(jnp.full_like(reading, jnp.nan))
+    assert np.trace(told) < np.trace(P)
+    assert not np.allclose(after.x, state.x, atol=1e-6)
+    np.testing.assert_array_equal(np.concatenate(same), np.concatenate(state))
+    np.testing.assert_array_equal(still, P)
+    assert not np.any(nu)
+    holed = replace(piece, bridged=((piece.time[199], piece.time[203]),))
+    other = FollowingError(likelihood.table, [holed], noise=likelihood.noise)
+    assert list(np.flatnonzero(np.isnan(other._readings[0][:, 0]))) == [200, 201, 202]
+    assert list(np.flatnonzero(likelihood.counted[0] & ~other.counted[0])) == [200, 201, 202]
+
+
+def test_a_record_begins_with_rotors_that_may_not_have_settled() -> None:
+    """And with air of which nothing is known: the spread of both is in the first covariance."""
+    likelihood = _likelihood()
+    run = likelihood._runs[0]
+    numbers = run.placed(likelihood.table.card_row, np.array(likelihood.noise), likelihood.row.starts())[1]
+    numbers = jax.tree.map(lambda row: np.asarray(row)[None], numbers)
+    (spread,) = likelihood._spread
+    n, noise = len(spread), likelihood.noise
+    assert np.all(np.diag(spread)[_BODY:] > 0.0)
+    assert not np.any(spread[:_BODY])
+    sure, unsure = (np.asarray(_begun(likelihood.model, numbers, run.seen, s)[1][0]) for s in (0.0 * spread, spread))
+    np.testing.assert_allclose((unsure - sure)[:n, :n], spread, atol=1e-12)
+    wind = float(noise.wind) * np.sqrt(0.5 * float(noise.tau_wind))
+    assert np.all(np.sqrt(np.diag(sure))[n + N_DISTURBANCES : n + N_DISTURBANCES + 2] > 0.99 * wind)
+    assert not np.any(_spread_inside(np.full((5, n), np.nan)))
 
 
 def test_the_gradient_is_the_slope_of_the_cost() -> None:
