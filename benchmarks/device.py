@@ -87,8 +87,8 @@ def measure(
         fastest = min(fastest, time.perf_counter() - begin)
     after = single if steps == second else _Compiled(vehicle, vehicles, second, "float32")
     ends = (batch.run()[-1] for batch in (after, _Compiled(vehicle, vehicles, second, "float64")))
-    found, exact = (np.asarray(end, dtype=np.float64) for end in ends)
-    away = np.abs(found - exact) / np.maximum(1.0, np.abs(exact))
+    plain, exact = (np.asarray(end, dtype=np.float64) for end in ends)
+    away = np.abs(plain - exact) / np.maximum(1.0, np.abs(exact))
     rate = vehicles * steps / fastest
     flops, moved = (float(one) for one in single.cost / (vehicles * steps))
     shares = (None, None) if peaks is None else (rate * flops / peaks[0], rate * moved / peaks[1])
@@ -140,10 +140,10 @@ def main() -> None:
     options = parser.parse_args()
     enable_compilation_cache()
     peaks = None if options.flops is None or options.bytes is None else (options.flops, options.bytes)
-    found = measure(load_vehicle(options.vehicle), vehicles=options.vehicles, seconds=options.seconds, peaks=peaks)
-    beside = {"crazyflow": crazyflow(vehicles=options.vehicles, steps=found.steps)} if options.crazyflow else {}
-    promised = {"promised": PROMISED, "kept": found.rate >= PROMISED and found.close}
-    print(json.dumps({**asdict(found), "close": found.close, **promised, **beside}, indent=1))
+    measured = measure(load_vehicle(options.vehicle), vehicles=options.vehicles, seconds=options.seconds, peaks=peaks)
+    beside = {"crazyflow": crazyflow(vehicles=options.vehicles, steps=measured.steps)} if options.crazyflow else {}
+    promised = {"promised": PROMISED, "kept": measured.rate >= PROMISED and measured.close}
+    print(json.dumps({**asdict(measured), "close": measured.close, **promised, **beside}, indent=1))
 
 
 if __name__ == "__main__":

@@ -55,14 +55,14 @@ def responses(*, repeats: int) -> Span:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
     def run() -> None:
-        found = respond(
+        measured = respond(
             flight,
             inputs=[f"in_{i}" for i in range(4)],
             outputs=[f"out_{i}" for i in range(9)],
             band=(0.1, 10.0),
             bystanders=(),
         )
-        assert len(found.windows) == 5
+        assert len(measured.windows) == 5
 
     run()
     seconds = _best(run, repeats)
@@ -85,11 +85,11 @@ def x8(*, repeats: int) -> list[Span]:
     rate = np.radians(degrees)
     own = Flight({"uniform": stream(np.arange(time_.size) / RATE, {"command": command, "p": rate}, {"command": "1"})})
     asked = {"inputs": ["command"], "outputs": ["p"], "band": X8_BAND, "bystanders": ()}
-    found = respond(own, **asked)  # type: ignore[arg-type]
+    measured = respond(own, **asked)  # type: ignore[arg-type]
     seconds = _best(lambda: respond(own, **asked), repeats)  # type: ignore[arg-type]
 
     def fitted() -> TransferFunctionFit:
-        return fit_transfer_function(found, X8_FORM, input="command", band=X8_FITTED)
+        return fit_transfer_function(measured, X8_FORM, input="command", band=X8_FITTED)
 
     cost = fitted().cost
     fitting = _best(fitted, repeats)
@@ -153,18 +153,18 @@ def fit(*, repeats: int) -> Span:
     """A 13-state fit of 40 parameters to 20 and more responses, start values 30 % off, accuracy figures included."""
     true = structure("thirteen_state")
     true = true.with_values({n: 0.1 * p.unit.count("/") or 0.05 for n, p in true.parameters.items() if not p.value})
-    found = _exact(true)
+    measured = _exact(true)
     random = np.random.default_rng(2)
     start = true.with_values({n: true.parameters[n].value * (1 + 0.3 * random.choice([-1, 1])) for n in true.free})
     # Twenty responses: the strongest ones.
-    order = np.argsort(-np.median(np.abs(found.response), axis=0), axis=None)[:20]
-    keep = np.zeros(found.coherence.shape[1:], dtype=bool)
+    order = np.argsort(-np.median(np.abs(measured.response), axis=0), axis=None)[:20]
+    keep = np.zeros(measured.coherence.shape[1:], dtype=bool)
     keep.flat[order] = True
-    found = replace(found, coherence=np.where(keep, found.coherence, 0.0))
+    measured = replace(measured, coherence=np.where(keep, measured.coherence, 0.0))
     count = []
 
     def run() -> None:
-        result = fit_state_space(start, found)
+        result = fit_state_space(start, measured)
         count[:] = [len(result.names), len(result.targets), result.cost]
 
     run()

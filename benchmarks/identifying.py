@@ -145,11 +145,11 @@ def scipy_least_squares(logged: sp.Flight) -> Span:
     lowest, begin = [np.inf], time.perf_counter()
 
     def errors(row: np.ndarray) -> np.ndarray:
-        found = (np.asarray(likelihood.residuals(row)[0]) @ white).ravel()
-        lowest[0] = min(lowest[0], 0.5 * float(found @ found))
+        whitened = (np.asarray(likelihood.residuals(row)[0]) @ white).ravel()
+        lowest[0] = min(lowest[0], 0.5 * float(whitened @ whitened))
         if lowest[0] <= aim + 1.0 or time.perf_counter() - begin > RATIO * ours:
             raise StopIteration
-        return found
+        return whitened
 
     aim = -np.inf
     at_best = (np.asarray(likelihood.residuals(best.row)[0]) @ white).ravel()

@@ -41,19 +41,19 @@ def exchanges(name: str, *, count: int, repeats: int) -> list[Result]:
             link.terminate()
             link.communicate()
     rate, sender = count / min(clock for clock, _, _ in runs), min(own for _, own, _ in runs)
-    found = [Result(f"ArduPilot link, {name}", rate, TARGET, f"{rate / _RATE:.1f} times real time at {_RATE} Hz")]
+    results = [Result(f"ArduPilot link, {name}", rate, TARGET, f"{rate / _RATE:.1f} times real time at {_RATE} Hz")]
     if spent := [link_time for _, _, link_time in runs if link_time is not None]:
         each, others = (1e6 * min(spent) / count, 1e6 * sender / count)
         note = f"{each:.0f} us of the link's processor time; the sender's own {others:.0f}"
-        found.append(Result(f"ArduPilot link, {name}, a second of its processor", count / min(spent), TARGET, note))
-    return found
+        results.append(Result(f"ArduPilot link, {name}, a second of its processor", count / min(spent), TARGET, note))
+    return results
 
 
 def _port(link: subprocess.Popen[str]) -> int:
     assert link.stderr is not None
     for line in link.stderr:
-        if found := re.search(r"UDP 127\.0\.0\.1:(\d+)", line):
-            return int(found[1])
+        if match := re.search(r"UDP 127\.0\.0\.1:(\d+)", line):
+            return int(match[1])
     raise RuntimeError("the link did not start")
 
 

@@ -71,11 +71,11 @@ class Punctual:
 def measure(*, short: bool) -> list[Punctual]:
     """Both kinds of page for 60 s (5 s in the short form); without Chromium only the first."""
     seconds = 5.0 if short else 60.0
-    found = [_reading(seconds)]
+    readings = [_reading(seconds)]
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is not None:
-        found.append(_drawn(seconds, chromium))
-    return found
+        readings.append(_drawn(seconds, chromium))
+    return readings
 
 
 @contextmanager
@@ -84,10 +84,10 @@ def _served() -> Iterator[tuple[str, subprocess.Popen[str]]]:
         command = [sys.executable, "-m", "swashplate", "live", MODEL, "--port", "0", "--out", f"{folder}/live"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            found = re.search(r"http://(\S+)/", process.stdout.readline())
-            assert found is not None
+            match = re.search(r"http://(\S+)/", process.stdout.readline())
+            assert match is not None
             try:
-                yield found[1], process
+                yield match[1], process
             finally:
                 process.send_signal(signal.SIGINT)
 

@@ -24,7 +24,7 @@ def batches(name: str, precision: Precision, *, steps: int, repeats: int, promis
     hover = trim(vehicle)
     start = {**hover.states(), "p": np.linspace(-0.1, 0.1, VEHICLES)}
     inputs = {n: np.full(steps + 1, value) for n, value in zip(vehicle.input_names, hover.inputs, strict=True)}
-    found = []
+    results = []
     engines: dict[Engine, tuple[str, dict[str, float]]] = {"c": ("own C in lanes", TARGETS), "jax": ("vmap", BY_JAX)}
     for engine, (how, targets) in engines.items():
         seconds: list[float] = []
@@ -40,5 +40,5 @@ def batches(name: str, precision: Precision, *, steps: int, repeats: int, promis
         rate = best_rate(run, steps * VEHICLES, repeats=repeats)
         note = f"vehicle steps, all cores; {1e9 * min(seconds) / (steps * VEHICLES):.0f} ns of processor time each"
         target = targets[precision] if promised else None
-        found.append(Result(f"{VEHICLES} {name}, {how}, {precision}", rate, target, note))
-    return found
+        results.append(Result(f"{VEHICLES} {name}, {how}, {precision}", rate, target, note))
+    return results

@@ -40,7 +40,7 @@ def rotor_options(*, steps: int, repeats: int, short: bool) -> list[Result]:
     """One result each: the rate with the option, and in its note the share of the rate without."""
     cases = SHORT if short else CASES
     plain = {name: _loop(name, {}, steps) for name in dict.fromkeys(name for name, _, _ in cases)}
-    found = []
+    results = []
     for name, said, options in cases:
         with_it = _loop(name, options, steps)
         rates = [0.0, 0.0]
@@ -48,5 +48,5 @@ def rotor_options(*, steps: int, repeats: int, short: bool) -> list[Result]:
             for place, run in enumerate((plain[name], with_it)):
                 rates[place] = max(rates[place], best_rate(run, steps, repeats=1))
         note = f"{rates[1] / rates[0]:.2f} of {rates[0]:,.0f} without"
-        found.append(Result(f"{name}, {said}", rates[1], None, note))
-    return found
+        results.append(Result(f"{name}, {said}", rates[1], None, note))
+    return results

@@ -70,11 +70,11 @@ def against_subspaces(*, seconds: float = SECONDS) -> Span:
     begin = time.process_time()
     fit = fit_in_time(parse(_MODEL), flight, shifts=False, method="filter-error")
     ours = time.process_time() - begin
-    found = {e.name: e.value for e in fit.estimates}
-    A = np.array([[found["Zw"], found["Zq"]], [found["Mw"], found["Mq"]]])
-    B = np.array([[found["Zd"]], [found["Md"]]])
+    values = {e.name: e.value for e in fit.estimates}
+    A = np.array([[values["Zw"], values["Zq"]], [values["Mw"], values["Mq"]]])
+    B = np.array([[values["Zd"]], [values["Md"]]])
     note = f"processor time, compiling included; largest error of the response {100 * _error(A, B, np.eye(2)):.1f} %"
-    name = f"state-space model of {len(found)} parameters, {seconds:g} s in gusts"
+    name = f"state-space model of {len(values)} parameters, {seconds:g} s in gusts"
     if find_spec("sippy_unipi") is None:
         return Span(name, ours, WITHIN, f"{note}; SIPPY (sippy-unipi) is not installed: not compared")
     told = [_subspace(method, elevator, measured) for method in _METHODS]

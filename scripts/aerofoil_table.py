@@ -104,10 +104,10 @@ def table_text() -> str:
     ]
     for mach in MACHS:
         for reynolds in REYNOLDS:
-            found = coefficients(mach, reynolds, np.radians(ANGLES))
+            columns = coefficients(mach, reynolds, np.radians(ANGLES))
             lines += [
                 f"{mach:g},{reynolds:g},{angle:g},{lift + 0.0:.4f},{drag:.5f},{moment + 0.0:.4f}"
-                for angle, lift, drag, moment in zip(ANGLES, *found, strict=True)
+                for angle, lift, drag, moment in zip(ANGLES, *columns, strict=True)
             ]
     return "\n".join(lines).replace(",-0.0000", ",0.0000") + "\n"
 

@@ -28,18 +28,18 @@ def locked(text: str) -> list[tuple[str, str, list[str]]]:
     Raises:
         ValueError: for a line that is none of it.
     """
-    found: list[tuple[str, str, list[str]]] = []
+    pins: list[tuple[str, str, list[str]]] = []
     for line in text.splitlines():
         stripped = line.strip().rstrip("\\").strip()
         if not stripped or stripped.startswith("#"):
             continue
         if digest := re.fullmatch(r"--hash=sha256:([0-9a-f]{64})", stripped):
-            found[-1][2].append(digest[1])
+            pins[-1][2].append(digest[1])
         elif pin := re.match(r"([A-Za-z0-9._-]+)(?:\[[^]]*\])?==([^\s;]+)", stripped):
-            found.append((re.sub(r"[-_.]+", "-", pin[1]).lower(), pin[2], []))
+            pins.append((re.sub(r"[-_.]+", "-", pin[1]).lower(), pin[2], []))
         else:
             raise ValueError(f"lock: {line!r} is neither a pinned package nor a hash")
-    return found
+    return pins
 
 
 def _licences(name: str, version: str) -> list[dict[str, Any]]:
@@ -76,14 +76,14 @@ def _of_pip(text: str) -> list[dict[str, Any]]:
 
 
 def _of_npm(text: str) -> list[dict[str, Any]]:
-    found = []
+    components = []
     for place, entry in json.loads(text)["packages"].items():
         if place:
             digest = base64.b64decode(entry["integrity"].removeprefix("sha512-")).hex()
             licence = [{"license": {"id": entry["license"]}}] if "license" in entry else []
             name = place.rpartition("node_modules/")[2]
-            found.append(_component("npm", name, entry["version"], [("SHA-512", digest)], licence))
-    return found
+            components.append(_component("npm", name, entry["version"], [("SHA-512", digest)], licence))
+    return components
 
 
 def bill(root: Path = ROOT) -> dict[str, Any]:

@@ -77,8 +77,8 @@ class Block:
 
 def equations_of(function: Callable[..., Any]) -> str:
     """Equation numbers that a function's docstring cites, as "eqs 9 to 11"."""
-    found = re.search(r"\beqs?\.? (\d+(?:(?:, | and | to )\d+)*)", inspect.getdoc(function) or "")
-    return f"eq. {found[1]}" if found and found[1].isdigit() else f"eqs {found[1]}" if found else ""
+    cited = re.search(r"\beqs?\.? (\d+(?:(?:, | and | to )\d+)*)", inspect.getdoc(function) or "")
+    return f"eq. {cited[1]}" if cited and cited[1].isdigit() else f"eqs {cited[1]}" if cited else ""
 
 
 class Trace:
@@ -155,16 +155,16 @@ class Trace:
 
     def _arrows(self) -> dict[tuple[str, str], list[str]]:
         owner = {name: title for title, block in self.blocks.items() for name in block.states}
-        found: dict[tuple[str, str], list[str]] = {}
+        by_pair: dict[tuple[str, str], list[str]] = {}
         for title, block in self.blocks.items():
             for origin in sorted(block.reads):
                 kind, name, *function = origin.split()
                 source = {"state": owner.get(name, ""), "block": name.replace("~", " ")}.get(kind, name)
                 flows = function[0] if kind == "block" else name
                 if source != title:
-                    found.setdefault((source, title), []).append(flows)
+                    by_pair.setdefault((source, title), []).append(flows)
         order = {name: i for i, name in enumerate(self._aircraft.state_names)}
-        return {k: sorted(v, key=lambda n: (order.get(n, 99), n)) for k, v in found.items()}
+        return {k: sorted(v, key=lambda n: (order.get(n, 99), n)) for k, v in by_pair.items()}
 
 
 def _names_of(module: ModuleType) -> list[str]:

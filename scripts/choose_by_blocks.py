@@ -90,8 +90,8 @@ def learnt(
             criterion = MultiStepErrors(
                 likelihood, optimum.row, pieces, horizon=Horizon(first, last), settling=SETTLING, known=beside
             )
-            found = minimise(criterion, start=criterion.start)
-            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(found.row)
+            solved = minimise(criterion, start=criterion.start)
+            rows[f"{first:g} to {last:g} s ahead, {how}"] = criterion.whole(solved.row)
     for name, row in rows.items():
         numbers = (row * likelihood.row.scale)[: len(table.names)]
         told = Nuisance(*(float(np.asarray(value).ravel()[0]) for value in likelihood.nuisances_of(row)))
@@ -100,11 +100,11 @@ def learnt(
 
 def errors(vehicle: Vehicle, record: Record, noise: Noise, nuisance: Nuisance) -> tuple[Array, Array]:
     """Squared errors and squared movements (starts, 12)."""
-    found = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD, every=EVERY, settling=SETTLING)
+    paths = predict(vehicle, record, noise=noise, nuisance=nuisance, horizon=AHEAD, every=EVERY, settling=SETTLING)
     truth, ahead = measured_states(record, nuisance), round(AHEAD / record.dt)
-    counted = found.starts + ahead < record.time.size - 10  # rates at the end are one-sided
-    first = found.starts[counted]
-    return (found.states[counted, ahead - 1] - truth[first + ahead]) ** 2, (truth[first + ahead] - truth[first]) ** 2
+    counted = paths.starts + ahead < record.time.size - 10  # rates at the end are one-sided
+    first = paths.starts[counted]
+    return (paths.states[counted, ahead - 1] - truth[first + ahead]) ** 2, (truth[first + ahead] - truth[first]) ** 2
 
 
 def main(flight: str, *names: str) -> int:

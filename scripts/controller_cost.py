@@ -62,8 +62,8 @@ def cost(source: Path) -> dict[str, float]:
         stack = sum(int(line.split("\t")[1]) for line in (folder / "step.su").read_text().splitlines())
         text_size, data, bss, *_ = map(int, run("size", "step.o", cwd=folder).splitlines()[1].split()[:3])
         run("valgrind", "--tool=callgrind", "--callgrind-out-file=out", "./driver", cwd=folder)
-        found = [re.search(r"^summary: (\d+)", p.read_text(), re.MULTILINE) for p in folder.glob("out.*")]
-    counts = sorted(int(m[1]) for m in found if m and int(m[1]) > 0)
+        summaries = [re.search(r"^summary: (\d+)", p.read_text(), re.MULTILINE) for p in folder.glob("out.*")]
+    counts = sorted(int(m[1]) for m in summaries if m and int(m[1]) > 0)
     if len(counts) > STEPS:  # the dump at the end of the program holds no step
         counts = counts[1:]
     carried = int(memory) * (8 if real == "double" else 4)

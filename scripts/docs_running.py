@@ -47,16 +47,16 @@ class Fence:
 
 
 def fences(page: str) -> list[Fence]:
-    found: list[Fence] = []
+    fenced: list[Fence] = []
     end = 0
     for match in _FENCE.finditer(page):
         before = page[end : match.start()]
         file = _FILE.search(before)
-        found.append(
+        fenced.append(
             Fence(match[1], match[2], match.start(2), match.end(2), file[1] if file else "", not before.strip())
         )
         end = match.end()
-    return found
+    return fenced
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,8 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
     A page whose Python identifies from real flights runs on short simulated ones instead unless `real`; what it prints
     is then of no interest.
     """
-    found = fences(text)
-    programs = [f for f in found if f.language == "python"]
+    fenced = fences(text)
+    programs = [f for f in fenced if f.language == "python"]
     standing_in = (
         not real
         and any(f"{verb}(" in f.text for f in programs for verb in ("identify", "validate"))
@@ -153,7 +153,7 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
         for name in _PACKAGE.findall(text):
             site = Path(around.enter_context(tempfile.TemporaryDirectory()))
             around.enter_context(installed(name, site))
-        for number, fence in enumerate(found):
+        for number, fence in enumerate(fenced):
             if fence.file:
                 Path(fence.file).write_text(fence.text, encoding="utf-8")
             elif fence.language == "python":
@@ -161,7 +161,7 @@ def run_page(text: str, *, real: bool, data_is_here: bool = True) -> Iterator[Sh
                     yield Shown(fence.text, "", None, fence)
                     return  # what comes after builds on it
                 printed = run_python(fence, namespace)
-                following = found[number + 1] if number + 1 < len(found) else None
+                following = fenced[number + 1] if number + 1 < len(fenced) else None
                 if following and following.language == "text" and following.follows:
                     yield Shown(fence.text, following.text.strip("\n"), None if standing_in else printed, following)
             elif fence.language == "console":

@@ -38,10 +38,10 @@ def main(models: int) -> None:
     fit = sp.identify(sp.vehicle("coax"), august, free="full")
     print("delays [ms]:", {name: round(1e3 * value) for name, value in input_delays(fit.model).items()})
     for air, gusts in (("still air", None), ("gusts of 0.15 m/s", INDOOR)):
-        found = sp.decouple(fit.model, to_speed=SPEED, fit=fit, gusts=gusts, draws=models)
-        assert found.step is not None
-        print(f"\n{air}\n{table(found.step)}")
-        for other, (wins, of) in found.step.nearer_than().items():
+        result = sp.decouple(fit.model, to_speed=SPEED, fit=fit, gusts=gusts, draws=models)
+        assert result.step is not None
+        print(f"\n{air}\n{table(result.step)}")
+        for other, (wins, of) in result.step.nearer_than().items():
             print(f"nearer to straight ahead than {other}: {wins} of {of}")
 
 

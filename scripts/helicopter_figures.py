@@ -253,8 +253,8 @@ def behind_sticks(model: LinearModel, columns: Mapping[str, Array], here: slice)
     basis = np.concatenate([*bases, started, pushed @ model.B], axis=2)
     seen = [model.states.index(name) for name in ("p", "q", "r", "phi", "theta")]
     truth = np.column_stack([columns[model.states[i]][here] for i in seen])
-    found = np.linalg.lstsq(basis[:, seen].reshape(-1, basis.shape[2]), truth.ravel(), rcond=None)[0]
-    return dict(zip(model.states, (basis @ found).T, strict=True))
+    weights = np.linalg.lstsq(basis[:, seen].reshape(-1, basis.shape[2]), truth.ravel(), rcond=None)[0]
+    return dict(zip(model.states, (basis @ weights).T, strict=True))
 
 
 def trex_figure(file: Path) -> None:

@@ -51,7 +51,7 @@ class ClosedLoopErrors:
         return self.base.row
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:
-        vehicle, runs, found = self.base.table.vehicle, self.base.runs(row), []
+        vehicle, runs, by_piece = self.base.table.vehicle, self.base.runs(row), []
         kept = [vehicle.index(name) for name in PREDICTED]
         if not self.laws:
             for piece, run in zip(self.base.pieces, runs, strict=True):
@@ -60,7 +60,7 @@ class ClosedLoopErrors:
         for piece, run, laws, starts in zip(self.base.pieces, runs, self.laws, ahead.starts, strict=True):
             places, steps, last = np.array(starts, dtype=np.intp), np.array(ahead.steps), max(ahead.steps)
             if not places.size:
-                found.append(np.zeros((0, steps.size, piece.outputs.shape[1])))
+                by_piece.append(np.zeros((0, steps.size, piece.outputs.shape[1])))
                 continue
             inputs, voltage = (lengthened(rows, piece.time.size + last) for rows in (piece.inputs, piece.voltage))
             reaching, _ = commands_moved(vehicle, piece.dt, inputs, Nuisance(*run.numbers.nuisance), np)
@@ -69,8 +69,8 @@ class ClosedLoopErrors:
                 model, run.states, numbers, laws, piece.inputs, reaching, voltage, places, last
             )  # (starts, samples, states)
             seen = np.asarray(self._measured(states[:, steps - 1], numbers.nuisance))
-            found.append(piece.outputs[places[:, None] + steps] - seen)
-        return found
+            by_piece.append(piece.outputs[places[:, None] + steps] - seen)
+        return by_piece
 
     def errors_ahead_moved(self, row: Array, ahead: Ahead, places: Places) -> tuple[list[Array], list[Array]]:
         here, moved = self.errors_ahead(row, ahead), []

@@ -85,8 +85,8 @@ def heave(
     truth = slow(measured_force(body, record.dt))
     spread = float(np.var(truth))
 
-    def explained(found: Array) -> float:
-        return 1.0 - float(np.mean((truth - found) ** 2)) / spread
+    def explained(predicted: Array) -> float:
+        return 1.0 - float(np.mean((truth - predicted) ** 2)) / spread
 
     shifts = range(-round(_SHIFT / record.dt), round(_SHIFT / record.dt) + 1)
     nearest = max((slow(np.roll(felt, k)) for k in shifts), key=lambda row: float(np.corrcoef(row, truth)[0, 1]))

@@ -154,9 +154,14 @@ def _subspace_models(training: Sequence[Motion], *, bare: bool, rows: int) -> li
         X = (left[:, :order].T @ along @ past) / np.sqrt(size[:order, None] * past.shape[1] ** 0.5)
         u, y = later_u[:k_u, inside], later_y[:k_y, inside]
         known = np.concatenate([X[:, inside], u])
-        found = np.linalg.lstsq(known.T, np.concatenate([X[:, inside + 1], y]).T, rcond=None)[0].T
-        off = np.concatenate([X[:, inside + 1], y]) - found @ known
-        A, B, C, D = found[:order, :order], found[:order, order:], found[order:, :order], found[order:, order:]
+        solution = np.linalg.lstsq(known.T, np.concatenate([X[:, inside + 1], y]).T, rcond=None)[0].T
+        off = np.concatenate([X[:, inside + 1], y]) - solution @ known
+        A, B, C, D = (
+            solution[:order, :order],
+            solution[:order, order:],
+            solution[order:, :order],
+            solution[order:, order:],
+        )
         spread = off @ off.T / off.shape[1]
         Q, S, R = spread[:order, :order], spread[:order, order:], spread[order:, order:] + 1e-6 * np.eye(k_y)
         P = solve_discrete_are(A.T, C.T, Q, R, s=S)

@@ -116,8 +116,8 @@ def open_loop(vehicle: Vehicle, record: Record, nuisance: Nuisance, starts: Plac
     inner = jnp.stack([jnp.asarray(inside[name]) for name in vehicle.state_names[BODY:]])
     push = jnp.array([float(getattr(nuisance, name)) for name in PUSHES])
     voltage = jnp.asarray(record.voltage)
-    found = flown(model, model.equations, jnp.asarray(body), inner, reaching, voltage, par, push, starts)
-    return np.asarray(found[0]), np.asarray(found[1])
+    paths = flown(model, model.equations, jnp.asarray(body), inner, reaching, voltage, par, push, starts)
+    return np.asarray(paths[0]), np.asarray(paths[1])
 
 
 def in_the_room(states: Array) -> Array:
@@ -181,14 +181,14 @@ def compare(
     """Every predictor on every record, and heave by the first model."""
     first = next(iter(models))
     textbook = {"textbook quadrotor (the card)": started_from(models[first])}
-    found: dict[str, list[Scored]] = {}
+    by_label: dict[str, list[Scored]] = {}
     slow: list[Heave] = []
     for record, felt in pieces:
         starts = np.arange(round(CALIBRATION / record.dt), record.time.size - AHEAD - EDGE, EVERY)
         plain = measured_states(record, Nuisance())
         for kind, label in (("hold", "hold"), ("rates", "constant velocity and rates")):
             ahead = [naive(plain, starts, k, record.dt, kind=kind) for k in range(1, FITS[-1] + 1)]
-            found.setdefault(label, []).append(scored(np.stack(ahead, axis=1), plain, starts))
+            by_label.setdefault(label, []).append(scored(np.stack(ahead, axis=1), plain, starts))
         for label, vehicle in (textbook | models).items():
             noise, prior = observer_of(vehicle)
             nuisance = calibrate(vehicle, record, noise=noise, prior=prior)
@@ -201,17 +201,17 @@ def compare(
                     slow.append(along_z(vehicle, record, felt, nuisance, told, int(starts[0])))
             else:
                 states = open_loop(vehicle, record, nuisance, starts)[0]
-            found.setdefault(label, []).append(scored(states, body, starts))
+            by_label.setdefault(label, []).append(scored(states, body, starts))
         motion = seen(record, beyond=FITS[-1] + 1)
         for label, rival in rivals.items():
             with np.errstate(over="ignore", invalid="ignore"):
-                found.setdefault(label, []).append(scored(rival(motion, starts, FITS[-1]), plain, starts))
-    return found, slow
+                by_label.setdefault(label, []).append(scored(rival(motion, starts, FITS[-1]), plain, starts))
+    return by_label, slow
 
 
-def mean_errors(found: dict[str, list[Scored]]) -> str:
+def mean_errors(by_label: dict[str, list[Scored]]) -> str:
     """A table of mean absolute errors, the best of each column in bold."""
-    means = {label: np.concatenate([one.errors for one in parts]).mean(axis=0) for label, parts in found.items()}
+    means = {label: np.concatenate([one.errors for one in parts]).mean(axis=0) for label, parts in by_label.items()}
     heads = [f"{group if h == SHOWN[0] else ''} {h / 100:g} s".strip() for group in GROUPS for h in SHOWN]
     rows = np.array([[mean[h - 1, g] for g in range(len(GROUPS)) for h in SHOWN] for mean in means.values()])
     best = rows.min(axis=0)
@@ -219,10 +219,10 @@ def mean_errors(found: dict[str, list[Scored]]) -> str:
     return table(["predictor", *heads], [[label, *row] for label, row in zip(means, cells, strict=True)])
 
 
-def mean_fits(found: dict[str, list[Scored]]) -> str:
+def mean_fits(by_label: dict[str, list[Scored]]) -> str:
     """A table of fit % after the horizons of `FITS`."""
     lines = []
-    for label, parts in found.items():
+    for label, parts in by_label.items():
         fits = [
             fit_percent(*(np.concatenate(rows) for rows in zip(*(one.fits[h] for one in parts), strict=True)))
             for h in range(len(FITS))
@@ -248,8 +248,8 @@ def into_page(text: str, name: str, made: str) -> str:
         SystemExit: where it has no such part.
     """
     begin, end = f"<!-- scores: {name} -->", "<!-- end -->"
-    before, found, after = text.partition(begin)
-    if not found or end not in after:
+    before, mark, after = text.partition(begin)
+    if not mark or end not in after:
         raise SystemExit(f"the page has no part {begin} ... {end}")
     return f"{before}{begin}\n{made}\n{end}{after.split(end, 1)[1]}"
 
@@ -274,11 +274,11 @@ def main(
     lifted: list[Heave] = []
     for name, flights in (("known kinds", held_out), ("new kinds", new)):
         if flights:
-            found, slow = compare(models, rivals, of_files(flights, vehicle))
+            by_label, slow = compare(models, rivals, of_files(flights, vehicle))
             lifted += slow
-            starts = sum(len(one.errors) for one in found["hold"])
-            made[name] = f"{starts} starts.\n\n{mean_errors(found)}"
-            made[f"{name}, fit"] = mean_fits(found)
+            starts = sum(len(one.errors) for one in by_label["hold"])
+            made[name] = f"{starts} starts.\n\n{mean_errors(by_label)}"
+            made[f"{name}, fit"] = mean_fits(by_label)
     made["heave"] = table(HEADS, [one.cells for one in lifted])
     for name, part in made.items():
         print(f"\n{name}\n{part}")

@@ -75,9 +75,9 @@ def law_of(record: Record, body: Array, wanted: Array, last: int) -> Law:
         for i in range(2):
             moved = np.stack([wanted[:, i], body[:, ANGLES[i]], body[:, RATES[i]]], axis=1)[50 - lag : last - lag]
             rows = np.column_stack([np.ones(last - 50), moved])
-            found, *_ = np.linalg.lstsq(rows, mixed[50:last, i], rcond=None)
-            offset[i], gains[i] = found[0], found[1:]
-            left += float(np.var(mixed[50:last, i] - rows @ found) / np.var(mixed[50:last, i]))
+            solution, *_ = np.linalg.lstsq(rows, mixed[50:last, i], rcond=None)
+            offset[i], gains[i] = solution[0], solution[1:]
+            left += float(np.var(mixed[50:last, i] - rows @ solution) / np.var(mixed[50:last, i]))
         if best is None or left < best[0]:
             best = left, Law(offset, gains, lag)
     assert best is not None

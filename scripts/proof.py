@@ -58,12 +58,12 @@ def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def section(found: dict[str, Any]) -> str:
+def section(document: dict[str, Any]) -> str:
     """One JSON file as a section of the page."""
-    verdict = {True: "**Passed.** ", False: "**Missed.** ", None: ""}[found.get("passed")]
-    parts = [f"## {found['title']}", verdict + found.get("text", "")]
-    if found.get("columns"):
-        parts.append(markdown_table(found["columns"], found["rows"]))
+    verdict = {True: "**Passed.** ", False: "**Missed.** ", None: ""}[document.get("passed")]
+    parts = [f"## {document['title']}", verdict + document.get("text", "")]
+    if document.get("columns"):
+        parts.append(markdown_table(document["columns"], document["rows"]))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -110,8 +110,8 @@ def assemble(folder: Path, runs: Sequence[dict[str, Any]]) -> str:
     """The page from the JSON files in a folder."""
     sections = []
     for file in sorted(folder.glob("*.json")):
-        found = json.loads(file.read_text(encoding="utf-8"))
-        sections.append(section(benchmarks_as_section(found) if file.name == "benchmarks.json" else found))
+        document = json.loads(file.read_text(encoding="utf-8"))
+        sections.append(section(benchmarks_as_section(document) if file.name == "benchmarks.json" else document))
     return "\n\n".join([heading(runs), *sections]) + "\n"
 
 

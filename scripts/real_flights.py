@@ -56,7 +56,7 @@ def beside(validation: sp.Validation, channels: Sequence[str], horizon: float) -
 
 def missed(validation: sp.Validation) -> list[str]:
     """Where a rival is at least as good although it should not be, and how sure that is."""
-    found = []
+    lines = []
     for horizon, channels in WANTED.items():
         for name in channels:
             own = validation.score(name, horizon).fit
@@ -65,8 +65,8 @@ def missed(validation: sp.Validation) -> list[str]:
             if own <= rivals[best]:
                 told = validation.floor(name, horizon)
                 sure = f"{told.lead:+.1f} points, 95 % from {told.lead_low:+.1f} to {told.lead_high:+.1f}"
-                found.append(f"{name} at {horizon:g} s: {own:.1f} %, {best} {rivals[best]:.1f} % ({sure})")
-    return found
+                lines.append(f"{name} at {horizon:g} s: {own:.1f} %, {best} {rivals[best]:.1f} % ({sure})")
+    return lines
 
 
 def parameters(fit: sp.Result[Any, Any]) -> str:

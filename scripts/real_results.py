@@ -25,14 +25,14 @@ def directions(page: str) -> dict[str, list[AxisVerdict]]:
     from swashplate.validation.verdict import LEVELS
 
     parts = _DIRECTION.split(page)
-    found = {
+    judgements = {
         title: [AxisVerdict(*match.groups()) for match in _VERDICT.finditer(body)]
         for title, body in zip(parts[1::2], parts[2::2], strict=True)
     }
-    verdicts = [verdict for judged in found.values() for verdict in judged]
-    if len(found) != 2 or not all(found.values()) or any(v.level not in LEVELS for v in verdicts):
-        raise ValueError(f"{PAGE.name}: two directions with verdicts of {LEVELS} are expected, found {found}")
-    return found
+    verdicts = [verdict for judged in judgements.values() for verdict in judged]
+    if len(judgements) != 2 or not all(judgements.values()) or any(v.level not in LEVELS for v in verdicts):
+        raise ValueError(f"{PAGE.name}: two directions with verdicts of {LEVELS} are expected, found {judgements}")
+    return judgements
 
 
 def trusted_text() -> str:
@@ -46,9 +46,9 @@ def trusted_text() -> str:
 
 def results_text() -> str:
     """Every axis in both directions: fit of the model, best rival, verdict."""
-    found = directions(PAGE.read_text(encoding="utf-8"))
-    rows = [f"| axis | {' | | '.join(found)} | |", "|" + " --- |" * 5]
-    for axes in zip(*found.values(), strict=True):
+    judgements = directions(PAGE.read_text(encoding="utf-8"))
+    rows = [f"| axis | {' | | '.join(judgements)} | |", "|" + " --- |" * 5]
+    for axes in zip(*judgements.values(), strict=True):
         cells = [cell for verdict in axes for cell in (_numbers(verdict), f"**{verdict.level}**")]
         rows.append(f"| {axes[0].axis} | {' | '.join(cells)} |")
     return "\n".join(rows)

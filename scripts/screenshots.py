@@ -75,11 +75,11 @@ def live(browser: Any, name: str, vehicle: str) -> None:
         command = [sys.executable, "-m", "swashplate", "live", vehicle, "--port", "0"]
         with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
             assert process.stdout is not None
-            found = re.search(r"http://\S+", process.stdout.readline())
+            match = re.search(r"http://\S+", process.stdout.readline())
             try:
-                if found is None:
+                if match is None:
                     raise SystemExit(f"swash live {vehicle} told no address")
-                picture(browser, found[0], name, drawn=False, flying=3.0)
+                picture(browser, match[0], name, drawn=False, flying=3.0)
             finally:
                 process.send_signal(signal.SIGINT)
                 process.wait(timeout=20.0)

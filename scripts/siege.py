@@ -51,14 +51,14 @@ def campaigns(chosen: argparse.Namespace) -> dict[str, Callable[[float], list[di
     def besiege_writers(seconds: float) -> list[dict[str, object]]:
         every = {**kills.QUICK, **kills.SLOW}
         counts = {"kills": chosen.kills, "failures": chosen.failures}
-        found = kills.besiege(every, **counts, seconds=seconds, seed=chosen.seed, kept=FOLDER / "kills.kept")
-        return [one.as_dict() for one in found]
+        results = kills.besiege(every, **counts, seconds=seconds, seed=chosen.seed, kept=FOLDER / "kills.kept")
+        return [one.as_dict() for one in results]
 
     def besiege_disks(seconds: float) -> list[dict[str, object]]:
-        found = disks.besiege()
-        if found is None:
+        outcome = disks.besiege()
+        if outcome is None:
             print("Not allowed to mount a disk here: the section of `disks` is left out.", file=sys.stderr)
-        return [] if found is None else [found]
+        return [] if outcome is None else [outcome]
 
     def besiege_places(seconds: float) -> list[dict[str, object]]:
         return [places.besiege().as_dict()]
@@ -125,11 +125,11 @@ def main() -> int:
             old.unlink()
         share = SHARES[name] / sum(SHARES[n] for n in (chosen.only or SHARES))
         began = stamp(resumed=chosen.resume)
-        for k, found in enumerate(run(60.0 * chosen.minutes * share)):
-            found["text"] = f"{found['text']} {began}"
-            (FOLDER / f"{name}-{k}.json").write_text(json.dumps(found), encoding="utf-8")
-            fell = fell or not found["passed"]
-            print(proof.section(found), flush=True)
+        for k, outcome in enumerate(run(60.0 * chosen.minutes * share)):
+            outcome["text"] = f"{outcome['text']} {began}"
+            (FOLDER / f"{name}-{k}.json").write_text(json.dumps(outcome), encoding="utf-8")
+            fell = fell or not outcome["passed"]
+            print(proof.section(outcome), flush=True)
     page = proof.PAGE.read_text(encoding="utf-8") if proof.PAGE.exists() else ""
     proof.PAGE.write_text(proof.with_siege(page, siege_section(FOLDER)), encoding="utf-8")
     print(f"Written: {proof.PAGE.relative_to(ROOT)}")

@@ -110,8 +110,8 @@ def _members(module: str, made: ast.ClassDef) -> Iterator[str]:
     classes = [made]
     for base in made.bases:
         root = base.value if isinstance(base, ast.Subscript) else base
-        found = [n for n in _tree(module).body if isinstance(n, ast.ClassDef) and ast.unparse(root) == n.name]
-        classes += found
+        bases = [n for n in _tree(module).body if isinstance(n, ast.ClassDef) and ast.unparse(root) == n.name]
+        classes += bases
     rows, methods = [], []
     for node in (node for one in classes for node in one.body):
         if isinstance(node, ast.AnnAssign):

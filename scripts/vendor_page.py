@@ -48,8 +48,8 @@ def digests() -> dict[str, str]:
 
 def changed() -> list[str]:
     """Files that are missing or are not those that were pinned."""
-    pinned, found = json.loads(HASHES.read_text(encoding="utf-8")), digests()
-    return [name for name in FILES.values() if name not in found or found[name] != pinned.get(name)]
+    pinned, actual = json.loads(HASHES.read_text(encoding="utf-8")), digests()
+    return [name for name in FILES.values() if name not in actual or actual[name] != pinned.get(name)]
 
 
 def fetch(*, pin: bool = False) -> None:

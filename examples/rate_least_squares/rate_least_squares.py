@@ -40,19 +40,19 @@ class RateLeastSquares:
             told = [np.asarray(rates(x.T, u.T, numbers, air)).T for x, u in zip(states, inputs, strict=True)]
             return np.concatenate([((a - b) / size).ravel() for a, b in zip(told, slopes, strict=True)])
 
-        found = least_squares(errors, table.starts(), bounds=table.bounds(), x_scale="jac")
-        covariance = np.linalg.inv(found.jac.T @ found.jac) * 2.0 * found.cost / (found.fun.size - found.x.size)
+        best = least_squares(errors, table.starts(), bounds=table.bounds(), x_scale="jac")
+        covariance = np.linalg.inv(best.jac.T @ best.jac) * 2.0 * best.cost / (best.fun.size - best.x.size)
         card = model.card.parameters
         names, sigma = table.names, np.sqrt(np.diag(covariance))
         estimates = tuple(
             Estimate(name, card[name].unit, card[name].value, float(value), float(spread))
-            for name, value, spread in zip(names, found.x, sigma, strict=True)
+            for name, value, spread in zip(names, best.x, sigma, strict=True)
         )
-        identified = table.vehicle.with_values(dict(zip(names, map(float, found.x), strict=True)), status="identified")
+        identified = table.vehicle.with_values(dict(zip(names, map(float, best.x), strict=True)), status="identified")
         return Result(
             method="rate-least-squares", solution=identified, start=model, estimates=estimates, names=names,
             covariance=covariance, covariance_corrected=np.full_like(covariance, np.nan), details=None,
-            correlation=correlation_of(covariance), converged=bool(found.success), data=sources_of(data),
+            correlation=correlation_of(covariance), converged=bool(best.success), data=sources_of(data),
         )  # fmt: skip
 
 

@@ -36,12 +36,12 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
     """
     told = "\0".join((source, compiler() or "", *options, _processor(compiler()) if NATIVE in options else ""))
     folder = Path(platformdirs.user_cache_dir("swashplate")) / "c"
-    found = folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
-    if found.is_file():
+    library = folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
+    if library.is_file():
         try:
-            return ctypes.CDLL(str(found))
+            return ctypes.CDLL(str(library))
         except OSError:  # damaged: made anew
-            found.unlink(missing_ok=True)
+            library.unlink(missing_ok=True)
     with ExitStack() as keeping:
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -52,8 +52,8 @@ def loaded(source: str, *, options: Sequence[str]) -> ctypes.CDLL:
         text.write_text(source, encoding="utf-8")
         shared_library([text], place, options=options)
         if made.parent == folder:
-            os.replace(place, found)
-            place = found
+            os.replace(place, library)
+            place = library
         return ctypes.CDLL(str(place))  # what is loaded stays when its file goes
 
 

@@ -86,12 +86,12 @@ def _bounded_count(entries: int, form: Form) -> None:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in names if names.count(name) > 1)
         raise _RefusedError(f"has '{_shown(twice)}' twice in one table.")
-    return found
+    return entries
 
 
 def _shown(value: Any) -> str:
@@ -168,11 +168,11 @@ def parse(
         error: where the text is too large, does not parse, is nested too deeply, or holds a number that is not finite,
             too large, or a text that cannot be shown.
     """
-    found = _parsed(text, form, str(where), error, hint)
-    if not isinstance(found, dict):
-        raise error(f"is a {type(found).__name__}, expected an object with named entries.", where=where, hint=hint)
-    _check_values(found, str(where), error)
-    return found
+    document = _parsed(text, form, str(where), error, hint)
+    if not isinstance(document, dict):
+        raise error(f"is a {type(document).__name__}, expected an object with named entries.", where=where, hint=hint)
+    _check_values(document, str(where), error)
+    return document
 
 
 def parse_logged(text: str, schema: type[Schema], *, where: str | Path, at: str, error: type[SwashError]) -> Schema:
@@ -181,9 +181,9 @@ def parse_logged(text: str, schema: type[Schema], *, where: str | Path, at: str,
     Raises:
         error: where the text is too large, does not parse, is nested too deeply, or is not of the schema.
     """
-    found = _parsed(text, "json", str(where), error, None)
-    _check_values(found, str(where), error, logged=True)
-    return checked(found, schema, where=where, at=at, error=error)
+    document = _parsed(text, "json", str(where), error, None)
+    _check_values(document, str(where), error, logged=True)
+    return checked(document, schema, where=where, at=at, error=error)
 
 
 def _parsed(text: str, form: Form, where: str, error: type[SwashError], hint: str | None) -> Any:
@@ -260,8 +260,8 @@ def read(
     """
     document = read_document(path, form=form, error=error, hint=hint)
     if document.get("kind") != kind:
-        found = f"kind is {_shown(document['kind'])!r}" if "kind" in document else "says no kind"
-        raise error(f"{found}, expected '{kind}'.", where=path, hint=hint)
+        actual = f"kind is {_shown(document['kind'])!r}" if "kind" in document else "says no kind"
+        raise error(f"{actual}, expected '{kind}'.", where=path, hint=hint)
     return checked(document, schema, where=path, error=error)
 
 

@@ -25,11 +25,11 @@ def read_bytes(path: str | os.PathLike[str], *, most: int) -> bytes:
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as file:
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode):
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
             problem = "it is a pipe or a device; write what it gives into a file first"
             raise OSError(errno.EINVAL, problem, os.fspath(path))
-        likely = max(found.st_size, _AT_LEAST)
+        likely = max(status.st_size, _AT_LEAST)
         content = file.read(min(most, likely) + 1)  # memory is set aside for what is asked for
         if likely < len(content) <= most:  # it grew
             content += file.read(most + 1 - len(content))

@@ -34,8 +34,8 @@ def parse(text: str) -> Told | None:
     if not text.startswith(_MARK):
         return None
     try:
-        found: Any = json.loads(text[len(_MARK) :])
-        what, done, total = found
+        entries: Any = json.loads(text[len(_MARK) :])
+        what, done, total = entries
         return Told(str(what), float(done), None if total is None else float(total))
     except (TypeError, ValueError):
         return None

@@ -27,8 +27,8 @@ class Shown(Saved):
     @property
     def figures(self) -> tuple[str, ...]:
         """Names of the figures that `plot` and `explore` can draw, the main one first."""
-        found: tuple[str, ...] = resolve("figure_names")(self)
-        return found
+        names: tuple[str, ...] = resolve("figure_names")(self)
+        return names
 
     def plot(
         self,

@@ -105,10 +105,10 @@ def _total(block: Numbered) -> int:
 
 def _grown(block: Numbered, natural: Sequence[int], width: int) -> Numbered:
     """What of the width is left goes to the columns that were folded, the last one first."""
-    found = list(block)
+    grown = list(block)
     for at, (i, least) in reversed(list(enumerate(block))):
-        found[at] = (i, least + max(0, min(width - _total(found), natural[i] - least)))
-    return found
+        grown[at] = (i, least + max(0, min(width - _total(grown), natural[i] - least)))
+    return grown
 
 
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,), keys: int = 1) -> str:

@@ -173,7 +173,7 @@ def accept_autopilot(
                 )
     say("reading the log")
     logs = sitl.logs()
-    found: TruthBeside | None = None
+    comparison: TruthBeside | None = None
     if flown:
         late = 0.5 / values.get("SCHED_LOOP_RATE", _LOOP)
         moved = mixed(mixer, other.trim, _mixing(values, law.parameters, law.frame), inputs=names)
@@ -182,9 +182,9 @@ def accept_autopilot(
             return mixer_response(linear, moved[axis], output, omega, late=late, gravity=float(around.gravity))
 
         swept = {axis: chirps[axis] for axis in flown}
-        found = _judged(logs, swept, partial(response, other), partial(response, model), pilot, lines)
+        comparison = _judged(logs, swept, partial(response, other), partial(response, model), pilot, lines)
     log = logs[-1] if logs else None
-    return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), found, log, folder, speed)
+    return Acceptance(str(binary), version, called, tuple(sitl.command), tuple(lines), comparison, log, folder, speed)
 
 
 def _linear(vehicle: Vehicle, environment: Environment | None) -> LinearModel:
@@ -304,17 +304,17 @@ def _judged(
         damage = "; ".join(flight.provenance.damage)
         lines.append(TrialLine("log", damage or f"{flight.duration:.0f} s", "read, not damaged", not damage))
         lines.append(_rotor_line(flight, pilot))
-        found = beside_truth(flight, flown, true, own, rate=_RATE)
+        comparison = beside_truth(flight, flown, true, own, rate=_RATE)
     except SwashError as error:
         lines.append(TrialLine("log", str(error), "read", False))
         return None
-    lines += found.lines
-    return found
+    lines += comparison.lines
+    return comparison
 
 
 def _rotor_line(flight: Flight, pilot: TrialPilot) -> TrialLine:
     """The rotor speed that the log has, beside the true one; told, not judged: not every version reads it."""
     true = float(np.max([seen.rotor for seen in pilot.seen])) * 30.0 / math.pi
     logged = float(np.max(flight.values("omega_rotor"))) * 30.0 / math.pi if "omega_rotor" in flight else 0.0
-    found = f"{logged:.0f} rpm" if logged else "none: this version reads no rpm, or RPM1_TYPE is not 10"
-    return TrialLine("rotor speed in the log, largest", found, f"{true:.0f} rpm")
+    words = f"{logged:.0f} rpm" if logged else "none: this version reads no rpm, or RPM1_TYPE is not 10"
+    return TrialLine("rotor speed in the log, largest", words, f"{true:.0f} rpm")

@@ -86,13 +86,13 @@ class AutopilotGains(Shown):
     @property
     def problems(self) -> tuple[str, ...]:
         """Why these gains should not be flown; empty where margins hold and the flights stay where they should."""
-        found = list(self.found.problems)
+        problems = list(self.found.problems)
         for flight in self.flown:
             if flight.fell:
-                found.append(f"{flight.mode} does not fly: {flight.fell}")
+                problems.append(f"{flight.mode} does not fly: {flight.fell}")
             elif flight.mode == "loiter" and not flight.place <= STRAYS:
-                found.append(f"loiter strays by {flight.place:.2f} m, expected {STRAYS:g} m or less.")
-        return tuple(found)
+                problems.append(f"loiter strays by {flight.place:.2f} m, expected {STRAYS:g} m or less.")
+        return tuple(problems)
 
     def controller(self, mode: FlightMode = "loiter") -> ArduPilotLaw:
         """The law as a controller, for `sp.simulate_closed_loop`, `sp.check_controller` and `sp.live`."""
@@ -220,19 +220,19 @@ def autopilot_gains(
     late, told = _late(vehicle, delays)
     if autopilot == "px4":
         start = px4_law(mapping, vehicle, hover, rate=rate or PX4_RATE)
-        found = cascade_gains(vehicle, hover, start, delays=late)
-        gains = px4_gains(found.law)
+        design = cascade_gains(vehicle, hover, start, delays=late)
+        gains = px4_gains(design.law)
         lines = {**px4_parameters(mapping), **gains}
     else:
         given = read_parameter_file(parameters) if isinstance(parameters, str | Path) else parameters
         told_given = None if given is None else dict(given)
         start = ardupilot_law(mapping, vehicle, hover, given=told_given, notch=notch, rate=rate or RATE_OF_LOOPS)
         search = cascade_gains if given is None else judge_cascade
-        found = search(vehicle, hover, start, delays=late)
-        gains = written_gains(found.law)
+        design = search(vehicle, hover, start, delays=late)
+        gains = written_gains(design.law)
         lines = {**ardupilot_parameters(mapping, vehicle, hover), **gains}
-    flown = tuple(_flown(vehicle, hover, found, mode) for mode in FLIGHT_MODES) if fly else ()
-    return AutopilotGains(autopilot, vehicle.card.title, found, lines, tuple(gains), flown, told)
+    flown = tuple(_flown(vehicle, hover, design, mode) for mode in FLIGHT_MODES) if fly else ()
+    return AutopilotGains(autopilot, vehicle.card.title, design, lines, tuple(gains), flown, told)
 
 
 def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[dict[str, float], str]:
@@ -247,11 +247,11 @@ def _late(vehicle: Vehicle, given: Mapping[str, float] | float | None) -> tuple[
     return dict(late), f"{', '.join(f'{name} {1e3 * value:.3g} ms' for name, value in late.items())} ({whose})"
 
 
-def _flown(vehicle: Vehicle, hover: Trim, found: CascadeGains, mode: FlightMode) -> FlownMode:
+def _flown(vehicle: Vehicle, hover: Trim, design: CascadeGains, mode: FlightMode) -> FlownMode:
     rest = hover.states()
     start = {**rest, **{name: rest.get(name, 0.0) + by for name, by in _UPSET.items()}}
     reference = {name: rest.get(name, 0.0) for name in ("x", "y", "z", "psi")}
-    law = replace(found.law.in_mode(mode), settled=())
+    law = replace(design.law.in_mode(mode), settled=())
     nothing = (math.nan,) * 5
     try:
         flight = simulate_closed_loop(
@@ -261,7 +261,7 @@ def _flown(vehicle: Vehicle, hover: Trim, found: CascadeGains, mode: FlightMode)
             start=start,
             reference=reference,
             rate=law.rate,
-            delays=dict(found.delays),
+            delays=dict(design.delays),
             voltage=float(hover.environment.voltage),
             environment=hover.environment,
         )

@@ -28,10 +28,10 @@ def evaluate_bench(*records: str | Path | BenchRecord, vehicle: Vehicle) -> Benc
     Raises:
         BenchError: for a record that cannot be read, that no procedure knows, or that contradicts what it measures.
     """
-    found: list[BenchRecord] = []
+    every: list[BenchRecord] = []
     for each in records:
-        found += [each] if isinstance(each, BenchRecord) else read_records(str(each))
-    return evaluate(found, vehicle)
+        every += [each] if isinstance(each, BenchRecord) else read_records(str(each))
+    return evaluate(every, vehicle)
 
 
 def simulate_bench(

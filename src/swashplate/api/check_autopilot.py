@@ -139,8 +139,8 @@ def check_autopilot(
         reading = read_parameters(connection, packed=packed)
         ask_by_name(connection, reading, expected, packed=packed)
         health = listen_to_health(connection, duration=listen)
-    found = compared(expected, reading)
-    problems = [p.problem for p in found if p.problem]
+    comparisons = compared(expected, reading)
+    problems = [p.problem for p in comparisons if p.problem]
     if not reading.complete:
         told = f"{len(reading.missing)} of {reading.count} parameters never came, although they were asked for again"
         problems.append(
@@ -150,7 +150,7 @@ def check_autopilot(
     return AutopilotCheck(
         firmware,
         connection.address,
-        found,
+        comparisons,
         {key: reading.values[key] for key in _RATES if key in reading.values},
         tuple(health.refusals),
         health.sick,
@@ -168,24 +168,24 @@ def _expected(vehicle: Vehicle, firmware: Firmware, name: str | None, servos: st
 
 
 def _arming(health: Health) -> list[str]:
-    found = []
+    reasons = []
     if health.restarted:
-        found.append("the autopilot restarted during the check.")
+        reasons.append("the autopilot restarted during the check.")
     factor = health.real_time_factor()
     if factor is not None and factor[0] <= max(factor[1], _STILL):
-        found.append("its simulated time stands still: is its physics (swash link) running?")
+        reasons.append("its simulated time stands still: is its physics (swash link) running?")
     if health.refusals and not health.armed:
-        found.append(f"arming is refused: {'; '.join(health.refusals)}.")
+        reasons.append(f"arming is refused: {'; '.join(health.refusals)}.")
     elif health.ready is False and not health.armed:
         why = (
             f"it calls unhealthy: {', '.join(health.sick)}"
             if health.sick
             else "it does not say why; wait and ask again"
         )
-        found.append(f"arming is refused: {why}.")
+        reasons.append(f"arming is refused: {why}.")
     elif health.ready is None and not health.armed:
-        found.append("whether it can be armed is not known: it did not tell the result of its checks (SYS_STATUS).")
-    return found
+        reasons.append("whether it can be armed is not known: it did not tell the result of its checks (SYS_STATUS).")
+    return reasons
 
 
 def _factor(real_time: tuple[float, float] | None) -> str:

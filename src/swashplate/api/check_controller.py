@@ -88,7 +88,7 @@ def check_controller(
     nominal = vehicle.card.values().get("voltage_nominal")
     at = trim(vehicle, speed=speed, voltage=nominal if voltage is None else voltage)
     made, name = flown_by(controller, vehicle, at)
-    found = judge(
+    check = judge(
         vehicle,
         made,
         at,
@@ -102,7 +102,7 @@ def check_controller(
         required_delay=required_delay,
         fly=loop_in_c(vehicle, made, at),
     )
-    return ControllerCheck(found, name, lateness(vehicle, made, given=delays))
+    return ControllerCheck(check, name, lateness(vehicle, made, given=delays))
 
 
 def _document(check: ControlCheck, controller: str) -> dict[str, Any]:

@@ -120,10 +120,10 @@ def _read(one: Any) -> Any:
         return fitted(one)
     path = Path(one)
     if path.is_dir():
-        found = next((path / name for name in _FILES if (path / name).is_file()), None)
-        if found is None:
+        file = next((path / name for name in _FILES if (path / name).is_file()), None)
+        if file is None:
             raise SwashError(f"has none of {', '.join(_FILES)} in it.", where=path)
-        path = found
+        path = file
     if path.suffix == ".nc":
         return FrequencyResponse.load(path)
     if path.suffix == ".json":

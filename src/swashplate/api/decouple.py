@@ -73,15 +73,15 @@ class FlownStep:
     def figures(self) -> dict[str, dict[str, Any]]:
         """Paths on the step: of the model itself, and percentiles over drawn models."""
         figures = ("drift", "leftmost", "rightmost", "speed")
-        found: dict[str, dict[str, Any]] = {}
+        by_run: dict[str, dict[str, Any]] = {}
         for name, run in self.runs.items():
-            found[name] = {key: float(getattr(run.path, key)[0]) for key in figures} | {"models": "this one"}
+            by_run[name] = {key: float(getattr(run.path, key)[0]) for key in figures} | {"models": "this one"}
             if run.drawn is not None:
                 arrived = int(np.sum(np.isfinite(run.drawn.drift)))
                 for percent in (5, 50, 95):
                     values = {key: float(np.nanpercentile(getattr(run.drawn, key), percent)) for key in figures}
-                    found[f"{name}, {percent} %"] = values | {"models": f"{arrived} of {self.draws}"}
-        return found
+                    by_run[f"{name}, {percent} %"] = values | {"models": f"{arrived} of {self.draws}"}
+        return by_run
 
     def __repr__(self) -> str:
         head = ("path on the step", "drift at 6 m [m]", "leftmost [m]", "rightmost [m]", "fastest [m/s]", "models")
@@ -149,7 +149,7 @@ class DecouplingDesign(Shown):
 
     def to_document(self) -> dict[str, Any]:
         """All of it as what becomes JSON."""
-        found: dict[str, Any] = {
+        document: dict[str, Any] = {
             "vehicle": self.vehicle.name,
             "model": self.vehicle.card.title,
             "mode": self.law.mode,
@@ -161,14 +161,14 @@ class DecouplingDesign(Shown):
             "least_stable_mode": {"real": self.mode.real, "imaginary": abs(self.mode.imag)},
         }
         if self.margins is not None:
-            found["margins"] = margins_document(self.margins)
+            document["margins"] = margins_document(self.margins)
         if self.step is not None:
             sources = dict(self.step.sources)
-            found["step"] = {"command": self.step.command, **self.step.figures(), "drift_sources": sources}
+            document["step"] = {"command": self.step.command, **self.step.figures(), "drift_sources": sources}
             if against := self.step.nearer_than():
                 gusts = None if self.step.gusts is None else asdict(self.step.gusts)
-                found["step"] |= {"nearer_than": against, "gusts": gusts}
-        return found
+                document["step"] |= {"nearer_than": against, "gusts": gusts}
+        return document
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes: the two paths.

@@ -42,17 +42,17 @@ def demo(*, simulated: bool = False, seed: int = 1, say: Say = silent) -> Identi
         say: told what is being done.
     """
     coax = vehicle("coax")
-    found = [] if simulated else [path for f in (FITTED, HELD_OUT) if (path := datasets.find("coax56", f))]
-    if len(found) == 2:
+    files = [] if simulated else [path for f in (FITTED, HELD_OUT) if (path := datasets.find("coax56", f))]
+    if len(files) == 2:
         say("reading the real flights")
-        fitted, held_out = (read(path) for path in found)
+        fitted, held_out = (read(path) for path in files)
     else:
         say("simulating two flights")
         fitted, held_out = (simulated_log(coax, maneuver, seed=seed + i) for i, maneuver in enumerate(_MANEUVERS))
     made = identify_and_validate(
         coax, fitted.condition(rate=100.0, cutoff=0.0), hold_out=held_out.condition(rate=100.0, cutoff=0.0), say=say
     )
-    if len(found) == 2:
+    if len(files) == 2:
         return made
     true = _aircraft(coax).card.values()
     known = {e.name: true[e.name] for e in made.fit.estimates if e.name in true}

@@ -182,21 +182,21 @@ def design_controller(
         voltage=voltage,
     )
     where = str(vehicle.card.path or vehicle.name)
-    found = [analyse(made, at=i, where=where) for i in range(len(speeds))]
+    analyses = [analyse(made, at=i, where=where) for i in range(len(speeds))]
     if gain == "steady":
         made = with_steady_gain(made)
         kept = dict(zip(made.plan.names, map(float, steady_sigmas(made)), strict=True))
-        found = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in found]
+        analyses = [replace(each, uncertainty={n: kept[n] for n in each.uncertainty if n in kept}) for each in analyses]
     took = "not known, one sample is left for it" if computation is None else f"{1e3 * computation:g} ms"
     late = f"{lateness(vehicle, None, given=delays)}; computation: {took}"
-    return ControllerDesign(made, tuple(found), tuple(speeds), late, _fast(made, found))
+    return ControllerDesign(made, tuple(analyses), tuple(speeds), late, _fast(made, analyses))
 
 
-def _fast(made: Lqg, found: Sequence[Analysis]) -> str:
+def _fast(made: Lqg, analyses: Sequence[Analysis]) -> str:
     """Loops that cross above what the design aimed at and could not reach with less effort, in words."""
     told = []
     for name, limit in made.figures["crossover_limits"].items():
-        highest = max((a.crossover for one in found for a in one.margins.axes if a.name == name), default=0.0)
+        highest = max((a.crossover for one in analyses for a in one.margins.axes if a.name == name), default=0.0)
         if highest > _NEARLY * limit:
             told.append(f"{name} at {highest:.3g} rad/s (asked for: {limit:.3g})")
     if not told:

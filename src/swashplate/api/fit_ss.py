@@ -111,10 +111,10 @@ def fit_ss(
     called = {**responses.settings.get("channels", {}), **(names or {})}
     flights = uniform_records(hold_out, wanted, rate=rate, cutoff=cutoff, names=called)
     choice = PairChoice(band, bands or {}, tuple(without), least_coherence)
-    found = None
+    searched = None
     if search:
         _check_names(given, {*(start or {}), *(fixed or {})})
-        found = search_structures(
+        searched = search_structures(
             responses,
             structures=given,
             choice=choice,
@@ -123,7 +123,7 @@ def fit_ss(
             seed=seed,
             say=lambda text: say("trying structures", note=text),
         )
-        fit = found.pick.fit
+        fit = searched.pick.fit
     else:
         begun = with_given(at_flown_trim(begun, responses), start, fixed)
         say("fitting")
@@ -149,7 +149,7 @@ def fit_ss(
         say("flying the model along what the fit has not seen")
         verification = marked(verify_inside(fit.solution, flights, band=band), responses.sources)
     advice = suggest_gains(fit, responses) if gains else ()
-    material = ResponseMaterial(responses, fit=fit, search=found, verification=verification, gains=advice)
+    material = ResponseMaterial(responses, fit=fit, search=searched, verification=verification, gains=advice)
     return LinearStudy(material, structure=fit.solution, remarks=remarks)
 
 

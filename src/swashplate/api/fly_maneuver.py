@@ -166,12 +166,12 @@ def holding(
 
 def _at_limits(vehicle: Vehicle, flight: Flight) -> list[str]:
     """Inputs that stood at a limit: what they were told beyond it was not flown."""
-    found = []
+    told = []
     for name, (low, high) in zip(vehicle.input_names, vehicle.input_limits, strict=True):
         if name in dict(vehicle.trim_held) or name not in flight:
             continue
         values = flight.values(name)
         share = float(((values <= low) | (values >= high)).mean())
         if share > _HELD:
-            found.append(f"{name} stands at its limit for {100.0 * share:.0f} % of the time; fly a smaller amplitude.")
-    return found
+            told.append(f"{name} stands at its limit for {100.0 * share:.0f} % of the time; fly a smaller amplitude.")
+    return told

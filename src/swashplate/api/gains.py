@@ -25,12 +25,14 @@ def suggest_gains(fit: Fitted, responses: FrequencyResponse) -> tuple[Suggestion
         SwashError: no axis joins a rate with its mixer command.
     """
     settings: dict[str, Any] = dict(responses.settings)
-    found = ardupilot_gains.suggest_gains(fit, autopilot=settings.get("autopilot"), sources=settings.get("channels"))
-    if not found:
+    suggestions = ardupilot_gains.suggest_gains(
+        fit, autopilot=settings.get("autopilot"), sources=settings.get("channels")
+    )
+    if not suggestions:
         pairs = ", ".join(f"{rate} with {command}" for rate, command in ARDUPILOT.values())
         raise SwashError(
             f"the model joins no rate with its mixer command ({pairs}).",
             channel="--gains",
             hint="Name the log's own channels in `swash respond`, for example --inputs mixer_yaw --outputs r.",
         )
-    return found
+    return suggestions

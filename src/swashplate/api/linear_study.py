@@ -103,7 +103,7 @@ class LinearStudy(ReportFolder):
             parts.append("\n".join(["Structures tried (zeros/poles):", *rows]))
         if self.fit is not None:
             parts.append("\n".join([repr(self.fit), *map(repr, self.margins)]))
-        parts += [repr(found) for found in (m.verification, m.rival) if found is not None]
+        parts += [repr(verified) for verified in (m.verification, m.rival) if verified is not None]
         parts += [repr(suggestion) for suggestion in m.gains]
         return "\n\n".join(parts)
 

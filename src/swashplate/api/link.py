@@ -240,8 +240,8 @@ def write_ardupilot_parameters(
     if not file.absolute().parent.is_dir():
         raise SwashError("the folder does not exist.", where=file.parent, channel="--write-parameters")
     mapping = mapping_of(vehicle, servos, name=name, suffix="")
-    found = parameters(mapping, vehicle, trim) | gains_to_write(mapping, vehicle, trim, notice=notice)
-    return write_text(file, parameter_file(found, title=vehicle.card.title))
+    settings = parameters(mapping, vehicle, trim) | gains_to_write(mapping, vehicle, trim, notice=notice)
+    return write_text(file, parameter_file(settings, title=vehicle.card.title))
 
 
 def gains_to_write(mapping: ServoMapping, vehicle: Vehicle, trim: Trim, *, notice: Say) -> Parameters:

@@ -53,11 +53,11 @@ def load(
         return vehicle(Path(path))
     if ending == ".nc":
         return Flight.load(path) if _holds_flight(Path(path)) else FrequencyResponse.load(path)
-    found = documents.read_document(os.fspath(path), form="json", hint=_HINT)
-    if found.get("kind") in saved.KINDS:
-        judged: Validation = saved.from_document(found, where=os.fspath(path), equations=equations)
+    document = documents.read_document(os.fspath(path), form="json", hint=_HINT)
+    if document.get("kind") in saved.KINDS:
+        judged: Validation = saved.from_document(document, where=os.fspath(path), equations=equations)
         return judged
-    return result_file.from_document(found, where=os.fspath(path), equations=equations)
+    return result_file.from_document(document, where=os.fspath(path), equations=equations)
 
 
 def _holds_flight(path: Path) -> bool:

@@ -99,10 +99,10 @@ def _response(vehicle: Vehicle, text: str) -> Callable[[Vehicle], Complex]:
     along = np.array([ways[axis].get(name, 0.0) for name in vehicle.input_names])
 
     def numbers(one: Vehicle) -> Complex:
-        found = linearize(one).response(2.0 * np.pi * frequencies)[:, one.index(output)] @ along
-        if not np.all(np.abs(found) > 0.0):
+        response = linearize(one).response(2.0 * np.pi * frequencies)[:, one.index(output)] @ along
+        if not np.all(np.abs(response) > 0.0):
             raise ManeuverError(f"{output} does not answer {axis}.", where=one.name, channel=f"aim {text}")
-        return np.asarray(found, dtype=np.complex128)
+        return np.asarray(response, dtype=np.complex128)
 
     return numbers
 
@@ -124,7 +124,7 @@ def _margin(model: Vehicle, controller: Made) -> Callable[[Vehicle], Complex]:
     def numbers(one: Vehicle) -> Complex:
         late = dict(zip(one.input_names, flown_delays(one, law).tolist(), strict=True))
         judged = kind_of(law).judged(law, Aircraft(one, trim(one), late))
-        found = margins_of(judged.loop, points=_POINTS, where=one.name).together.alpha
-        return np.array([found], dtype=np.complex128)
+        alpha = margins_of(judged.loop, points=_POINTS, where=one.name).together.alpha
+        return np.array([alpha], dtype=np.complex128)
 
     return numbers

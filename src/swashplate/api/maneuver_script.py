@@ -52,7 +52,7 @@ def maneuver_script(made: DesignedManeuver) -> str:
         row = -np.gradient(values) * rate if axis == "heave" else values
         row = row[begin : begin + count] - np.mean(row[begin : begin + count])
         turn = np.exp(-2j * np.pi * np.outer(numbers, np.arange(count)) / count)
-        found = 2.0 / count * turn @ row
-        lines[axis] = tuple((n, float(np.abs(v)), float(np.angle(v))) for n, v in zip(numbers, found, strict=True))
+        phasors = 2.0 / count * turn @ row
+        lines[axis] = tuple((n, float(np.abs(v)), float(np.angle(v))) for n, v in zip(numbers, phasors, strict=True))
     told = f"{made.vehicle.name}: {made.aim or ', '.join(made.unknown)}, {piece.duration:g} s"
     return ardupilot_script(lines, duration=piece.duration, limits=made.limits, title=told)

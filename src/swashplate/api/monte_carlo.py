@@ -203,16 +203,16 @@ def monte_carlo(
     )
     moves_on = any(axis in _SPEEDS for axis in asked)
     judged = limits or Limits()
-    found = spread(flown, hover, limits=replace(judged, place=math.inf) if moves_on else judged)
-    worst = _up_to_divergence(flown, found.worst)
-    own = {name: float(values[found.worst]) for name, values in drawn.items()}
+    outcome = spread(flown, hover, limits=replace(judged, place=math.inf) if moves_on else judged)
+    worst = _up_to_divergence(flown, outcome.worst)
+    own = {name: float(values[outcome.worst]) for name, values in drawn.items()}
     remarks: tuple[str, ...] = (_NO_STICK,) if not kind.takes_stick and set(excitation.axes) - set(asked) else ()
     remarks += (_MOVES_ON,) if moves_on else ()
     remarks += not_followed(flown, hover, {n: signals[n] for n in asked}, time - _LEAD)
-    worst = worst.done("drawn", seed=seed, number=found.worst, delay=float(late[found.worst]), parameters=own)
+    worst = worst.done("drawn", seed=seed, number=outcome.worst, delay=float(late[outcome.worst]), parameters=own)
     settings = {"count": count, "seed": seed, "payload": payload, "delay": delay, "voltage_fall": fall, "bits": bits}
     told = lateness(vehicle, pilot, given=None) + further
-    return MonteCarlo(vehicle, name, found, worst, flown, drawn, told, remarks, settings)
+    return MonteCarlo(vehicle, name, outcome, worst, flown, drawn, told, remarks, settings)
 
 
 def _up_to_divergence(flown: Batch, number: int) -> Flight:
@@ -233,17 +233,17 @@ def not_followed(flown: Batch, start: Trim, asked: Mapping[str, Array], time: Ar
         asked: changes by axis [m, rad, m/s], shape (n,).
         time: of these, from the maneuver's start [s], shape (n,).
     """
-    found = []
+    remarks = []
     for name, signal in asked.items():
         last = int(np.flatnonzero(signal)[-1])
         state = {"ahead": "u", "right": "v"}.get(name, name)
         at = int(np.searchsorted(flown.time, time[last] + _LEAD, side="right")) - 1
         reached = float(np.nanmedian(flown[state][at] - start.states()[state]))
         if not abs(reached - signal[last]) < 0.5 * abs(signal[last]):
-            found.append(
+            remarks.append(
                 f"{name} was asked to change by {signal[last]:g}, and half of the flights reached {reached:.2g}."
             )
-    return tuple(found)
+    return tuple(remarks)
 
 
 _SPEEDS = ("ahead", "right")
@@ -309,15 +309,15 @@ def _only_what_is_linear(model: StateSpaceModel, **asked: bool) -> None:
 
 def _varied(values: Mapping[str, float], wanted: Mapping[str, float | str] | None) -> dict[str, float]:
     """Sigmas in the parameters' units, of numbers or of texts such as "5%"."""
-    found = {}
+    sigmas = {}
     for name, given in (wanted or {}).items():
         if not isinstance(given, str):
-            found[name] = float(given)
+            sigmas[name] = float(given)
             continue
         try:
             number = float(given.removesuffix("%"))
         except ValueError:
             raise SwashError(f"{name} varies by '{given}', expected a number or 5%.", channel="vary") from None
         share = name in values and given.endswith("%")
-        found[name] = abs(values[name]) * number / 100.0 if share else number
-    return found
+        sigmas[name] = abs(values[name]) * number / 100.0 if share else number
+    return sigmas

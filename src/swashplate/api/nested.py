@@ -45,15 +45,15 @@ class NestedComparison(ReportFolder):
 
     def words(self, test: EffectTest) -> str:
         """One effect in a line: likelihood, what it moves, and whether unseen flights agree."""
-        found = self.held_out.get(test.effect.name, ())
-        told = [f"{one.channel} {one.points:+.1f} points ({one.verdict})" for one in found if one.verdict]
-        judged = any(math.isfinite(one.low) for one in found)
-        largest = max(found, key=lambda one: abs(one.points), default=None)
+        unseen_gains = self.held_out.get(test.effect.name, ())
+        told = [f"{one.channel} {one.points:+.1f} points ({one.verdict})" for one in unseen_gains if one.verdict]
+        judged = any(math.isfinite(one.low) for one in unseen_gains)
+        largest = max(unseen_gains, key=lambda one: abs(one.points), default=None)
         if judged or largest is None:
             silent_about = f"no channel's prediction differs for sure {AHEAD:g} s ahead"
         else:
             silent_about = f"{largest.channel} {largest.points:+.1f} points at most, in flights too short to judge it"
-        unseen = f"; held out: {', '.join(told) or silent_about}" if found else ""
+        unseen = f"; held out: {', '.join(told) or silent_about}" if unseen_gains else ""
         return test.words + unseen
 
     def lines(self) -> list[str]:

@@ -70,7 +70,7 @@ def observability(
         SwashError: for sensors that are none; TrimError for a speed that cannot be flown.
     """
     chosen = suite(sensors)
-    found = tuple(
+    by_speed = tuple(
         study(vehicle, trim(vehicle, speed=at, voltage=voltage), chosen, rate=rate, seconds=seconds) for at in speeds
     )
-    return ObservabilityStudy(vehicle.card.title, tuple(speeds), found)
+    return ObservabilityStudy(vehicle.card.title, tuple(speeds), by_speed)

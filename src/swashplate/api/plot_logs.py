@@ -61,8 +61,8 @@ def _shift(first: Flight, other: Flight, by: Alignment) -> tuple[float, str]:
         return 0.0, "as logged"
     if by in ("auto", "motion"):
         try:
-            found = synchronise(first, other)
-            return found.offset + found.drift * 0.5 * (other.start + other.stop), f"by the motion ({found})"
+            shift = synchronise(first, other)
+            return shift.offset + shift.drift * 0.5 * (other.start + other.stop), f"by the motion ({shift})"
         except FlightError:
             if by == "motion":
                 raise

@@ -136,9 +136,9 @@ def _series(
 
 def _count(size: int | None, *groups: Mapping[str, NDArray[np.float64]]) -> int:
     numbers, states, series = groups
-    found = {v.shape[0] for group in (numbers, states) for v in group.values() if v.ndim}
-    found |= {v.shape[1] for v in series.values() if v.shape[1] > 1}
-    found |= set() if size is None else {size}
-    if len(found) != 1:
-        raise SwashError(f"the number of vehicles is {sorted(found) or 'not given'}, expected one number (size=...).")
-    return int(found.pop())
+    counts = {v.shape[0] for group in (numbers, states) for v in group.values() if v.ndim}
+    counts |= {v.shape[1] for v in series.values() if v.shape[1] > 1}
+    counts |= set() if size is None else {size}
+    if len(counts) != 1:
+        raise SwashError(f"the number of vehicles is {sorted(counts) or 'not given'}, expected one number (size=...).")
+    return int(counts.pop())

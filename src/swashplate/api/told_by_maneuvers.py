@@ -80,7 +80,7 @@ class DesignDraws:
         small = {axis: _PROBE * peak[axis] for axis in axes}
         twice = {a: {2 * int(n): 1.0 for n in own} for a, own in zip(axes, lines, strict=True)}
         maneuver = composed(twice, duration=2.0 * seconds, peak=small)
-        found: list[Complex] = []
+        responses: list[Complex] = []
         for draw in range(len(self.models)):
             time, _, inputs = self.fly(draw, maneuver)
             inside = (time >= seconds - 1e-9) & (time < 2.0 * seconds - 0.5 / self.rate)
@@ -89,8 +89,8 @@ class DesignDraws:
                 asked = maneuver.signals(time[inside])[axis]
                 turning = np.exp(-2j * np.pi * np.multiply.outer(own / seconds, time[inside]))
                 rows.append((turning @ inputs[inside]) / (turning @ asked)[:, None])
-            found.append(np.asarray(np.concatenate(rows), dtype=np.complex128))
-        return found
+            responses.append(np.asarray(np.concatenate(rows), dtype=np.complex128))
+        return responses
 
     def information(
         self, draw: int, pieces: Sequence[Maneuver], table: Mapping[str, tuple[Array, list[Complex]]]

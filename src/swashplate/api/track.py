@@ -270,7 +270,7 @@ def track(
         strange = [name for name in names_given if not any(name in e.channels for e in texts)]
         if strange:
             raise IdentificationError("stands in no equation.", channel=f"{what} {strange[0]}")
-    found = []
+    tracks = []
     for e in texts:
         say("estimating", note=e.text)
         time, samples = stream_of(renamed, e.channels)
@@ -279,8 +279,8 @@ def track(
         told = [name for name in instruments if name in e.channels and name != e.left]
         plan = _plan(e, rate or usual, band, spacing, memory, wanted, told)
         units = {name: str(renamed[name].attrs.get("units", "")) for name in e.channels}
-        found.append(tracked(plan, time, samples, every=every, units=units))
-    return Tracking(source, simulated, tuple(found), notes)
+        tracks.append(tracked(plan, time, samples, every=every, units=units))
+    return Tracking(source, simulated, tuple(tracks), notes)
 
 
 def _rate(time: Array, source: str) -> float:
@@ -325,9 +325,9 @@ def _parameters(
     inputs = table[:, len(channels) :]
     if not volts:
         inputs = np.column_stack([inputs, np.full(len(time), float(plan.trim.environment.voltage))])
-    found = tracked_parameters(plan, time, inputs, table[:, : len(channels)], every=every)
+    estimates = tracked_parameters(plan, time, inputs, table[:, : len(channels)], every=every)
     told = () if volts else ("The log has no battery voltage; the card's nominal one stands in.",)
-    return replace(found, notes=(*told, *found.notes))
+    return replace(estimates, notes=(*told, *estimates.notes))
 
 
 def _equations(

@@ -82,15 +82,15 @@ def beside_truth(flight: Flight, flown: Mapping[str, Chirp], truth: Truth, own: 
         truth: what the estimates are held against. own: of the vehicle that flew.
         rate: of the records [Hz].
     """
-    found = TruthBeside()
-    by_axis = _sweeps_by_axis(flight, flown, found)
+    comparison = TruthBeside()
+    by_axis = _sweeps_by_axis(flight, flown, comparison)
     axes = [axis for axis in MIXER_AXES if axis in by_axis]
     for together in _grouped(axes):
         try:
-            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, found)
+            _judge(flight, [by_axis[axis] for axis in together], together, flown, truth, own, rate, comparison)
         except SwashError as error:
-            found.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
-    return found
+            comparison.lines.append(TrialLine(f"{' and '.join(together)}: estimate", str(error), "an estimate", False))
+    return comparison
 
 
 def _grouped(axes: Sequence[str]) -> list[tuple[str, ...]]:
@@ -100,14 +100,14 @@ def _grouped(axes: Sequence[str]) -> list[tuple[str, ...]]:
     return [*groups, *((axis,) for axis in axes if axis not in taken)]
 
 
-def _sweeps_by_axis(flight: Flight, flown: Mapping[str, Chirp], found: TruthBeside) -> dict[str, Sweep]:
+def _sweeps_by_axis(flight: Flight, flown: Mapping[str, Chirp], comparison: TruthBeside) -> dict[str, Sweep]:
     told = [sweep for sweep in sweeps(flight) if sweep.source == "log"]
     by_axis = {}
     for axis, chirp in flown.items():
         mine = [sweep for sweep in told if sweep.axis == chirp.axis_name]
         complete = [sweep for sweep in mine if sweep.complete]
         words = f"{len(complete)} complete of {len(mine)}"
-        found.lines.append(TrialLine(f"sweep of {axis} in the log", words, "1 complete", len(complete) == 1))
+        comparison.lines.append(TrialLine(f"sweep of {axis} in the log", words, "1 complete", len(complete) == 1))
         if complete:
             by_axis[axis] = complete[-1]
     return by_axis
@@ -121,7 +121,7 @@ def _judge(
     truth: Truth,
     own: Truth,
     rate: float,
-    found: TruthBeside,
+    comparison: TruthBeside,
 ) -> None:
     named = [MIXER_AXES[axis] for axis in axes]
     inputs, outputs = [a.input for a in named], [a.output for a in named]
@@ -136,16 +136,16 @@ def _judge(
     band = (1.25 * low, 0.75 * high)
     responses = respond(records, inputs=inputs, outputs=outputs, references=swept, band=band)
     words = f"{' and '.join(axes)}: "
-    found.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
+    comparison.remarks += [words + text for text in (*responses.warnings, *responses.problems)]
     exact = _exact(responses, axes, own)
     forms = [_form(exact, axis) for axis in axes]
     simple = [_fitted(responses, axis, form) for axis, form in zip(axes, forms, strict=True)]
-    found.models += [f"{axis}, fit-tf: {each!r}" for axis, each in zip(axes, simple, strict=True)]
+    comparison.models += [f"{axis}, fit-tf: {each!r}" for axis, each in zip(axes, simple, strict=True)]
     name = STRUCTURES.get(tuple(axes))
     fit = None if name is None else fit_ss(name, responses)
     fitted = None if fit is None else fit.structure
     if fit is not None and fit.fit is not None:
-        found.structures[" and ".join(axes)] = fit.fit.estimates
+        comparison.structures[" and ".join(axes)] = fit.fit.estimates
     for place, (axis, a) in enumerate(zip(axes, named, strict=True)):
         h, coherence, error = responses.pair(a.output, a.input)
         good = np.isfinite(h) & (coherence >= COHERENT)
@@ -153,15 +153,15 @@ def _judge(
         curves = {"truth": (responses.omega, true), "respond": (responses.omega, np.where(good, h, np.nan))}
         share = float(np.mean(good))
         told = f"{100 * share:.0f} % of the band"
-        found.lines.append(
+        comparison.lines.append(
             TrialLine(f"{axis}: coherent", told, f"{100 * _LEAST_SHARE:.0f} % of the band", share >= _LEAST_SHARE)
         )
-        found.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good))
+        comparison.lines.append(_verdict(f"{axis}: respond beside truth", h, true, error, good))
         estimate = np.asarray(simple[place].response(responses.omega))
         curves["fit-tf"] = (responses.omega, estimate)
         line = _verdict(f"{axis}: fit-tf beside truth", estimate, true, error, good)
         follows = _follows(exact, axis, np.asarray(_fitted(exact, axis, forms[place]).response(responses.omega)))
-        found.lines.append(line if follows else _told(line, f"no form of {', '.join(FORMS[axis])} follows"))
+        comparison.lines.append(line if follows else _told(line, f"no form of {', '.join(FORMS[axis])} follows"))
         if fitted is not None:
             o, i = list(fitted.outputs).index(a.output), list(fitted.inputs).index(a.input)
             estimate = fitted.response(responses.omega)[:, o, i]
@@ -173,9 +173,9 @@ def _judge(
                 assert best is not None
                 follows = _follows(exact, axis, best.response(responses.omega)[:, o, i])
                 line = line if follows else _told(line, f"the structure {name} does not follow")
-            found.lines.append(line)
-        found.curves[(a.output, a.input)] = curves
-        found.lines.append(_lateness(axis, h, true, responses, good))
+            comparison.lines.append(line)
+        comparison.curves[(a.output, a.input)] = curves
+        comparison.lines.append(_lateness(axis, h, true, responses, good))
 
 
 def _exact(responses: FrequencyResponse, axes: Sequence[str], own: Truth) -> FrequencyResponse:
@@ -226,8 +226,8 @@ def _verdict(what: str, estimate: Complex, true: Complex, error: Array, good: ND
     sigma = np.nan_to_num(error[good])
     allowed = np.maximum(GAIN, SIGMAS * 20.0 / np.log(10.0) * sigma), np.maximum(PHASE, SIGMAS * np.degrees(sigma))
     passed = bool(np.all(gain <= allowed[0]) and np.all(phase <= allowed[1]))
-    found = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
-    return TrialLine(what, found, _WITHIN, passed)
+    distance = f"{gain.max():.2f} dB, {phase.max():.1f} deg"
+    return TrialLine(what, distance, _WITHIN, passed)
 
 
 def _lateness(axis: str, h: Complex, true: Complex, responses: FrequencyResponse, good: NDArray[np.bool_]) -> TrialLine:

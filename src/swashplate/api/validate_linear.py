@@ -48,8 +48,8 @@ def validate_linear(
         flown = uniform_records(raw, one.inputs, rate=rate, cutoff=cutoff, names=names, also=one.outputs)
         return verify_inside(one, flown, band=band)
 
-    found, rival = along(identified), None if compared is None else along(compared)
-    return LinearStudy(ResponseMaterial(verification=found, rival=rival), structure=identified)
+    verification, rival = along(identified), None if compared is None else along(compared)
+    return LinearStudy(ResponseMaterial(verification=verification, rival=rival), structure=identified)
 
 
 def _other(vehicle: Vehicle) -> StateSpaceModel:

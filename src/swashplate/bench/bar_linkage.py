@@ -54,8 +54,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     )
 
 
-def _deflections(found: SteadyPoints) -> Steering:
-    alpha, beta = found["bar_alpha"], found["bar_beta"]
+def _deflections(steady: SteadyPoints) -> Steering:
+    alpha, beta = steady["bar_alpha"], steady["bar_beta"]
 
     def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
         bar = StabilizerBar(float(alpha[i]), float(beta[i]))

@@ -67,12 +67,12 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             return np.asarray(np.r_[off.real, off.imag])
 
         start = np.array([abs(mean_y[0] / mean_u[0]), np.log(0.15)])
-        found = least_squares(left, start, x_scale=np.abs(start), xtol=1e-12)
-        tau = float(np.exp(found.x[1]))
+        solution = least_squares(left, start, x_scale=np.abs(start), xtol=1e-12)
+        tau = float(np.exp(solution.x[1]))
         noise = float(np.sum(np.var(np.r_[y.real, y.imag].reshape(2, periods, -1), axis=1, ddof=1)) / periods)
-        variance = max(noise / (2 * frequency.size), 2.0 * found.cost / (2 * frequency.size - 2))
-        covariance = variance * np.linalg.inv(found.jac.T @ found.jac)
-        if not (found.success and 0.005 < tau < 5.0 and found.x[0] > 0.0):
+        variance = max(noise / (2 * frequency.size), 2.0 * solution.cost / (2 * frequency.size - 2))
+        covariance = variance * np.linalg.inv(solution.jac.T @ solution.jac)
+        if not (solution.success and 0.005 < tau < 5.0 and solution.x[0] > 0.0):
             raise BenchError(
                 f"omega_{rotor} does not follow motor_{rotor} as a first-order lag does.",
                 where=record.name,
@@ -81,7 +81,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         names.append(f"tau_drive_{rotor}")
         values.append(tau)
         variances.append(covariance[1, 1] * tau**2)
-        excess = 2.0 * found.cost / (2 * frequency.size - 2) / (noise / (2 * frequency.size))
+        excess = 2.0 * solution.cost / (2 * frequency.size - 2) / (noise / (2 * frequency.size))
         checks.append(
             BenchCheck(
                 f"{record.name}: the response departs from a first-order lag by {np.sqrt(excess):.1f} times the noise"
@@ -91,7 +91,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         )
         dense = np.geomspace(frequency[0], frequency[-1], 60)
         a = np.exp(-record.dt / tau)
-        line = found.x[0] * (1.0 - a) / (np.exp(2j * np.pi * dense * record.dt) - a)
+        line = solution.x[0] * (1.0 - a) / (np.exp(2j * np.pi * dense * record.dt) - a)
         measured = mean_y / mean_u
         curves += [
             Curve(f"{what.capitalize()} of the {rotor} drive train", "frequency [Hz]", f"{what} [{unit}]",

@@ -92,8 +92,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             )
         )
     names = tuple(f"tau_drive_{rotor}" for rotor in fits)
-    weights = [np.array([fit.sigma**-2 for fit in found]) for found in fits.values()]
-    values = [float(w @ [fit.tau for fit in found] / w.sum()) for w, found in zip(weights, fits.values(), strict=True)]
+    weights = [np.array([fit.sigma**-2 for fit in group]) for group in fits.values()]
+    values = [float(w @ [fit.tau for fit in group] / w.sum()) for w, group in zip(weights, fits.values(), strict=True)]
     return BenchResult(
         NAME,
         TITLE,

@@ -185,7 +185,7 @@ def _unseen(card: Card, names: tuple[str, ...], covariance: Array) -> tuple[Dire
 
 def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
     """Records by procedure, in the order of `PROCEDURES`; columns are checked."""
-    found: dict[str, list[BenchRecord]] = {}
+    by_procedure: dict[str, list[BenchRecord]] = {}
     for record in records:
         for name in record.procedures:
             if name not in PROCEDURES:
@@ -198,8 +198,8 @@ def _sorted(records: Iterable[BenchRecord]) -> dict[str, list[BenchRecord]]:
                 _ = record.dt  # says that a table of points does not do
             for column in PROCEDURES[name].COLUMNS:
                 _ = record[column]  # says what is missing
-            found.setdefault(name, []).append(record)
-    return {name: found[name] for name in PROCEDURES if name in found}
+            by_procedure.setdefault(name, []).append(record)
+    return {name: by_procedure[name] for name in PROCEDURES if name in by_procedure}
 
 
 def _card(published: Card, joint: Joint, results: Sequence[BenchResult]) -> Card:

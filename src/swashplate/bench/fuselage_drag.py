@@ -71,12 +71,12 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 "varies no single stream.", where=record.name, hint="Vary airspeed_x or airspeed_y, one a record."
             )
         speed, force, name = blown[0]
-        found = steady_points(record, (*COLUMNS[1:], speed, force))
-        if max(found["omega_lower"].max(), found["omega_upper"].max()) > _STANDING:
+        steady = steady_points(record, (*COLUMNS[1:], speed, force))
+        if max(steady["omega_lower"].max(), steady["omega_upper"].max()) > _STANDING:
             raise BenchError("a rotor turns.", where=record.name, channel="omega", hint="Take it with rotors off.")
         density = record.number("air_density", card["air_density"]) / card["air_density"]
-        pushed = density * found[speed] * np.abs(found[speed])
-        line = fit_line([-pushed, *nuisance(found)], found[force], where=record.name)
+        pushed = density * steady[speed] * np.abs(steady[speed])
+        line = fit_line([-pushed, *nuisance(steady)], steady[force], where=record.name)
         if line.values[0] < -3.0 * np.sqrt(line.covariance[0, 0]):
             raise BenchError(
                 f"grows with {speed}: air from the front pushes back (Fx < 0), from the right to the left (Fy < 0).",
@@ -88,17 +88,17 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         names.append(name)
         values.append(float(line.values[0]))
         variances.append(float(line.covariance[0, 0]))
-        level = np.round(found[speed] * 2.0) / 2.0
+        level = np.round(steady[speed] * 2.0) / 2.0
         checks += [
-            check_settled(found, force),
-            check_vibration(found, force),
-            check_line_drift(found, line, 2, what=f"{force} [N]"),
+            check_settled(steady, force),
+            check_vibration(steady, force),
+            check_line_drift(steady, line, 2, what=f"{force} [N]"),
             *check_structure(line, level, what=f"{record.name}: {force} [N]"),
         ]
-        blowing = np.linspace(found[speed].min(), found[speed].max(), 60)
+        blowing = np.linspace(steady[speed].min(), steady[speed].max(), 60)
         fitted = line.values[0] * pushed
         curves.append(
-            Curve(f"Drag against {speed}", "speed of the air [m/s]", "drag [mN]", found[speed],
+            Curve(f"Drag against {speed}", "speed of the air [m/s]", "drag [mN]", steady[speed],
                   1e3 * (fitted - line.residuals), blowing, 1e3 * density * line.values[0] * blowing * np.abs(blowing))
         )  # fmt: skip
     checks.append(BenchCheck("The mount's own drag is in these numbers unless it was measured alone and subtracted."))

@@ -88,8 +88,8 @@ def fit_lag(
             where=where,
             hint="Does the column follow its command at all? Are the steps long enough, and not too small?",
         )
-    found = minimize_scalar(cost, bracket=(grid[best - 1], grid[best], grid[best + 1]), options={"xtol": 1e-7})
-    tau = float(np.exp(found.x))
+    minimum = minimize_scalar(cost, bracket=(grid[best - 1], grid[best], grid[best + 1]), options={"xtol": 1e-7})
+    tau = float(np.exp(minimum.x))
     matrix, linear, model = solved(tau)
     step = 1e-4 * tau
     slope = (_at(response, tau + step, linear) - _at(response, tau - step, linear)) / (2.0 * step)

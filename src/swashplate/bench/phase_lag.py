@@ -53,12 +53,12 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     sigmas: list[float] = []
     checks: list[BenchCheck] = []
     for record in records:
-        found = steady_points(record, COLUMNS[1:])
-        levels = np.unique(np.round(found["motor_lower"], 6))
-        inside = (np.abs(found["motor_lower"][:, None] - levels) < 1e-5).astype(np.float64)
-        slopes = [*(inside * found["servo_pitch"][:, None]).T]
-        columns = [*slopes, *inside.T, nuisance(found)[1]]
-        roll, pitch = (fit_line(columns, found[name], where=record.name) for name in ("Mx", "My"))
+        steady = steady_points(record, COLUMNS[1:])
+        levels = np.unique(np.round(steady["motor_lower"], 6))
+        inside = (np.abs(steady["motor_lower"][:, None] - levels) < 1e-5).astype(np.float64)
+        slopes = [*(inside * steady["servo_pitch"][:, None]).T]
+        columns = [*slopes, *inside.T, nuisance(steady)[1]]
+        roll, pitch = (fit_line(columns, steady[name], where=record.name) for name in ("Mx", "My"))
         k = levels.size
         across, along = roll.values[:k], -pitch.values[:k]
         if np.median(along) < 0.0:
@@ -72,11 +72,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         size = across**2 + along**2
         noise = (along**2 * np.diag(roll.covariance)[:k] + across**2 * np.diag(pitch.covariance)[:k]) / size**2
         sigmas += list(np.sqrt(noise))
-        speeds += [float(found["omega_lower"][column > 0.5].mean()) for column in inside.T]
-        checks += [check(found, name) for name in ("Mx", "My") for check in (check_settled, check_vibration)]
-        level = 1e3 * found["motor_lower"] + np.round(found["servo_pitch"], 3)
+        speeds += [float(steady["omega_lower"][column > 0.5].mean()) for column in inside.T]
+        checks += [check(steady, name) for name in ("Mx", "My") for check in (check_settled, check_vibration)]
+        level = 1e3 * steady["motor_lower"] + np.round(steady["servo_pitch"], 3)
         for fitted, name in ((roll, "Mx [N m]"), (pitch, "My [N m]")):
-            checks.append(check_line_drift(found, fitted, 2 * k, what=name))
+            checks.append(check_line_drift(steady, fitted, 2 * k, what=name))
             checks += check_structure(fitted, level, what=f"{record.name}: {name}")
         if np.any(sigmas[-k:] > np.radians(3.0)):
             checks.append(

@@ -173,11 +173,11 @@ def read_rig(path: str | Path) -> BenchRecord:
 
 def _what_turns(stem: str) -> dict[str, str]:
     """The propellers by the file's name, `[FOLDER_]MAKER-D-KV-PITCH-D-KV-PITCH-#RUN`: zeros for none below."""
-    found = _WHAT_TURNS.fullmatch(stem)
-    if found is None:
+    match = _WHAT_TURNS.fullmatch(stem)
+    if match is None:
         return {"propeller": re.sub(r"[-_ ]*#?\d+$", "", stem).lower()}
-    maker = found["maker"].lower()
-    told = {"propeller": f"{maker} {found['upper']}"}
-    if found["lower"] != "0-0-0":
-        told["propeller_lower"] = f"{maker} {found['lower']}"
+    maker = match["maker"].lower()
+    told = {"propeller": f"{maker} {match['upper']}"}
+    if match["lower"] != "0-0-0":
+        told["propeller_lower"] = f"{maker} {match['lower']}"
     return told

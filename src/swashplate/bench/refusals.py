@@ -59,13 +59,13 @@ def refuse_out_of_range(record: BenchRecord) -> None:
             continue
         # A tachometer's noise about zero is no sign; its mean is.
         lowest = float(np.median(values)) if channel.startswith("omega") else float(values.min())
-        for found, beyond in (
+        for value, beyond in (
             (lowest, lowest < low - _SLACK),
             (float(values.max()), float(values.max()) > high + _SLACK),
         ):
             if beyond:
                 raise BenchError(
-                    f"is {found:.4g} {COLUMNS[channel][0]}, expected {low:g} to {high:g}.",
+                    f"is {value:.4g} {COLUMNS[channel][0]}, expected {low:g} to {high:g}.",
                     where=record.name,
                     channel=channel,
                     hint=f"It is: {COLUMNS[channel][1]}. Correct its sign or its unit.",
@@ -170,10 +170,10 @@ def refuse_idle(record: BenchRecord, rotor: str, card: Mapping[str, float]) -> N
         BenchError: naming the rotor.
     """
     expected = card[f"k_drive_{rotor}"] * float(np.std(record[f"motor_{rotor}"]))
-    found = float(np.std(record[f"omega_{rotor}"]))
-    if found < _FOLLOWS * expected:
+    moved = float(np.std(record[f"omega_{rotor}"]))
+    if moved < _FOLLOWS * expected:
         raise BenchError(
-            f"moves by {found:.2g} rad/s (standard deviation) where motor_{rotor} should move it by {expected:.2g}: "
+            f"moves by {moved:.2g} rad/s (standard deviation) where motor_{rotor} should move it by {expected:.2g}: "
             "the motor did not reach its speeds.",
             where=record.name,
             channel=f"omega_{rotor}",

@@ -72,13 +72,13 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 hint="Add '# rotor_removed: upper' to the header.",
             )
         rotor = "lower" if removed == "upper" else "upper"
-        found = steady_points(record, COLUMNS[1:])
+        steady = steady_points(record, COLUMNS[1:])
         density = record.number("air_density", card["air_density"]) / card["air_density"]
-        squared = density * found[f"omega_{rotor}"] ** 2
-        checks += [check_settled(found, "Fz"), check_vibration(found, "Fz"), check_ground(record, card)]
+        squared = density * steady[f"omega_{rotor}"] ** 2
+        checks += [check_settled(steady, "Fz"), check_vibration(steady, "Fz"), check_ground(record, card)]
         for name, channel, unit, signs in _LOADS:
             channel_unit = RECORD_COLUMNS[channel][0]
-            line = fit_line([squared, *nuisance(found)], signs[rotor] * found[channel], where=record.name)
+            line = fit_line([squared, *nuisance(steady)], signs[rotor] * steady[channel], where=record.name)
             alone, sigma = float(line.values[0]), float(np.sqrt(line.covariance[0, 0]))
             if alone < 0.0:
                 raise BenchError(
@@ -97,11 +97,11 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                     leans_on={f"k_{name}_{rotor}": -alone / coaxial**2},
                 ),
             ]
-            checks.append(check_line_drift(found, line, 2, what=f"{channel} [{channel_unit}]"))
+            checks.append(check_line_drift(steady, line, 2, what=f"{channel} [{channel_unit}]"))
             checks += check_structure(
-                line, found[f"motor_{rotor}"], what=f"{rotor} rotor alone, {name} [{channel_unit}]"
+                line, steady[f"motor_{rotor}"], what=f"{rotor} rotor alone, {name} [{channel_unit}]"
             )
-            turning = np.linspace(0.0, found[f"omega_{rotor}"].max(), 60)
+            turning = np.linspace(0.0, steady[f"omega_{rotor}"].max(), 60)
             size, shown = (1.0, "N") if name == "thrust" else (1e3, "N mm")
             fitted = size * alone * squared
             curves.append(
@@ -109,7 +109,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                     f"{name.capitalize()} of the {rotor} rotor alone",
                     "rotor speed [rad/s]",
                     f"{name} [{shown}]",
-                    found[f"omega_{rotor}"],
+                    steady[f"omega_{rotor}"],
                     fitted + size * line.residuals,
                     turning,
                     size * alone * density * turning**2,

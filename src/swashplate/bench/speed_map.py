@@ -135,15 +135,15 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
         u, speed, above, where = [], [], [], ", ".join(r.name for r in swept)
         for record in swept:
             known = record.header.get("voltage") != NOT_RECORDED
-            found = steady_points(record, (*COLUMNS[1:], *(["voltage"] if known else [])))
-            found = found.where_true(found[f"motor_{rotor}"] > 0.0)
-            above.append(found["voltage"] - card["voltage_nominal"] if known else np.zeros(len(found)))
-            u.append(found[f"motor_{rotor}"])
-            speed.append(found[f"omega_{rotor}"] - card["k_drive_voltage"] * above[-1])
-            checks.append(check_settled(found, f"omega_{rotor}"))
+            steady = steady_points(record, (*COLUMNS[1:], *(["voltage"] if known else [])))
+            steady = steady.where_true(steady[f"motor_{rotor}"] > 0.0)
+            above.append(steady["voltage"] - card["voltage_nominal"] if known else np.zeros(len(steady)))
+            u.append(steady[f"motor_{rotor}"])
+            speed.append(steady[f"omega_{rotor}"] - card["k_drive_voltage"] * above[-1])
+            checks.append(check_settled(steady, f"omega_{rotor}"))
             checks += [
                 _check_supply(record, known=known),
-                _check_other(record, rotor, float(np.ptp(found[f"omega_{_OTHER[rotor]}"]))),
+                _check_other(record, rotor, float(np.ptp(steady[f"omega_{_OTHER[rotor]}"]))),
             ]
         command, turned = np.concatenate(u), np.concatenate(speed)
         found_values, covariance, kept, reasons = fit_map(command, turned, where=where, rotor=rotor)

@@ -63,32 +63,32 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     sigmas: list[float] = []
     checks, curves, findings = [], [], []
     for record in records:
-        found = steady_points(record, COLUMNS[1:])
-        moved = max(np.ptp(found["motor_lower"]), np.ptp(found["motor_upper"]))
-        if moved > 1e-3 or np.ptp(found["voltage"]) < 0.5:
+        steady = steady_points(record, COLUMNS[1:])
+        moved = max(np.ptp(steady["motor_lower"]), np.ptp(steady["motor_upper"]))
+        if moved > 1e-3 or np.ptp(steady["voltage"]) < 0.5:
             raise BenchError(
-                f"motor commands move by {moved:.3g} and the supply by {np.ptp(found['voltage']):.2g} V.",
+                f"motor commands move by {moved:.3g} and the supply by {np.ptp(steady['voltage']):.2g} V.",
                 where=record.name,
                 hint="Hold the commands and vary the supply by a volt or more.",
             )
         for rotor in ("upper", "lower"):
-            speed = found[f"omega_{rotor}"]
-            line = fit_supply(found["voltage"], speed, where=record.name)
+            speed = steady[f"omega_{rotor}"]
+            line = fit_supply(steady["voltage"], speed, where=record.name)
             slopes.append(float(line.values[0]))
             sigmas.append(float(np.sqrt(line.covariance[0, 0])))
             findings.append(
                 BenchFinding(f"k_drive_voltage of the {rotor} rotor by itself", slopes[-1], sigmas[-1], "rad/s/V")
             )
-            level = np.round(found["voltage"] * 8.0) / 8.0
+            level = np.round(steady["voltage"] * 8.0) / 8.0
             checks += [
-                check_settled(found, f"omega_{rotor}"),
+                check_settled(steady, f"omega_{rotor}"),
                 *check_structure(line, level, what=f"{rotor} rotor speed [rad/s]"),
             ]
-            ends = np.array([found["voltage"].min(), found["voltage"].max()])
-            at = line.values[1] + line.values[0] * (ends - found["voltage"].mean())
+            ends = np.array([steady["voltage"].min(), steady["voltage"].max()])
+            at = line.values[1] + line.values[0] * (ends - steady["voltage"].mean())
             curves.append(
                 Curve(f"Speed of the {rotor} rotor against the supply", "supply voltage [V]", "rotor speed [rad/s]",
-                      found["voltage"], speed, ends, at)
+                      steady["voltage"], speed, ends, at)
             )  # fmt: skip
     mean, sigma, apart = together(slopes, sigmas)
     checks.append(

@@ -34,8 +34,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     findings, checks, curves = [], [], []
     factor = card["k_drive_voltage"]
     for record in records:
-        found = steady_points(record, COLUMNS[1:])
-        volts = found["voltage"]
+        steady = steady_points(record, COLUMNS[1:])
+        volts = steady["voltage"]
         if np.ptp(volts) < 0.5:
             raise BenchError(
                 f"moves by {np.ptp(volts):.2g} V.",
@@ -44,7 +44,7 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 hint="Vary the supply by a volt or more.",
             )
         for rotor in ("upper", "lower"):
-            line = fit_supply(volts, found[f"omega_{rotor}"], where=record.name)
+            line = fit_supply(volts, steady[f"omega_{rotor}"], where=record.name)
             left, sigma = float(line.values[0]), float(np.sqrt(line.covariance[0, 0]))
             findings += [
                 BenchFinding(f"speed of the {rotor} rotor left per volt", left, sigma, "rad/s/V"),
@@ -64,6 +64,6 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
             ends = np.array([volts.min(), volts.max()])
             curves.append(
                 Curve(f"Speed of the {rotor} rotor, compensated", "supply voltage [V]", "rotor speed [rad/s]", volts,
-                      found[f"omega_{rotor}"], ends, line.values[1] + left * (ends - volts.mean()))
+                      steady[f"omega_{rotor}"], ends, line.values[1] + left * (ends - volts.mean()))
             )  # fmt: skip
     return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings)

@@ -51,8 +51,8 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     )
 
 
-def _deflections(found: SteadyPoints) -> Steering:
-    roll, pitch = found["servo_roll"], found["servo_pitch"]
+def _deflections(steady: SteadyPoints) -> Steering:
+    roll, pitch = steady["servo_roll"], steady["servo_pitch"]
 
     def steering(i: int, linkage: float, lag: float) -> TipPathPlane:
         return swashplate_tilt(float(roll[i]), float(pitch[i]), linkage=linkage, lag=lag, mixing="rotation", xp=XP)

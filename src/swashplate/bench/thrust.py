@@ -44,29 +44,29 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
     Raises:
         BenchError: for signs that physics forbids, or rotors that the records do not vary.
     """
-    found = [steady_points(record, COLUMNS[1:]) for record in records]
+    means = [steady_points(record, COLUMNS[1:]) for record in records]
     where = ", ".join(record.name for record in records)
     density = np.concatenate(
         [
             np.full(len(p), r.number("air_density", card["air_density"]) / card["air_density"])
-            for p, r in zip(found, records, strict=True)
+            for p, r in zip(means, records, strict=True)
         ]
     )
-    upper, lower = (density * np.concatenate([p[f"omega_{rotor}"] for p in found]) ** 2 for rotor in ("upper", "lower"))
-    both = density * np.concatenate([p["omega_upper"] * p["omega_lower"] for p in found])
-    unknown = stacked([nuisance(p) for p in found])
-    lift, turn = -np.concatenate([p["Fz"] for p in found]), np.concatenate([p["Mz"] for p in found])
+    upper, lower = (density * np.concatenate([p[f"omega_{rotor}"] for p in means]) ** 2 for rotor in ("upper", "lower"))
+    both = density * np.concatenate([p["omega_upper"] * p["omega_lower"] for p in means])
+    unknown = stacked([nuisance(p) for p in means])
+    lift, turn = -np.concatenate([p["Fz"] for p in means]), np.concatenate([p["Mz"] for p in means])
     thrust = fit_line([upper, lower, *unknown], lift, where=where)
     torque = fit_line([upper, -lower, *unknown], turn, where=where)
     _refuse_signs(thrust, torque, where)
     checks: list[BenchCheck] = []
-    for place, (points, record) in enumerate(zip(found, records, strict=True)):
+    for place, (points, record) in enumerate(zip(means, records, strict=True)):
         checks += [check_settled(points, "Fz"), check_vibration(points, "Fz"), check_vibration(points, "Mz")]
         checks.append(check_ground(record, card))
         for line, what in ((thrust, "-Fz [N]"), (torque, "Mz [N m]")):
             checks.append(check_line_drift(points, line, 3 + 2 * place, what=what))
     level = np.concatenate(
-        [1e6 * i + 1e3 * p["motor_lower"] + p["motor_upper"] for i, p in enumerate(found)]  # equal for repeats only
+        [1e6 * i + 1e3 * p["motor_lower"] + p["motor_upper"] for i, p in enumerate(means)]  # equal for repeats only
     )
     checks += [*check_structure(thrust, level, what="thrust [N]"), *check_structure(torque, level, what="torque [N m]")]
     cross = fit_line([upper, lower, both, *unknown], lift, where=where)

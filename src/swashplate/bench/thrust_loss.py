@@ -140,17 +140,17 @@ def estimate(records: Sequence[BenchRecord], card: Mapping[str, float]) -> Bench
                 BenchCheck(f"{name}: no run of the same propellers alone, so what the pair loses is not known.")
             )
             continue
-        found = thrust_loss(runs, singles)
-        findings.append(BenchFinding(f"thrust that {name} loses at equal power", found.mean, found.mean_sigma))
-        rows.append(_lost(name, found))
-        sure = np.isfinite(found.at_power)
+        lost = thrust_loss(runs, singles)
+        findings.append(BenchFinding(f"thrust that {name} loses at equal power", lost.mean, lost.mean_sigma))
+        rows.append(_lost(name, lost))
+        sure = np.isfinite(lost.at_power)
         for words, loss, at in (
-            ("equal pulse width", found.at_pwm, found.pwm > 0.0),
-            ("equal power", found.at_power, sure),
+            ("equal pulse width", lost.at_pwm, lost.pwm > 0.0),
+            ("equal power", lost.at_power, sure),
         ):
             curves.append(
-                Curve(f"Thrust that {name} loses", "pulse width [us]", "loss [%]", 1e6 * found.pwm[at], 1e2 * loss[at],
-                      1e6 * found.pwm[at], 1e2 * loss[at], name=words)
+                Curve(f"Thrust that {name} loses", "pulse width [us]", "loss [%]", 1e6 * lost.pwm[at], 1e2 * loss[at],
+                      1e6 * lost.pwm[at], 1e2 * loss[at], name=words)
             )  # fmt: skip
     return BenchResult.of_findings(NAME, TITLE, SOURCE, records, checks, curves, findings, tables=rows)
 
@@ -173,7 +173,7 @@ def _measured(name: str, runs: Sequence[BenchRecord]) -> Rows:
     )
 
 
-def _lost(name: str, found: ThrustLoss) -> Rows:
+def _lost(name: str, lost: ThrustLoss) -> Rows:
     def words(value: float, sigma: float) -> tuple[str, str]:
         return (f"{100 * value:.1f}", f"{100 * sigma:.1f}") if np.isfinite(value) else ("not reached", "-")
 
@@ -182,7 +182,7 @@ def _lost(name: str, found: ThrustLoss) -> Rows:
         ("pulse width [us]", "at equal pulse width [%]", "at equal power [%]", "sigma [%]"),
         tuple(
             (f"{1e6 * level:.0f}", f"{100 * at:.1f}", *words(power, sigma))
-            for level, at, power, sigma in zip(found.pwm, found.at_pwm, found.at_power, found.sigma, strict=True)
+            for level, at, power, sigma in zip(lost.pwm, lost.at_pwm, lost.at_power, lost.sigma, strict=True)
         ),
     )
 

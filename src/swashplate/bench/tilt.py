@@ -99,18 +99,18 @@ def fit_tilt(points: SteadyPoints, steering: Steering, thrust: Array, *, hub_hei
         def off(x: Array, by: Array = spread) -> Array:
             return np.asarray((without(measured - model(x)) / by).ravel())
 
-        found = least_squares(off, values, x_scale=scale, xtol=1e-12)
-        values, used = found.x, spread
-        left = found.fun.reshape(n, 4) * used
+        solution = least_squares(off, values, x_scale=scale, xtol=1e-12)
+        values, used = solution.x, spread
+        left = solution.fun.reshape(n, 4) * used
         spread = np.sqrt(np.sum(left**2, axis=0) / (n - 2.75))
     _refuse_unlike(without(measured), left, points.where)
     _refuse(values, points.where)
-    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    covariance = np.linalg.inv(solution.jac.T @ solution.jac)
 
     def by_held(**shift: float) -> Array:
         """How the estimate moves with what it holds: what a wrong lift or height adds to the model, fitted back."""
         added = (model(values, **{k: 1.0 + s for k, s in shift.items()}) - model(values)) / sum(shift.values())
-        return np.asarray(-covariance @ found.jac.T @ (-without(added) / used).ravel())
+        return np.asarray(-covariance @ solution.jac.T @ (-without(added) / used).ravel())
 
     fitted = model(values)
     tilt = np.array([abs(complex(*steering(i, values[0], values[1]))) for i in range(n)])

@@ -60,8 +60,8 @@ def evaluate(
         line.say("evaluating the bench")
         from swashplate.api.bench import document, doubts, evaluate_bench
 
-        found = evaluate_bench(*read, vehicle=aircraft)
-        if out is not None and not found.names:
+        evaluation = evaluate_bench(*read, vehicle=aircraft)
+        if out is not None and not evaluation.names:
             from swashplate.reporting.words import listed
 
             raise SwashError(
@@ -73,21 +73,21 @@ def evaluate(
             line.say("writing the report")
             from swashplate.reporting.bench import bench_report
 
-            bench_report(found, path=report)
+            bench_report(evaluation, path=report)
         if out is not None:
-            write_text(out, found.model.card.to_toml())
+            write_text(out, evaluation.model.card.to_toml())
     if json:
-        typer.echo(as_json(document(found)))
+        typer.echo(as_json(document(evaluation)))
     elif not quiet:
         from swashplate.cli.bench_tables import bench_tables
 
-        for made in bench_tables(found):
+        for made in bench_tables(evaluation):
             console().print(made)
-        lines = [f"! {words}" for words in doubts(found)]
-        lines += [f"Left out: {words}" for result in found.details.results for words in result.left_out]
-        if found.names and found.details.kept:
-            lines.append(f"Kept as published, no record: {', '.join(found.details.kept)}")
-        if found.names:
+        lines = [f"! {words}" for words in doubts(evaluation)]
+        lines += [f"Left out: {words}" for result in evaluation.details.results for words in result.left_out]
+        if evaluation.names and evaluation.details.kept:
+            lines.append(f"Kept as published, no record: {', '.join(evaluation.details.kept)}")
+        if evaluation.names:
             lines.append(f"Card:   {out or 'not written (give --out FILE)'}")
         lines.append(f"Report: {report or 'not written (give --report FILE)'}")
         typer.echo("\n" + "\n".join(lines))

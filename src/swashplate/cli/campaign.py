@@ -67,9 +67,9 @@ def run(
         if out is None:
             sp.plan_campaign(file)  # what is wrong in what was typed comes first
             raise SwashError("is missing.", channel="--out", hint="Say where results are kept: -o FOLDER.")
-        found = sp.campaign(file, out, workers=workers, scheduler=scheduler, engine=_engine(engine),
+        study = sp.campaign(file, out, workers=workers, scheduler=scheduler, engine=_engine(engine),
                             accept_changes=accept_changes, say=line.say)  # fmt: skip
-    _show(found, json=json, quiet=quiet)
+    _show(study, json=json, quiet=quiet)
 
 
 @app.command("resume", short_help="Continue a campaign where it stopped.")
@@ -87,9 +87,9 @@ def resume(
     from swashplate.cli.console import progress
 
     with progress(quiet=quiet or json, every=_EVERY) as line:
-        found = sp.resume_campaign(folder, workers=workers, scheduler=scheduler, engine=_engine(engine),
+        study = sp.resume_campaign(folder, workers=workers, scheduler=scheduler, engine=_engine(engine),
                                    retry_failed=retry_failed, say=line.say)  # fmt: skip
-    _show(found, json=json, quiet=quiet)
+    _show(study, json=json, quiet=quiet)
 
 
 @app.command("status", short_help="Show the progress and the results so far of a campaign.")
@@ -109,8 +109,8 @@ def report(
     """Distributions, worst rows with the command that shows each again, convergence of the quantiles, and failures."""
     import swashplate as sp
 
-    found = sp.campaign_results(folder)
-    written = sp.report(found, path=out) if out.suffix == ".html" else found.save(out)
+    study = sp.campaign_results(folder)
+    written = sp.report(study, path=out) if out.suffix == ".html" else study.save(out)
     if not quiet:
         typer.echo(f"Written: {written}")
 
@@ -143,15 +143,15 @@ def _engine(name: str | None) -> Literal["dask", "processes"] | None:
     raise SwashError(f"is '{name}', expected dask or processes.", channel="--engine")
 
 
-def _show(found: Campaign, *, json: bool, quiet: bool, judged: bool = True) -> None:
+def _show(study: Campaign, *, json: bool, quiet: bool, judged: bool = True) -> None:
     from swashplate.cli.console import as_json
     from swashplate.cli.flying import end_with
 
     if json:
-        typer.echo(as_json(found.to_document()))
+        typer.echo(as_json(study.to_document()))
     elif not quiet:
-        typer.echo(repr(found))
-    if judged and found.failed:
+        typer.echo(repr(study))
+    if judged and study.failed:
         end_with(
-            [f"{len(found.failed)} of {len(found.names)} tasks were given up: swash campaign status {found.folder}"]
+            [f"{len(study.failed)} of {len(study.names)} tasks were given up: swash campaign status {study.folder}"]
         )

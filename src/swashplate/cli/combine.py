@@ -42,16 +42,16 @@ def combine(
 
     if len(responses) > 2:
         raise SwashError(f"are {len(responses)}; it takes one or two.", channel="RESPONSES")
-    found = sp.combine(operation, *(_one(text) for text in responses))  # type: ignore[arg-type]  # it says which
+    combined = sp.combine(operation, *(_one(text) for text in responses))  # type: ignore[arg-type]  # it says which
     with folder_when_complete(out, ours=FILES) as folder:
         if folder is not None:
-            found.save(folder / flying.RESPONSES)
-            write_json(folder / "responses.json", found.as_dict())
-            sp.report(found, path=folder / "report.html")
+            combined.save(folder / flying.RESPONSES)
+            write_json(folder / "responses.json", combined.as_dict())
+            sp.report(combined, path=folder / "report.html")
     if json:
-        typer.echo(as_json(found.as_dict()))
+        typer.echo(as_json(combined.as_dict()))
     elif not quiet:
-        typer.echo(repr(found))
+        typer.echo(repr(combined))
         if out is not None:
             typer.echo(f"\n{told(out, FILES)}")
 
@@ -62,6 +62,6 @@ def _one(text: str) -> FrequencyResponse:
     if not path.exists() and ":" in text:
         name, _, pair = text.rpartition(":")
         path = Path(name)
-    found = flying.load_responses(path)
+    responses = flying.load_responses(path)
     output, _, input = pair.partition("/")
-    return found.select((output.strip(),), (input.strip(),)) if pair else found
+    return responses.select((output.strip(),), (input.strip(),)) if pair else responses

@@ -46,12 +46,12 @@ def compare(
     how = asked(mapping, unit, drop_bad_stamps)
     flown = conditioned(flight, rate=rate, cutoff=cutoff, how=how) if flight else None
     names = [name.strip() for name in outputs.split(",")] if outputs else None
-    found = sp.compare(cases, flown, outputs=names)
+    comparison = sp.compare(cases, flown, outputs=names)
     if out is not None:
-        sp.report(found, path=out)
+        sp.report(comparison, path=out)
     if json:
-        typer.echo(as_json(found.to_document()))
+        typer.echo(as_json(comparison.to_document()))
     elif not quiet:
-        typer.echo(repr(found))
+        typer.echo(repr(comparison))
         if out is not None:
             typer.echo(f"Written: {out}")

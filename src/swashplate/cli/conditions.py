@@ -113,9 +113,9 @@ class Conditions:
 def speeds(text: str) -> tuple[float, ...]:
     """One speed, or a range A-B or A-B/STEP, ascending."""
     number = r"\d+(?:\.\d*)?|\.\d+"
-    if found := re.fullmatch(rf"({number})-({number})(?:/({number}))?", text.strip()):
-        low, high = float(found[1]), float(found[2])
-        step = float(found[3]) if found[3] else (high - low) / (_RANGE_POINTS - 1)
+    if match := re.fullmatch(rf"({number})-({number})(?:/({number}))?", text.strip()):
+        low, high = float(match[1]), float(match[2])
+        step = float(match[3]) if match[3] else (high - low) / (_RANGE_POINTS - 1)
         if not (low < high and step > 0.0 and (high - low) / step <= 500):
             raise SwashError(f"'{text}' is no ascending range of at most 500 speeds.", channel="--speed")
         return tuple(low + i * step for i in range(int((high - low) / step + 1e-9) + 1))
@@ -236,18 +236,18 @@ def drawn(vehicle: Vehicle, fit: Path, *, count: int, seed: int = 1) -> tuple[Ve
     """
     import swashplate as sp
 
-    found = sp.load(fit, equations=vehicle)
-    if not isinstance(found, sp.Result):
+    fitted = sp.load(fit, equations=vehicle)
+    if not isinstance(fitted, sp.Result):
         raise SwashError("holds no fit.", where=fit, channel="--posterior", hint="Give the fit.json beside the model.")
     own = vehicle.card.values()
-    for name in found.names:
-        if not math.isclose(own.get(name, math.nan), found[name].value, rel_tol=1e-6, abs_tol=1e-12):
+    for name in fitted.names:
+        if not math.isclose(own.get(name, math.nan), fitted[name].value, rel_tol=1e-6, abs_tol=1e-12):
             has = f"{own[name]:.6g}" if name in own else "none"
             raise SwashError(
-                f"is of another model: it found {name} = {found[name].value:.6g}, {vehicle.card.title} has {has}.",
+                f"is of another model: it found {name} = {fitted[name].value:.6g}, {vehicle.card.title} has {has}.",
                 where=fit,
                 channel="--posterior",
                 hint="Give the model file that this fit wrote beside it.",
             )
-    values = found.draw_values(count, seed=seed, within=vehicle)
+    values = fitted.draw_values(count, seed=seed, within=vehicle)
     return tuple(vehicle.with_values({n: float(v[k]) for n, v in values.items()}) for k in range(count))

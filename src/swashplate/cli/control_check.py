@@ -88,7 +88,7 @@ def check(
 
     with folder_when_complete(out, ours=OURS) as folder:
         with doing("checking the controller", quiet=quiet or json):
-            found = sp.check_controller(
+            checked = sp.check_controller(
                 given.vehicle_of(model, None, None),
                 controller,
                 speed=speed,
@@ -103,8 +103,8 @@ def check(
                 required_delay=None if delay_margin is None else delay_margin / 1e3,
             )
         if folder is not None:
-            sp.report(found, path=folder / "report.html")
-            found.save(folder / "check.json")
+            sp.report(checked, path=folder / "report.html")
+            checked.save(folder / "check.json")
     written = () if out is None else tuple(dict.fromkeys(place_of(out, name, OURS) for name in OURS))
-    shared.show(found, written=written, json=json, quiet=quiet)
-    end_with(found.problems)
+    shared.show(checked, written=written, json=json, quiet=quiet)
+    end_with(checked.problems)

@@ -76,7 +76,7 @@ def derivatives(
             typer.echo(f"At {speed:g} m/s: largest relative change of a mode, and of q/B1, p/A1, r/theta0T, w/theta0")
             console().print(tabulate(*study.rows(place)))
         return
-    found = sp.derivatives(
+    derivative_tables = sp.derivatives(
         asked.vehicle,
         curve.trims,
         primed=primed,
@@ -86,32 +86,32 @@ def derivatives(
         seed=seed,
     )
     if plot is not None:
-        sp.report(found, path=plot)
+        sp.report(derivative_tables, path=plot)
     if json:
-        typer.echo(as_json({"vehicle": asked.name, **found.as_dict(), "remarks": remarks}))
+        typer.echo(as_json({"vehicle": asked.name, **derivative_tables.as_dict(), "remarks": remarks}))
         return
-    for at, table in zip(found.trims, found.tables, strict=True):
+    for at, table in zip(derivative_tables.trims, derivative_tables.tables, strict=True):
         typer.echo(f"At {at.speed:g} m/s (flapping follows the motion without delay)")
-        console().print(tabulate(*found.rows(table), left=2))
-    if (wide := found.bounds) is not None:
+        console().print(tabulate(*derivative_tables.rows(table), left=2))
+    if (wide := derivative_tables.bounds) is not None:
         typer.echo(f"\n5 % and 95 % bounds of {wide.draws} samples of the card ({wide.refused} could not be trimmed).")
         _modes(wide)
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
 
-def _compared(asked: given.Conditions, found: PublishedComparison, path: Path, json: bool) -> None:
+def _compared(asked: given.Conditions, comparison: PublishedComparison, path: Path, json: bool) -> None:
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table as tabulate
 
     if json:
         told = {"vehicle": asked.name, "speed": asked.speeds[0], "published": str(path)}
-        typer.echo(as_json(told | found.as_dict()))
+        typer.echo(as_json(told | comparison.as_dict()))
         return
     typer.echo(f"At {asked.speeds[0]:g} m/s, published in {path} (small: below 2 % of the largest of its kind)")
-    console().print(tabulate(*found.rows(), left=2))
+    console().print(tabulate(*comparison.rows(), left=2))
     typer.echo("\nMean difference (each at most 100 %), and derivatives within 10 %:")
-    console().print(tabulate(*found.step_rows()))
+    console().print(tabulate(*comparison.step_rows()))
 
 
 def _modes(wide: CardSpread) -> None:

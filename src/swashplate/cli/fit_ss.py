@@ -63,13 +63,13 @@ def fit_ss(
 
     named, place = flying.structures_and_responses(structure, responses, search=search)
     begun, (limits, own) = [sp.structure(name) for name in named], flying.bands(band)
-    found = flying.load_responses(place)
+    measured = flying.load_responses(place)
     first, held = options.numbers_by_name(start, option="--start"), options.fixed_values(fix)
     names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps)
     flying.carried_out(
         lambda say: sp.fit_ss(
             begun,
-            found,
+            measured,
             search=search,
             start=first,
             start_from=flying.names(start_from) or None,

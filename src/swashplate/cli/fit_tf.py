@@ -54,11 +54,11 @@ def fit_tf(
     import swashplate as sp
     from swashplate.cli.reading import asked, read_all
 
-    found, limits, held = flying.load_responses(responses), flying.band(band), options.fixed_values(fix)
+    measured, limits, held = flying.load_responses(responses), flying.band(band), options.fixed_values(fix)
     names, how = flying.renamed(rename, option="--rename"), asked(mapping, unit, drop_bad_stamps)
     flying.carried_out(
         lambda say: sp.fit_tf(
-            found,
+            measured,
             input=input,
             outputs=flying.names(outputs) or None,
             form=form,

@@ -68,14 +68,14 @@ def bands(texts: Sequence[str] | None) -> tuple[tuple[float, float] | None, dict
     whole, some = [], {}
     for text in texts or ():
         name, equals, limits = text.rpartition("=")
-        found = band(limits)
-        assert found is not None
+        edges = band(limits)
+        assert edges is not None
         if not equals:
-            whole.append(found)
+            whole.append(edges)
         elif not name.strip() or name.strip() in some:
             raise SwashError(f"'{text}' gives no pair, or one that is given twice.", channel="--band")
         else:
-            some[name.strip()] = found
+            some[name.strip()] = edges
     if len(whole) > 1:
         raise SwashError(
             "two bands are given for all pairs.", channel="--band", hint="Say which pair: --band p/lateral=0.5-12"

@@ -29,9 +29,9 @@ def height_velocity(
     from swashplate.cli.console import as_json
 
     asked = given.conditions(vehicle, altitude=altitude, mass=mass, changed=changed, switched=switched)
-    found = sp.height_velocity(asked.vehicle, delay=delay, sink=sink, run=run, environment=asked.environment)
+    diagram = sp.height_velocity(asked.vehicle, delay=delay, sink=sink, run=run, environment=asked.environment)
     if out is not None:
-        sp.report(found, path=out)
-    typer.echo(as_json({"vehicle": vehicle, **found.as_dict()}) if json else repr(found))
+        sp.report(diagram, path=out)
+    typer.echo(as_json({"vehicle": vehicle, **diagram.as_dict()}) if json else repr(diagram))
     if out is not None and not json:
         typer.echo(f"Written: {out}")

@@ -39,14 +39,14 @@ def inspect(
             console().print(record_table(record))
             typer.echo(f"\nEvaluate it with `swash bench {flight}`.")
         return
-    found = look(read(flight, how=asked(mapping, unit, drop_bad_stamps)))
+    inspection = look(read(flight, how=asked(mapping, unit, drop_bad_stamps)))
     if json:
-        typer.echo(as_json(found.as_dict()))
+        typer.echo(as_json(inspection.as_dict()))
     elif not quiet:
-        console().print(found)
-    if found.damage:
+        console().print(inspection)
+    if inspection.damage:
         raise FlightError(
-            f"{'; '.join(found.damage)}.",
+            f"{'; '.join(inspection.damage)}.",
             where=flight,
             hint="Everything else was read" + (", and is shown." if not quiet else "."),
         )

@@ -25,12 +25,12 @@ def delays_from(texts: list[str] | None) -> dict[str, float] | float | None:
         return None
     plain = len(texts) == 1 and "=" not in texts[0]
     if plain:
-        found = {"": options.numbers(texts[0], option="--delay", count=1)[0]}
+        milliseconds = {"": options.numbers(texts[0], option="--delay", count=1)[0]}
     else:
         given = options.assignments(texts, option="--delay")
-        found = {name: options.numbers(value, option="--delay", count=1)[0] for name, value in given.items()}
-    for name, value in found.items():
+        milliseconds = {name: options.numbers(value, option="--delay", count=1)[0] for name, value in given.items()}
+    for name, value in milliseconds.items():
         if not 0.0 <= value <= 1000.0:
             told = f"{name}={value:g}" if name else f"{value:g}"
             raise SwashError(f"is {told} ms, expected 0 to 1000.", channel="--delay")
-    return found[""] / 1e3 if plain else {name: value / 1e3 for name, value in found.items()}
+    return milliseconds[""] / 1e3 if plain else {name: value / 1e3 for name, value in milliseconds.items()}

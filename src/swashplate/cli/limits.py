@@ -17,17 +17,17 @@ def limits(texts: list[str] | None) -> Limits:
     """`lean=30deg` and so on as what is judged by; those that are not given keep their defaults."""
     from swashplate.control.draws.spread import SHOWN, Limits
 
-    found = Limits()
+    chosen = Limits()
     for name, text in options.assignments(texts, option="--limit").items():
         if name not in SHOWN:
             raise SwashError(f"'{name}' is no limit; expected {', '.join(SHOWN)}.", channel="--limit")
         unit, factor = SHOWN[name]
         if text.strip() == "none":
-            found = replace(found, **{name: math.inf})
+            chosen = replace(chosen, **{name: math.inf})
             continue
         plain = text.strip().removesuffix(unit).strip()
         value = options.numbers(plain, option="--limit", count=1)[0]
         if not value > 0.0:
             raise SwashError(f"{name} is {text}, expected more than 0 {unit}.", channel="--limit")
-        found = replace(found, **{name: value / factor})
-    return found
+        chosen = replace(chosen, **{name: value / factor})
+    return chosen

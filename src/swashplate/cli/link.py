@@ -216,12 +216,12 @@ def _check(
     from swashplate.cli.flying import end_with
     from swashplate.json_text import as_json
 
-    found = sp.check_autopilot(made, firmware, name=name, servos=servos, mavlink=mavlink, timeout=timeout)
+    check = sp.check_autopilot(made, firmware, name=name, servos=servos, mavlink=mavlink, timeout=timeout)
     if json:
-        typer.echo(as_json(found.to_document()))
+        typer.echo(as_json(check.to_document()))
     elif not quiet:
-        typer.echo(repr(found))
-    end_with(found.problems)
+        typer.echo(repr(check))
+    end_with(check.problems)
 
 
 def _refuse_linear(name: str) -> None:

@@ -79,7 +79,7 @@ def accept(
     limits = flying.band(band)
     assert limits is not None
     with progress(quiet=quiet or json) as line:
-        found = sp.accept_autopilot(
+        acceptance = sp.accept_autopilot(
             where.vehicle,
             binary,
             out=out,
@@ -100,10 +100,10 @@ def accept(
             say=line.say,
         )
         line.say("writing the report")
-        found.save(out)
+        acceptance.save(out)
     if json:
-        typer.echo(as_json(found.to_document()))
+        typer.echo(as_json(acceptance.to_document()))
     elif not quiet:
-        typer.echo(repr(found))
+        typer.echo(repr(acceptance))
         typer.echo(f"\nReport: {out / 'report.html'}")
-    flying.end_with(found.problems)
+    flying.end_with(acceptance.problems)

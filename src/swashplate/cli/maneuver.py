@@ -213,8 +213,8 @@ def need(
     import swashplate as sp
     from swashplate.cli.console import as_json
 
-    found = sp.needed_excitation(validation, fit=fit, horizon=ahead)
-    typer.echo(as_json(found.to_document()) if json else repr(found))
+    excitation = sp.needed_excitation(validation, fit=fit, horizon=ahead)
+    typer.echo(as_json(excitation.to_document()) if json else repr(excitation))
 
 
 def _limit(item: str) -> tuple[str, float]:

@@ -26,7 +26,7 @@ def observability(
     from swashplate.cli.console import doing
 
     with doing("watching the observer", quiet=json):
-        found = sp.observability(
+        study = sp.observability(
             given.vehicle_of(model, None, switched),
             sensors,
             speeds=given.speeds(speed),
@@ -34,4 +34,4 @@ def observability(
             rate=rate,
             voltage=voltage,
         )
-    shared.show(found, written=(), json=json, quiet=False)
+    shared.show(study, written=(), json=json, quiet=False)

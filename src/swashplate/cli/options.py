@@ -130,14 +130,14 @@ def names(text: str) -> tuple[str, ...]:
 def numbers(text: str, *, option: str, count: int | None = None) -> list[float]:
     """Finite numbers, separated by commas."""
     try:
-        found = [float(part) for part in text.split(",")]
+        values = [float(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if not found or not all(map(math.isfinite, found)) or (count is not None and len(found) != count):
+        values = []
+    if not values or not all(map(math.isfinite, values)) or (count is not None and len(values) != count):
         several = "numbers" if count is None else f"{count} numbers"
         expected = "a number" if count == 1 else f"{several} separated by commas"
         raise SwashError(f"'{text}' is not {expected}.", channel=option)
-    return found
+    return values
 
 
 def _once(pairs: Sequence[tuple[str, str]], *, option: str) -> list[tuple[str, str]]:
@@ -155,8 +155,8 @@ def assignments(texts: Sequence[str] | None, *, option: str) -> dict[str, str]:
 
 def numbers_by_name(texts: Sequence[str] | None, *, option: str) -> dict[str, float]:
     """Repeated `name=number` by name."""
-    found = assignments(texts, option=option)
-    return {name: numbers(text, option=option, count=1)[0] for name, text in found.items()}
+    by_name = assignments(texts, option=option)
+    return {name: numbers(text, option=option, count=1)[0] for name, text in by_name.items()}
 
 
 def fixed_values(texts: Sequence[str] | None) -> dict[str, float]:

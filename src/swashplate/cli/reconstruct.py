@@ -34,12 +34,12 @@ def reconstruct(
 
     how = asked(mapping, unit, drop_bad_stamps)
     (flown,) = conditioned([flight], rate=rate, cutoff=0.0, how=how)
-    found = rebuild(flown)
+    reconstruction = rebuild(flown)
     if out is not None:
-        found.corrected(flown).save(out)
+        reconstruction.corrected(flown).save(out)
     if json:
-        typer.echo(as_json(found.as_dict()))
+        typer.echo(as_json(reconstruction.as_dict()))
     elif not quiet:
-        typer.echo(str(found))
+        typer.echo(str(reconstruction))
         if out is not None:
             typer.echo(f"Written: {out}")

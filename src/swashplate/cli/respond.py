@@ -69,7 +69,7 @@ def respond(
         check_disjoint(flights, log)
         with folder_when_complete(out, ours=FILES) as folder:
             line.say("computing responses")
-            found = sp.respond(
+            responses = sp.respond(
                 flights,
                 inputs=list(ins),
                 outputs=list(outs),
@@ -78,16 +78,16 @@ def respond(
                 windows=lengths,
                 direct=direct,
             )
-            document = {**found.as_dict(), "handling": [one.as_dict() for one in sp.handling_qualities(found)]}
+            document = {**responses.as_dict(), "handling": [one.as_dict() for one in sp.handling_qualities(responses)]}
             if folder is not None:
                 line.say("writing the report")
-                found.save(folder / flying.RESPONSES)
+                responses.save(folder / flying.RESPONSES)
                 write_json(folder / "responses.json", document)
-                sp.report(found, path=folder / "report.html")
+                sp.report(responses, path=folder / "report.html")
     if json:
         typer.echo(as_json(document))
     elif not quiet:
-        typer.echo(repr(found))
+        typer.echo(repr(responses))
         if out is not None:
             typer.echo(f"\n{told(out, FILES)}")
-    flying.end_with(found.problems)
+    flying.end_with(responses.problems)

@@ -41,9 +41,9 @@ def rotor_speed(
 
     bands = {}
     for text in line or ():
-        found = _LINE.fullmatch(text)
+        match = _LINE.fullmatch(text)
         try:
-            bands[found["name"]] = (float(found["low"]), float(found["high"]))  # type: ignore[index]
+            bands[match["name"]] = (float(match["low"]), float(match["high"]))  # type: ignore[index]
         except (TypeError, ValueError):
             raise SwashError(
                 f"'{text}' is no line.", channel="--line", hint="For example --line omega_upper=-40..-30."

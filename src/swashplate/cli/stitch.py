@@ -66,7 +66,7 @@ def _files(place: Path) -> list[Path]:
     """A point's file, or those of a folder."""
     if not place.is_dir():
         return [place]
-    found = sorted(place.glob("*.toml"))
-    if not found:
+    files = sorted(place.glob("*.toml"))
+    if not files:
         raise SwashError("has no .toml file in it.", where=place, channel="POINT")
-    return found
+    return files

@@ -31,8 +31,8 @@ def list_(json: options.Json = False) -> None:
     import swashplate as sp
     from swashplate.cli.console import as_json
 
-    found = sp.structures()
-    typer.echo(as_json(found.as_dict()) if json else repr(found))
+    ready = sp.structures()
+    typer.echo(as_json(ready.as_dict()) if json else repr(ready))
 
 
 @app.command()
@@ -49,11 +49,11 @@ def show(
     import swashplate as sp
     from swashplate.cli.console import as_json
 
-    found = sp.show_structure(structure)
+    shown = sp.show_structure(structure)
     if out is not None:
         if out.exists():
             raise SwashError("exists already; it is not overwritten.", where=out, hint="Choose another name.")
         sp.structure(structure).save(out)
-    typer.echo(as_json(found.as_dict()) if json else repr(found))
+    typer.echo(as_json(shown.as_dict()) if json else repr(shown))
     if out is not None and not json:
         typer.echo(f"\nWritten: {out}. Fit it: swash fit-ss {out} RESPONSES")

@@ -63,8 +63,8 @@ def validation_table(validation: Validation, *, width: int) -> TextTable:
     figures = figures if width >= _FIGURES_FROM else figures[:1]
     rows = []
     for name, horizon in dict.fromkeys((score.channel, score.horizon) for score in validation.scores):
-        found = {s.predictor: s for s in validation.scores if (s.channel, s.horizon) == (name, horizon)}
-        scores = {predictor: found.get(predictor) for predictor in PREDICTORS}
+        by_predictor = {s.predictor: s for s in validation.scores if (s.channel, s.horizon) == (name, horizon)}
+        scores = {predictor: by_predictor.get(predictor) for predictor in PREDICTORS}
         known = channel(name)
         row = [name, known.shown_unit, f"{horizon:g}"]
         for figure, _, style in figures:

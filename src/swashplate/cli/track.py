@@ -98,7 +98,7 @@ def track(
         progress(quiet=quiet or json) as line,
         folder_when_complete(out, ours=Tracking.files) as folder,
     ):
-        found = sp.track(
+        tracking = sp.track(
             read(log, how=asked(mapping, unit, drop_bad_stamps)),
             (sp.vehicle(model) if names else sp.structure(model)) if model is not None else equation or (),
             rate=rate,
@@ -116,17 +116,17 @@ def track(
             say=line.say,
         )
         if folder is not None:
-            found.write(folder)
-    code = None if c_code is None else found.code()
+            tracking.write(folder)
+    code = None if c_code is None else tracking.code()
     written = [] if code is None or c_code is None else code.save(c_code)
     if json:
-        typer.echo(as_json(found.to_document()))
+        typer.echo(as_json(tracking.to_document()))
     elif not quiet:
-        typer.echo(repr(found))
+        typer.echo(repr(tracking))
         for note in code.notes if code is not None else ():
             typer.echo(f"\n{note}")
         made = () if out is None else dict.fromkeys(str(place_of(out, name, Tracking.files)) for name in Tracking.files)
         files = [*map(str, written), *made]
         if files:
             typer.echo(f"\nWritten: {', '.join(files)}")
-    flying.end_with(found.problems)
+    flying.end_with(tracking.problems)

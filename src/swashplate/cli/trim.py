@@ -31,37 +31,37 @@ def trim(
     from swashplate.cli.console import as_json, console
     from swashplate.cli.tables import table
 
-    found = asked.curve(autorotation=autorotation)
-    asked.tell(found)
+    curve = asked.curve(autorotation=autorotation)
+    asked.tell(curve)
     if plot is not None:
         import swashplate as sp
 
-        sp.report(found, path=plot)
+        sp.report(curve, path=plot)
     if json:
-        typer.echo(as_json({"vehicle": asked.name, **found.as_dict()}))
+        typer.echo(as_json({"vehicle": asked.name, **curve.as_dict()}))
         return
-    if len(found.trims) == 1:
-        typer.echo(repr(found.trims[0]).splitlines()[0])
-        console().print(_one(found))
+    if len(curve.trims) == 1:
+        typer.echo(repr(curve.trims[0]).splitlines()[0])
+        console().print(_one(curve))
     else:
-        columns = {"speed [m/s]": [f"{at.speed:g}" for at in found.trims]}
-        columns |= {head: [f"{v:.3f}" for v in values] for head, values in list(found.columns().items())[1:]}
+        columns = {"speed [m/s]": [f"{at.speed:g}" for at in curve.trims]}
+        columns |= {head: [f"{v:.3f}" for v in values] for head, values in list(curve.columns().items())[1:]}
         if "power [W]" in columns:
-            columns["power [W]"] = [f"{v:.1f}" for v in found.columns()["power [W]"]]
+            columns["power [W]"] = [f"{v:.1f}" for v in curve.columns()["power [W]"]]
         console().print(table(list(columns), list(zip(*columns.values(), strict=True)), left=0))
     if plot is not None:
         typer.echo(f"Written: {plot}")
 
 
-def _one(found: TrimCurve) -> Any:
+def _one(curve: TrimCurve) -> Any:
     """Every input and state of a trim with its unit, angles also in degrees."""
     from swashplate.cli.tables import table
 
-    at = found.trims[0]
+    at = curve.trims[0]
     values, rows = {**at.commands(), **at.states()}, []
-    if (power := found.power(at)) is not None:
+    if (power := curve.power(at)) is not None:
         rows.append(("shaft power", f"{power:.1f}", "W", ""))
-    for name, unit in found.units().items():
+    for name, unit in curve.units().items():
         degrees = f"{round(math.degrees(values[name]), 3) + 0.0:.3f}" if unit == "rad" else ""
         rows.append((name, f"{round(values[name], 5) + 0.0:.5f}", unit, degrees))
     return table(("", "value", "unit", "in degrees"), rows, left=1)

@@ -119,22 +119,22 @@ def _cheaper(made: Sequence[Statement]) -> list[Statement]:
     turned = {(s.operation, s.reads): s.name for s in made if s.operation in ("SIN", "COS")}
     later = {s.name: place for place, s in enumerate(made)}
     inverted: set[str] = set()
-    found: list[Statement] = []
+    cheaper: list[Statement] = []
     for place, s in enumerate(made):
         if s.operation == "DIV" and s.reads[1] in shared:
             by = s.reads[1]
             inverse = "i_" + "".join(c if c.isalnum() else "_" for c in by)
             if by not in inverted:
                 inverted.add(by)
-                found.append(Statement(inverse, "INV", (by,)))
-            found.append(Statement(s.name, "MUL", (s.reads[0], inverse)))
+                cheaper.append(Statement(inverse, "INV", (by,)))
+            cheaper.append(Statement(s.name, "MUL", (s.reads[0], inverse)))
         elif s.operation == "TAN" and all(
             (k, s.reads) in turned and later[turned[k, s.reads]] < place for k in ("SIN", "COS")
         ):
-            found.append(Statement(s.name, "DIV", (turned["SIN", s.reads], turned["COS", s.reads])))
+            cheaper.append(Statement(s.name, "DIV", (turned["SIN", s.reads], turned["COS", s.reads])))
         else:
-            found.append(s)
-    return found
+            cheaper.append(s)
+    return cheaper
 
 
 def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str], outputs: Sequence[str]) -> str:
@@ -153,10 +153,10 @@ def body(function: Any, *, real: str, precision: Precision, inputs: Sequence[str
     return printed(statements(function, precision=precision, inputs=inputs), real, precision, outputs)
 
 
-def printed(found: Statements, real: str, precision: Precision, outputs: Sequence[str]) -> str:
+def printed(code: Statements, real: str, precision: Precision, outputs: Sequence[str]) -> str:
     """Statements in C, then stores of the outputs into arrays of these names."""
-    lines = [f"  {s.text(real, precision)}" for s in found.body]
-    stores = [f"  {outputs[o]}[{place}] = {text};" for (o, place), text in found.outputs.items()]
+    lines = [f"  {s.text(real, precision)}" for s in code.body]
+    stores = [f"  {outputs[o]}[{place}] = {text};" for (o, place), text in code.outputs.items()]
     return "\n".join([*lines, *stores]) + "\n"
 
 

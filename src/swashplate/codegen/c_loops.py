@@ -16,7 +16,7 @@ SETTLED: dict[Precision, float] = {"double": 1e-8, "single": 1e-4}
 """Relative change of a step after which the error, of the order of its square, is below rounding."""
 
 
-def looped(found: Statements, steps: Sequence[int], *, real: str, precision: Precision, outputs: Sequence[str]) -> str:
+def looped(code: Statements, steps: Sequence[int], *, real: str, precision: Precision, outputs: Sequence[str]) -> str:
     """Statements in C that compute a function with roots.
 
     They read and write an array `root`, and read `known`: where it is not zero, `root` holds guesses, and a search that
@@ -29,11 +29,11 @@ def looped(found: Statements, steps: Sequence[int], *, real: str, precision: Pre
     """
     count, n = len(steps), len(outputs)
     lines: list[str] = []
-    for search in searches(found, count, first=n):
+    for search in searches(code, count, first=n):
         lines += [f"  {_named(s).text(real, precision)}" for s in search.before]
         if search.sought:
             lines += _loop(search, steps, real, precision)
-    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in found.outputs.items() if o < n]
+    stores = [f"  {outputs[o]}[{p}] = {_renamed(t)};" for (o, p), t in code.outputs.items() if o < n]
     head = [f"  {real} {', '.join(f'root{i} = root[{i}]' for i in range(count))};", "  int step;"]
     kept = [f"  root[{i}] = root{i};" for i in range(count)]
     return "\n".join([*head, *lines, *kept, *stores]) + "\n"
@@ -58,10 +58,10 @@ class Search:
     slope: tuple[str, ...]
 
 
-def searches(found: Statements, count: int, *, first: int) -> list[Search]:
+def searches(code: Statements, count: int, *, first: int) -> list[Search]:
     """A function with `count` roots in the order of its searches; outputs `first` and the next two are the roots'."""
-    start, value, slope = ([found.outputs[first + k, i] for i in range(count)] for k in range(3))
-    needs = _needs(found.body, count)
+    start, value, slope = ([code.outputs[first + k, i] for i in range(count)] for k in range(3))
+    needs = _needs(code.body, count)
     rounds = _rounds([*zip(start, value, slope, strict=True)], needs, count)
 
     def known_after(name: str) -> int:
@@ -73,8 +73,8 @@ def searches(found: Statements, count: int, *, first: int) -> list[Search]:
     for number in range(max(rounds, default=0) + 1):
         sought = tuple(i for i in range(count) if rounds[i] == number + 1)
         texts = (tuple(t[i] for i in sought) for t in (start, value, slope))
-        before = tuple(s for s in found.body if not needs[s.name][1] and known_after(s.name) == number)
-        made.append(Search(before, sought, tuple(s for s in found.body if needs[s.name][1] & set(sought)), *texts))
+        before = tuple(s for s in code.body if not needs[s.name][1] and known_after(s.name) == number)
+        made.append(Search(before, sought, tuple(s for s in code.body if needs[s.name][1] & set(sought)), *texts))
     return made
 
 
@@ -94,11 +94,11 @@ def _needs(body: Sequence[Statement], count: int) -> _Needs:
 
 def _rounds(texts: Sequence[tuple[str, str, str]], needs: _Needs, count: int) -> list[int]:
     """The loop, from 1, in which each root is sought: after those that it depends on."""
-    found: list[int] = []
+    rounds: list[int] = []
     for i in range(count):
         before = frozenset().union(*(needs.get(text, (frozenset(), frozenset()))[0] for text in texts[i]))
-        found.append(1 + max((found[r] for r in before), default=0))
-    return found
+        rounds.append(1 + max((rounds[r] for r in before), default=0))
+    return rounds
 
 
 def _renamed(text: str) -> str:

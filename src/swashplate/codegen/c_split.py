@@ -11,7 +11,7 @@ ROOTS = ("guess[", "root[")
 _MOVING = ("x[", *ROOTS)
 
 
-def split(found: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = FIXED) -> tuple[Statements, Statements]:
+def split(code: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = FIXED) -> tuple[Statements, Statements]:
     """What nothing `moving` moves, with what the rest needs of it as outputs, and the rest, which reads it as `c[i]`.
 
     What the rest divides by is inverted once, before.
@@ -24,7 +24,7 @@ def split(found: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = 
     first: list[Statement] = []
     rest: list[Statement] = []
     moved: set[str] = set()
-    for s in found.body:
+    for s in code.body:
         if not any(name in moved or name.startswith(moving) for name in s.reads):
             first.append(s)
             continue
@@ -37,13 +37,13 @@ def split(found: Statements, *, moving: tuple[str, ...] = _MOVING, fixed: str = 
         else:
             rest.append(s)
     made = {s.name for s in first}
-    asked = [*(name for s in rest for name in s.reads), *found.outputs.values()]
+    asked = [*(name for s in rest for name in s.reads), *code.outputs.values()]
     kept = {name: f"{fixed}[{i}]" for i, name in enumerate(dict.fromkeys(name for name in asked if name in made))}
     return (
         Statements(tuple(first), {(0, i): name for i, name in enumerate(kept)}),
         Statements(
             tuple(Statement(s.name, s.operation, _renamed(s.reads, kept)) for s in rest),
-            {place: kept.get(text, text) for place, text in found.outputs.items()},
+            {place: kept.get(text, text) for place, text in code.outputs.items()},
         ),
     )
 

@@ -54,25 +54,25 @@ class Tangents:
         lines = []
         for s in made:
             lines.append(s.text("double", "double"))
-            found = _moved(s, [self.of(text) for text in s.reads])
-            if found is not None:
-                lines.append(f"const vec d_{s.name} = {found};")
+            moved = _moved(s, [self.of(text) for text in s.reads])
+            if moved is not None:
+                lines.append(f"const vec d_{s.name} = {moved};")
                 self._made[s.name] = f"d_{s.name}"
         return lines
 
-    def stores(self, found: Statements, outputs: Mapping[int, str]) -> list[str]:
+    def stores(self, code: Statements, outputs: Mapping[int, str]) -> list[str]:
         """Outputs, by number, and their tangents into arrays of these names, and those with a `d` in front."""
         lines = []
-        for (output, place), text in found.outputs.items():
+        for (output, place), text in code.outputs.items():
             if output in outputs:
                 lines.append(f"{outputs[output]}[{place}] = {text};")
                 lines.append(f"d{outputs[output]}[{place}] = {self.of(text) or '(vec){0}'};")
         return lines
 
-    def rooted(self, found: Statements, count: int) -> tuple[list[str], Statements]:
+    def rooted(self, code: Statements, count: int) -> tuple[list[str], Statements]:
         """A function with `count` roots that are known (an array `root`), and the function that reads them by name."""
         lines = [f"const double root{i} = root[{i}], guess{i} = root[{i}];" for i in range(count)]
-        for search in searches(found, count, first=1):
+        for search in searches(code, count, first=1):
             lines += self.body([_named(s) for s in search.before])
             lines += self.body([_named(s) for s in search.inside])
             for i, value, slope in zip(search.sought, search.value, search.slope, strict=True):
@@ -80,7 +80,7 @@ class Tangents:
                 if moved is not None:
                     lines.append(f"const vec d_root{i} = {moved} * (-1 / {_renamed(slope)});")
                     self._made[f"root{i}"] = f"d_root{i}"
-        return lines, Statements((), {place: _renamed(text) for place, text in found.outputs.items()})
+        return lines, Statements((), {place: _renamed(text) for place, text in code.outputs.items()})
 
 
 def _renamed(text: str) -> str:

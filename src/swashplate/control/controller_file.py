@@ -38,5 +38,5 @@ def read_controller(path: str | Path) -> Controller:
     name = document.get("type")
     if not isinstance(name, str) or name not in CONTROLLERS:
         raise ControllerError(f"is {name!r:.60}, expected {', '.join(CONTROLLERS)}.", where=path, channel="type")
-    found: Controller = CONTROLLERS[name].from_document(document, str(path))
-    return found
+    controller: Controller = CONTROLLERS[name].from_document(document, str(path))
+    return controller

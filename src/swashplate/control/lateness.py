@@ -31,21 +31,21 @@ def _further(
     """What is late beside what the equations delay."""
     known, believed = input_delays(vehicle), dict(getattr(controller, "delays", {}))
     if given is not None:
-        found, whose = complete_delays(vehicle, given), "as given"
-        if any(known.get(name, 0.0) > value + 1e-4 for name, value in found.items()):
+        late, whose = complete_delays(vehicle, given), "as given"
+        if any(known.get(name, 0.0) > value + 1e-4 for name, value in late.items()):
             whose += f"; Careful: identified were {_listed(known)}"
     elif getattr(controller, "at_once", False):
         left = f"; the identified {_listed(known)} are left out" if any(known.values()) else ""
         return f"nothing: the hold acts at once{left}"
     elif known:
-        found, whose = known, "identified"
+        late, whose = known, "identified"
     elif any(believed.values()):
-        found, whose = believed, "as the controller was designed for: the model knows none"
+        late, whose = believed, "as the controller was designed for: the model knows none"
     elif inside:
         return ""
     else:
         return "nothing: no delay of this model is known, --delay says one"
-    return f"{_listed(found) or 'nothing'} ({whose})"
+    return f"{_listed(late) or 'nothing'} ({whose})"
 
 
 def _listed(delays: Mapping[str, float]) -> str:

@@ -81,7 +81,7 @@ def ardupilot_state_space(model: Linear, sticks: Sticks) -> tuple[dict[str, floa
     plain = _in_sticks(model, sticks)
     pairs = [pair for pair in _TILTS if set(pair) <= set(plain.states)]
     tried = [_reduced(plain, pair) for pair in pairs] or [_reduced(plain, None)]
-    numbers = min(tried, key=lambda found: max(_moved(plain, assembled(found)).values()))
+    numbers = min(tried, key=lambda entries: max(_moved(plain, assembled(entries)).values()))
     for key, names in {"rp": ("roll", "pitch"), "ped": ("yaw",), "col": ("collective",)}.items():
         late = [plain.delay(plain.outputs[0], name) for name in names if name in plain.inputs]
         if any(late):
@@ -110,8 +110,8 @@ def _reduced(plain: Linear, kept: tuple[str, str] | None) -> dict[str, float]:
     held = _without(plain, [s for s in plain.states if s in _SLOW], steady=False)
     fast = [s for s in held.states if s not in _BODY and (kept is None or s not in kept)]
     settled = _without(held, fast, steady=True)
-    found = _with_tilts(settled, kept) if kept else _quasi_steady(settled)
-    return {key: float(value) for key, value in found.items() if value}
+    entries = _with_tilts(settled, kept) if kept else _quasi_steady(settled)
+    return {key: float(value) for key, value in entries.items() if value}
 
 
 def to_json(numbers: Mapping[str, float]) -> str:
@@ -253,23 +253,23 @@ def _with_tilts(model: Linear, kept: tuple[str, str]) -> dict[str, float]:
     A[rest] += model.A[np.ix_(rest, place)] @ settled[0]
     B[rest] += model.A[np.ix_(rest, place)] @ settled[1]
     body = replace(model, A=A, B=B)
-    found = _quasi_steady(body)
-    found |= {key: _entry(model, row, names[tilt]) for (row, tilt), key in _BY_DISC.items()}
-    found |= {"tf": tf, "Lfa1s": tf * float(inner[0, 1]), "Mfb1s": tf * float(inner[1, 0])}
+    entries = _quasi_steady(body)
+    entries |= {key: _entry(model, row, names[tilt]) for (row, tilt), key in _BY_DISC.items()}
+    entries |= {"tf": tf, "Lfa1s": tf * float(inner[0, 1]), "Mfb1s": tf * float(inner[1, 0])}
     for k, (roll, pitch) in enumerate((("Lflt", "Lflg"), ("Mflt", "Mflg"))):
-        found[roll] = tf * float(model.B[place[k], model.inputs.index("roll")])
-        found[pitch] = tf * float(model.B[place[k], model.inputs.index("pitch")])
-    return found
+        entries[roll] = tf * float(model.B[place[k], model.inputs.index("roll")])
+        entries[pitch] = tf * float(model.B[place[k], model.inputs.index("pitch")])
+    return entries
 
 
 def _moved(one: Linear, other: Linear) -> dict[str, float]:
     """Largest difference of the on-axis rate responses by stick, as a share of the response's peak."""
-    found = {}
+    by_stick = {}
     for stick, rate in {"roll": "p", "pitch": "q", "yaw": "r"}.items():
         if stick in one.inputs and rate in one.states:
             before, after = (_response(model, rate, stick) for model in (one, other))
-            found[stick] = float(np.max(np.abs(after - before)) / np.max(np.abs(before)))
-    return found
+            by_stick[stick] = float(np.max(np.abs(after - before)) / np.max(np.abs(before)))
+    return by_stick
 
 
 def _response(model: Linear, output: str, stick: str) -> Complex:

@@ -43,17 +43,17 @@ def fly_in_c(
     fly, precision = _compiled(equations, str(x0.dtype)), x0.dtype
     start, driving, numbers = (np.ascontiguousarray(table, precision) for table in (x0, rows, p))
     count, n = start.shape[1], (rows.shape[0] - 1) // keep
-    found = np.empty((n + 1, *start.shape), precision)
-    found[0] = start
+    states = np.empty((n + 1, *start.shape), precision)
+    states[0] = start
     given = [table.ctypes.data for table in (start, driving, numbers)]
     shape = (n * keep, keep, int(held), driving.shape[2], numbers.shape[1])
 
     def part(first: int) -> None:
-        fly(*given, float(dt), *shape, first, min(first + _PART, count), count, found.ctypes.data + found[0].nbytes)
+        fly(*given, float(dt), *shape, first, min(first + _PART, count), count, states.ctypes.data + states[0].nbytes)
 
     with ThreadPoolExecutor(_cores()) as threads:
         list(threads.map(part, range(0, count, _PART)))
-    return found
+    return states
 
 
 def _cores() -> int:

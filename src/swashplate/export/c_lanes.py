@@ -43,8 +43,8 @@ def lane_code(equations: Equations, precision: Precision) -> str:
     """
     traced = traced_rates(equations)
     function, steps = traced.function, traced.steps
-    found = statements(function, precision=precision, inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
-    of_card, rest = split(found, moving=("x[", "w[", *ROOTS), fixed="cp")
+    code = statements(function, precision=precision, inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
+    of_card, rest = split(code, moving=("x[", "w[", *ROOTS), fixed="cp")
     of_inputs, rest = split(rest)
     whole, bits, rounding = _WHOLE[precision]
     kernel = KERNELS["float64" if precision == "double" else "float32"]
@@ -88,10 +88,10 @@ def _line(s: Statement, precision: Precision) -> str:
     return Statement(s.name, s.operation, tuple(map(_of_lane, s.reads))).text("real", precision)
 
 
-def _plain(found: Statements, out: str, precision: Precision) -> str:
+def _plain(code: Statements, out: str, precision: Precision) -> str:
     """One loop over the lanes."""
-    lines = [_line(s, precision) for s in found.body]
-    return _loop([*lines, *(f"{out}[{place}][l] = {_of_lane(text)};" for (_, place), text in found.outputs.items())])
+    lines = [_line(s, precision) for s in code.body]
+    return _loop([*lines, *(f"{out}[{place}][l] = {_of_lane(text)};" for (_, place), text in code.outputs.items())])
 
 
 def _loop(lines: Iterable[str], *, pragma: str = "", indent: str = "  ") -> str:
@@ -99,10 +99,10 @@ def _loop(lines: Iterable[str], *, pragma: str = "", indent: str = "  ") -> str:
     return f'{indent}_Pragma("omp simd{pragma}") for (int l = 0; l < LANES; ++l) {{\n{body}{indent}}}\n' if body else ""
 
 
-def _moving(found: Statements, steps: Sequence[int], precision: Precision) -> str:
+def _moving(code: Statements, steps: Sequence[int], precision: Precision) -> str:
     """The rates: loops over lanes between searches, with arrays for what one makes and another reads."""
-    order = searches(found, len(steps), first=1)
-    rates = {place: text for (output, place), text in found.outputs.items() if output == 0}
+    order = searches(code, len(steps), first=1)
+    rates = {place: text for (output, place), text in code.outputs.items() if output == 0}
     home: dict[str, tuple[int, bool]] = {}
     for number, search in enumerate(order):
         home |= {s.name: (number, False) for s in search.before}

@@ -46,8 +46,8 @@ def stages(model: Traced, *, real: str, precision: Precision) -> Stages:
         first, rest = split(statements(model.rates, precision=precision, inputs=given))
         moving = printed(rest, real, precision, ["rates"])
     else:
-        found = statements(model.looped.function, precision=precision, inputs=[*given, "guess", "root"])
-        first, rest = split(found)
+        code = statements(model.looped.function, precision=precision, inputs=[*given, "guess", "root"])
+        first, rest = split(code)
         moving = looped(rest, model.looped.steps, real=real, precision=precision, outputs=["rates"])
     count = 0 if model.looped is None else len(model.looped.steps)
     return Stages(printed(first, real, precision, [FIXED]), moving, len(first.outputs), count)

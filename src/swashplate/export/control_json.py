@@ -93,12 +93,12 @@ def _names(document: Mapping[str, Any], key: str, path: str | Path) -> tuple[str
 
 def _matrix(document: Mapping[str, Any], key: str, shape: tuple[int, int], path: str | Path) -> Array:
     try:
-        found = np.array(document.get(key), dtype=np.float64).reshape(shape if 0 in shape else (-1, shape[1]))
+        matrix = np.array(document.get(key), dtype=np.float64).reshape(shape if 0 in shape else (-1, shape[1]))
     except (TypeError, ValueError):
-        found = np.full((1, 1), np.nan)
-    if found.shape != shape or not np.all(np.isfinite(found)):
+        matrix = np.full((1, 1), np.nan)
+    if matrix.shape != shape or not np.all(np.isfinite(matrix)):
         raise ExportError(f"is no matrix of {shape[0]} by {shape[1]} numbers.", where=path, channel=key)
-    return found
+    return matrix
 
 
 def _table(document: Mapping[str, Any], key: str, path: str | Path) -> Mapping[str, Any]:

@@ -144,9 +144,9 @@ def _without_delays(model: Model, name: str) -> tuple[Linear, str]:
     if isinstance(model, Linear):
         plain, known = model, dict(model.delays)
     else:
-        found = structure_of(model)
-        plain = of_state_space(replace(found, delays={}), name=name)
-        known = {key: float(expression(found.numbers())) for key, expression in found.delays.items()}
+        structure = structure_of(model)
+        plain = of_state_space(replace(structure, delays={}), name=name)
+        known = {key: float(expression(structure.numbers())) for key, expression in structure.delays.items()}
     late = {name: delay for name, delay in known.items() if delay}
     told = ", ".join(f"{name} {1e3 * delay:.3g} ms" for name, delay in late.items())
     return replace(plain, delays={}), f"Left out: the model's delays ({told})." if late else ""

@@ -74,32 +74,32 @@ def logged_delays(vehicle: Vehicle) -> dict[str, float]:
     Raises:
         ExportError: where the card remembers none.
     """
-    if not (found := input_delays(vehicle)):
+    if not (delays := input_delays(vehicle)):
         raise ExportError(
             "the card remembers no delays.",
             where=vehicle.card.path or vehicle.name,
             channel="--delays",
             hint="Only a model that `swash identify` wrote has them.",
         )
-    return found
+    return delays
 
 
 def of_vehicle(vehicle: Vehicle, trim: Trim, *, name: str, delays: Mapping[str, float] | None = None) -> Linear:
     """A vehicle about a trim, exactly differentiated; the outputs are the states. Delays of inputs [s] where given."""
-    found = linearize(vehicle, trim)
+    linear = linearize(vehicle, trim)
     units = dict(zip(vehicle.state_names, vehicle.state_units, strict=True))
     units |= dict(zip(vehicle.input_names, vehicle.input_units, strict=True))
     return Linear(
         name,
         vehicle.card.title,
         vehicle.card.trust,
-        found.A,
-        found.B,
-        found.C,
-        found.D,
-        found.states,
-        found.inputs,
-        found.states,
+        linear.A,
+        linear.B,
+        linear.C,
+        linear.D,
+        linear.states,
+        linear.inputs,
+        linear.states,
         units,
         dict(delays or {}),
         about={**trim.states(), **trim.commands()},

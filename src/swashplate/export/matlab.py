@@ -58,20 +58,20 @@ def read_matlab(path: str | Path) -> Linear:
         FlightError: where it is no .mat file of level 5.
         ExportError: naming the variable that is missing, of another shape or no number.
     """
-    found = mat.load(open_source(path))
-    states, inputs, outputs = (_texts(found, f"{kind}_names", path) for kind in ("state", "input", "output"))
+    variables = mat.load(open_source(path))
+    states, inputs, outputs = (_texts(variables, f"{kind}_names", path) for kind in ("state", "input", "output"))
     n, m, k = len(states), len(inputs), len(outputs)
-    delays = _numbers(found, "io_delay", (k, m), path)
+    delays = _numbers(variables, "io_delay", (k, m), path)
     starts = [
-        *zip(states, _numbers(found, "state_start", (n, 1), path)[:, 0], strict=True),
-        *zip(inputs, _numbers(found, "input_start", (m, 1), path)[:, 0], strict=True),
+        *zip(states, _numbers(variables, "state_start", (n, 1), path)[:, 0], strict=True),
+        *zip(inputs, _numbers(variables, "input_start", (m, 1), path)[:, 0], strict=True),
     ]
     units: dict[str, str] = {}
     for kind, names in (("state", states), ("input", inputs), ("output", outputs)):
-        units |= dict(zip(names, _texts(found, f"{kind}_units", path), strict=True))
+        units |= dict(zip(names, _texts(variables, f"{kind}_units", path), strict=True))
     shapes = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m)}
-    name, title, trust = (str(found[key]) if isinstance(found.get(key), str) else "" for key in _WORDS)
-    A, B, C, D = (_numbers(found, key, shape, path) for key, shape in shapes.items())
+    name, title, trust = (str(variables[key]) if isinstance(variables.get(key), str) else "" for key in _WORDS)
+    A, B, C, D = (_numbers(variables, key, shape, path) for key, shape in shapes.items())
     return Linear(
         name,
         title,
@@ -92,8 +92,8 @@ def read_matlab(path: str | Path) -> Linear:
 _WORDS = ("name", "title", "trust")
 
 
-def _texts(found: Mapping[str, Any], key: str, path: str | Path) -> tuple[str, ...]:
-    value = found.get(key)
+def _texts(variables: Mapping[str, Any], key: str, path: str | Path) -> tuple[str, ...]:
+    value = variables.get(key)
     listed = [value] if isinstance(value, str) else value
     if not isinstance(listed, list):
         raise ExportError(
@@ -106,8 +106,8 @@ def _texts(found: Mapping[str, Any], key: str, path: str | Path) -> tuple[str, .
     return tuple(entry if isinstance(entry, str) else "" for entry in listed)
 
 
-def _numbers(found: Mapping[str, Any], key: str, shape: tuple[int, int], path: str | Path) -> Any:
-    value = mat.numbers(found.get(key))
+def _numbers(variables: Mapping[str, Any], key: str, shape: tuple[int, int], path: str | Path) -> Any:
+    value = mat.numbers(variables.get(key))
     if value is None or value.size != shape[0] * shape[1] or not np.all(np.isfinite(value)):
         raise ExportError(f"is no matrix of {shape[0]} by {shape[1]} numbers.", where=path, channel=key)
     return value.reshape(shape)

@@ -94,7 +94,7 @@ def _blanks(model: Traced, precision: Precision) -> dict[str, str]:
 
 
 def _filled(text: str, blanks: Mapping[str, str]) -> str:
-    return re.sub(r"@(\w+)@", lambda found: blanks[found[1]], text)
+    return re.sub(r"@(\w+)@", lambda match: blanks[match[1]], text)
 
 
 def _variables(model: Traced) -> dict[str, tuple[Variable, ...]]:

@@ -130,10 +130,10 @@ def _powers(slopes: Entries, moves: int) -> list[NDArray[np.bool_]]:
     """Where the series for the exponential is not zero, after each of its terms."""
     given = np.zeros((moves, moves), dtype=bool)
     given[tuple(np.array(slopes).T)] = True
-    found = [np.eye(moves, dtype=bool) | given]
+    powers = [np.eye(moves, dtype=bool) | given]
     for _ in range(1, _TERMS):
-        found.append(np.eye(moves, dtype=bool) | (given.astype(int) @ found[-1].astype(int) > 0))
-    return found
+        powers.append(np.eye(moves, dtype=bool) | (given.astype(int) @ powers[-1].astype(int) > 0))
+    return powers
 
 
 def _loops(N: int, slopes: Entries, seen: Entries, powers: list[NDArray[np.bool_]]) -> int:

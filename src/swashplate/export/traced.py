@@ -93,10 +93,10 @@ class _Remembering(CasadiBackend):
         return symbol
 
     def shown(self, expressions: Sequence[Any]) -> list[Any]:
-        found = list(expressions)
+        substituted = list(expressions)
         for symbol, value in reversed(self.hidden):  # later ones may be made of earlier ones
-            found = self._casadi.substitute(found, [symbol], [value])
-        return found
+            substituted = self._casadi.substitute(substituted, [symbol], [value])
+        return substituted
 
 
 def trace_vehicle(
@@ -201,7 +201,7 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
         )
 
     late = {i: sorted({model.delay(o, i) for o in model.outputs}) for i in model.inputs}
-    if torn := [name for name, found in late.items() if len(found) > 1]:
+    if torn := [name for name, times in late.items() if len(times) > 1]:
         told = ", ".join(
             f"{o}/{i} {1e3 * model.delay(o, i):.3g} ms" for i in torn for o in model.outputs if model.delay(o, i)
         )
@@ -212,7 +212,7 @@ def trace_linear(model: Linear, *, name: str) -> Traced:
             hint="Give the file one delay per input, or leave all of them out (--no-delays); --format matlab and "
             "control hold them.",
         )
-    delays = tuple(found[0] for found in late.values() if found)
+    delays = tuple(times[0] for times in late.values() if times)
     return Traced(
         name=name,
         title=model.title,

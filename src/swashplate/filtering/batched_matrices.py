@@ -115,8 +115,8 @@ class StackMatrices(JaxMatrices):
         """Mean, covariance and that of the innovations after readings by one call of C; None where there is no C."""
         if not stack_kernels.fits(P.shape[0]):
             return None
-        found = stack_kernels.updated(H.data, P.data, mean.data[:, 0], innovations.data[:, 0], jnp.asarray(noise))
-        return Stack(found[0][:, None]), Stack(found[1]), Stack(found[2])
+        arrays = stack_kernels.updated(H.data, P.data, mean.data[:, 0], innovations.data[:, 0], jnp.asarray(noise))
+        return Stack(arrays[0][:, None]), Stack(arrays[1]), Stack(arrays[2])
 
     def stacked(self, parts: Sequence[Stack], /) -> Stack:
         return Stack(jnp.concatenate([part.data for part in parts], axis=0))

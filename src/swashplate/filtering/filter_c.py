@@ -35,9 +35,9 @@ def filter_source(model: StochasticModel) -> str:
     vehicle = model.vehicle
     n, m = len(vehicle.state_names), len(vehicle.input_names)
     correction = _correction(model)
-    found = statements(correction, precision="double", inputs=["s", "y", "g"])
+    corrected = statements(correction, precision="double", inputs=["s", "y", "g"])
     of_sample = Tangents({"s": ("ds", None), "g": ("dg", None)})
-    correcting = [*of_sample.body(found.body), *of_sample.stores(found, dict(enumerate(_FOUND)))]
+    correcting = [*of_sample.body(corrected.body), *of_sample.stores(corrected, dict(enumerate(_FOUND)))]
     rates = traced_rates(model.equations)
     whole = statements(rates.function, precision="double", inputs=["x", "w", "p", *(name[:-1] for name in ROOTS)])
     of_card, rest = split(whole, moving=("x[", "w[", *ROOTS), fixed="cp")
@@ -69,7 +69,7 @@ def filter_source(model: StochasticModel) -> str:
         "CP": str(max(1, len(of_card.outputs))),
         "C": str(max(1, len(of_inputs.outputs))),
         "PUSHED": ", ".join(map(str, model.disturbed)),
-        "CORRECT": printed(found, "double", "double", _FOUND),
+        "CORRECT": printed(corrected, "double", "double", _FOUND),
         "CORRECT_MOVED": _indented(correcting),
         "OF_CARD": printed(of_card, "double", "double", ["cp"]),
         "OF_CARD_MOVED": _indented(card_lines),

@@ -59,9 +59,9 @@ class FilterLibrary:
     def rates_and_slopes(self, x: Array, w: Array, p: Array) -> tuple[Array, Array, Array]:
         """As `dynamics.rates_and_slopes`, with any axes in front; slopes by the voltage are left at zero."""
         front, n, m = x.shape[:-1], x.shape[-1], w.shape[-1]
-        found = np.empty((*front, n)), np.empty((*front, n, n)), np.empty((*front, n, m))
-        self._c.rates_and_slopes(math.prod(front), *map(flat, (x, w, p)), *found)
-        return found
+        results = np.empty((*front, n)), np.empty((*front, n, n)), np.empty((*front, n, m))
+        self._c.rates_and_slopes(math.prod(front), *map(flat, (x, w, p)), *results)
+        return results
 
 
 def flat(rows: Any) -> Array:

@@ -63,11 +63,11 @@ class JaxMatrices:
         rest = self.scalars(w)
 
         def both(row: Any) -> tuple[Any, Any]:
-            found = self.column(f([row[i] for i in range(x.shape[0])], rest))[:, 0]
-            return found, found
+            value = self.column(f([row[i] for i in range(x.shape[0])], rest))[:, 0]
+            return value, value
 
-        J, found = jax.jacfwd(both, has_aux=True)(x[:, 0])
-        return found[:, None], J
+        J, value = jax.jacfwd(both, has_aux=True)(x[:, 0])
+        return value[:, None], J
 
     def row(self, scalars: Sequence[Any], /) -> Any:
         """Scalars side by side."""

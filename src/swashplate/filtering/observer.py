@@ -230,12 +230,12 @@ def shown(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[An
 
 def pieces(plan: ObserverPlan) -> list[tuple[Sampling, slice, int]]:
     """Of each sensor its sampling, its channels, and where its kept readings begin."""
-    found, channel, place = [], 0, plan.moves + len(plan.biases)
+    placed, channel, place = [], 0, plan.moves + len(plan.biases)
     for sensor, at in zip(plan.sensors, plan.sampling, strict=True):
         m = len(sensor.channels)
-        found.append((at, slice(channel, channel + m), place))
+        placed.append((at, slice(channel, channel + m), place))
         channel, place = channel + m, place + m * at.kept
-    return found
+    return placed
 
 
 def arriving(plan: ObserverPlan, numbers: Numbers, e: Sequence[Any], w: Sequence[Any], xp: Backend) -> list[Any]:
@@ -291,8 +291,8 @@ def corrected(
     expected, H = M.linearised(heard, estimate.mean, M.column([*M.scalars(w), *flags]))
     innovations = M.column(innovations_of(plan, M.column(flags) * y, expected, M))
     own = getattr(M, "updated", None)  # operations that have one of their own for this may use it
-    if own is not None and (found := own(H, *estimate, innovations, numbers.measurement)) is not None:
-        mean, covariance, spread = found
+    if own is not None and (update := own(H, *estimate, innovations, numbers.measurement)) is not None:
+        mean, covariance, spread = update
         return ObserverEstimate(mean, covariance), innovations, spread
     together = H @ estimate.covariance
     spread = H @ together.T + M.diagonal(numbers.measurement)
@@ -350,8 +350,8 @@ def predicted(
         readings, J = M.linearised(kept, begin, M.column([*M.scalars(w), *taken]))
         mean.append(readings)
     at_once = getattr(M, "propagated", None)
-    if at_once is not None and (found := at_once(A, J, P, numbers.process, dt)) is not None:
-        return ObserverEstimate(M.stacked(mean), found)
+    if at_once is not None and (covariance := at_once(A, J, P, numbers.process, dt)) is not None:
+        return ObserverEstimate(M.stacked(mean), covariance)
     F, _ = held_series(A, dt, np.eye(moves))
     for _ in range(2):  # the moved states' rows, the offsets', the kept readings'; then the same from the other side
         stored = [] if J is None else [J @ P]

@@ -80,10 +80,10 @@ def _cycle(plan: ObserverPlan, numbers: Numbers, model: LinearModel, period: int
 
 
 def _first(plan: ObserverPlan, N: int) -> Array:
-    found = np.full(N, 1e-4)
+    variances = np.full(N, 1e-4)
     own = plan.n + 6 + len(plan.biases)
-    found[:own] = observer.start_variance(plan, disturbances.Unrest())
-    return np.diag(found)
+    variances[:own] = observer.start_variance(plan, disturbances.Unrest())
+    return np.diag(variances)
 
 
 def _transition(plan: ObserverPlan, numbers: Numbers, model: LinearModel) -> Array:

@@ -98,7 +98,7 @@ def suite(text: str) -> Suite:
     Raises:
         ControllerError: naming the part that is no sensor, is there twice, or has an impossible rate or delay.
     """
-    found: list[Sensor] = []
+    sensors: list[Sensor] = []
     for part in (piece.strip().lower() for piece in text.split(",")):
         match = _WRITTEN.fullmatch(part)
         if match is None or match["kind"] not in KINDS:
@@ -115,14 +115,14 @@ def suite(text: str) -> Suite:
             rate = delay = math.nan
         if not (0.0 < rate <= 1e4 and 0.0 <= delay <= 1.0):
             raise ControllerError(f"'{part}': expected up to 10000 Hz and 1000 ms.", channel="sensors")
-        found.append(Sensor(match["kind"], rate, delay, kind.sigma))
-    kinds = [sensor.kind for sensor in found]
+        sensors.append(Sensor(match["kind"], rate, delay, kind.sigma))
+    kinds = [sensor.kind for sensor in sensors]
     doubled = sorted(
         {k for k in kinds if kinds.count(k) > 1} | ({"gyro", "imu"} if {"gyro", "imu"} <= {*kinds} else set())
     )
     if doubled:
         raise ControllerError(f"{' and '.join(doubled)} is there twice.", channel="sensors", hint="Give each once.")
-    return tuple(found)
+    return tuple(sensors)
 
 
 def biased(sensors: Suite) -> tuple[str, ...]:

@@ -70,12 +70,12 @@ class Inconsistency:
 def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
     """Every contradiction between the flight's measured channels; none where nothing can be held against anything."""
     made = {name for step in flight.history if step.operation == "derive" for name in step.details.get("derived", ())}
-    found: list[Inconsistency] = []
-    if (attitude := _attitude(flight, found)) is not None:
+    contradictions: list[Inconsistency] = []
+    if (attitude := _attitude(flight, contradictions)) is not None:
         for names in _families(flight, RATES, made):
             told = _compared(flight, names, attitude.time, attitude.turning, attitude.axes, _RATE)
             # Pitch without roll: on its back, q and the change of theta have opposite signs.
-            found += [replace(one, decisive=one.decisive and attitude.axes != (1,)) for one in told]
+            contradictions += [replace(one, decisive=one.decisive and attitude.axes != (1,)) for one in told]
     if all(name in flight for name in POSITION):
         place = [_thinned(*_series(flight, name)) for name in POSITION]
 
@@ -90,8 +90,8 @@ def consistency(flight: Flight) -> tuple[Inconsistency, ...]:
         for names, reference in ((_LOCAL, local), *([(VELOCITY, body)] if whole else [])):
             measured = tuple(name if name in flight and name not in made else "" for name in names)
             if any(measured):
-                found += _compared(flight, measured, place[0][0], reference, (0, 1, 2), _SPEED)
-    return (*found, *_weight(flight, made, attitude if attitude and len(attitude.axes) > 1 else None))
+                contradictions += _compared(flight, measured, place[0][0], reference, (0, 1, 2), _SPEED)
+    return (*contradictions, *_weight(flight, made, attitude if attitude and len(attitude.axes) > 1 else None))
 
 
 def refuse_inconsistent(flight: Flight) -> None:
@@ -174,7 +174,7 @@ class _Attitude:
         return body_rates(interpolate(self.time, self.quaternion, grid), rate=1.0 / float(grid[1] - grid[0]))
 
 
-def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
+def _attitude(flight: Flight, contradictions: list[Inconsistency]) -> _Attitude | None:
     """The flight's attitude, None where it has none; angles that are degrees are said and put right."""
     if all(name in flight for name in QUATERNION) and len({flight.stream_of(n) for n in QUATERNION}) == 1:
         table = flight.array(QUATERNION)
@@ -196,7 +196,7 @@ def _attitude(flight: Flight, found: list[Inconsistency]) -> _Attitude | None:
     table = table[good]
     steep = float(np.quantile(np.abs(table[:, 1]), 0.99))
     if steep > _STEEPEST:
-        found.append(
+        contradictions.append(
             Inconsistency(
                 "theta",
                 f"reaches {steep:.3g} rad, and no pitch angle passes 1.57 rad: it looks like degrees",
@@ -231,7 +231,7 @@ def _compared(
     flight: Flight, names: tuple[str, ...], time: Array, reference: Reference, axes: tuple[int, ...], kind: _Kind
 ) -> list[Inconsistency]:
     """Findings on the channels `names` (one an axis, "" where missing) against `reference(grid)`, shape (n, 3)."""
-    found = []
+    contradictions = []
     for home in dict.fromkeys(flight.stream_of(name) for name in names if name):
         here = tuple(name if name and flight.stream_of(name) == home else "" for name in names)
         pieces = list(_pieces(flight, [name for name in here if name], time, reference))
@@ -244,8 +244,8 @@ def _compared(
                 clearest = max(told, key=lambda by_axis: max(abs(at.correlation) for at in by_axis.values()))
                 every = next(agreements for agreements in both if agreements.get(i) is clearest)
                 owners = {j: by_axis[j] for j, by_axis in every.items() if j in by_axis}
-                found += _judged(flight, here, i, clearest, kind, owners)
-    return found
+                contradictions += _judged(flight, here, i, clearest, kind, owners)
+    return contradictions
 
 
 def _pieces(flight: Flight, names: Sequence[str], time: Array, reference: Reference) -> Iterator[tuple[float, Array]]:
@@ -379,7 +379,7 @@ def _unit_of(ratio: float, kind: _Kind) -> str | None:
 
 def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[Inconsistency]:
     """The accelerometers' mean along body z: what neither falls nor climbs away feels its weight, -9.81 m/s^2 level."""
-    found, gravity = [], flight.gravity or GRAVITY
+    contradictions, gravity = [], flight.gravity or GRAVITY
     for (name,) in _families(flight, ("az",), made):
         stamps, values = _thinned(*_series(flight, name))
         if values.size < _SHORTEST:
@@ -396,5 +396,5 @@ def _weight(flight: Flight, made: set[str], attitude: _Attitude | None) -> list[
                 text = f"{' and '.join(words)}: its median is {-felt:+.3g} when level, expected {-gravity:.3g} m/s^2"
                 mend = _unit_to_give(flight, name, sign="-" * (felt < 0.0), looks_like=unit.removeprefix("m/s^2"))
                 # Without an attitude it may have lain on its back.
-                found.append(Inconsistency(name, text, mend, decisive=attitude is not None))
-    return found
+                contradictions.append(Inconsistency(name, text, mend, decisive=attitude is not None))
+    return contradictions

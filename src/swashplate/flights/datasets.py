@@ -275,8 +275,8 @@ def fetch(name: str, *, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[Pat
 
     paths = []
     for file, entry in _dataset(name, registry).files.items():
-        found = find(name, file, registry=registry)
-        if found is None:
+        path = find(name, file, registry=registry)
+        if path is None:
             try:
                 got = pooch.retrieve(
                     entry.address, known_hash=f"sha256:{entry.sha256}", fname=file, path=cache_folder() / name
@@ -288,8 +288,8 @@ def fetch(name: str, *, registry: Mapping[str, Dataset] = REGISTRY) -> tuple[Pat
                     channel=f"{name}/{file}",
                     hint="Check the network, or put the file into the folder that SWASHPLATE_DATA names.",
                 ) from error
-            found = Path(got)
-        paths.append(found)
+            path = Path(got)
+        paths.append(path)
     return tuple(paths)
 
 

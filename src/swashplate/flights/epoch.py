@@ -43,12 +43,12 @@ def rebased(flight: Flight) -> Flight:
             name: data.assign_coords(time=("time", data["time"].values - shift, data["time"].attrs))
             for name, data in flight.streams.items()
         }
-        found = flight.provenance
-        events = tuple(replace(event, time=event.time - shift) for event in found.events)
+        origin = flight.provenance
+        events = tuple(replace(event, time=event.time - shift) for event in origin.events)
         flight = replace(
             flight,
             streams=streams,
-            provenance=replace(found, events=events, epoch=found.epoch + shift),
+            provenance=replace(origin, events=events, epoch=origin.epoch + shift),
             segments=tuple((start - shift, stop - shift) for start, stop in flight.segments),
         )
     return flight
@@ -74,14 +74,14 @@ def iso(epoch: float) -> str:
 
 def from_iso(text: str) -> Decimal | None:
     """Seconds since 1970 of a date and time in ISO 8601 (UTC where it names no zone); None where it is none."""
-    found = _ISO.fullmatch(text.strip())
-    if found is None:
+    match = _ISO.fullmatch(text.strip())
+    if match is None:
         return None
     try:
-        day = datetime.fromisoformat(f"{found['day']}T{found['time']}{(found['zone'] or 'Z')}")
+        day = datetime.fromisoformat(f"{match['day']}T{match['time']}{(match['zone'] or 'Z')}")
     except ValueError:
         return None
-    return int(day.timestamp()) + Decimal("0." + found["fraction"][1:] if found["fraction"] else 0)
+    return int(day.timestamp()) + Decimal("0." + match["fraction"][1:] if match["fraction"] else 0)
 
 
 def small(stamps: Sequence[Decimal]) -> tuple[Array, int]:

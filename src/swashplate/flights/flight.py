@@ -61,8 +61,8 @@ def did_you_mean(name: str, channels: Iterable[str]) -> str | None:
     among, small = tuple(channels), name.lower()
     like = [c for c in among if len(small) > 1 and (small in c.lower() or c.lower() in small.split("_"))]
     near = difflib.get_close_matches(small, among, n=2)
-    found = dict.fromkeys((*like, *near))
-    return f"Did you mean {' or '.join(repr(c) for c in list(found)[:3])}?" if found else None
+    candidates = dict.fromkeys((*like, *near))
+    return f"Did you mean {' or '.join(repr(c) for c in list(candidates)[:3])}?" if candidates else None
 
 
 @dataclass(frozen=True)

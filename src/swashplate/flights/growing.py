@@ -218,9 +218,9 @@ def parse(content: bytes | mmap.mmap, *, where: str) -> Flight:
             f"does not read as a recording of swashplate: {str(error) or type(error).__name__}.", where=where
         ) from None
     rows, damage = _whole(content, end + 1, width=1 + len(columns))
-    found = {c: rows[:, 1 + j] for j, c in enumerate(columns)}
+    series = {c: rows[:, 1 + j] for j, c in enumerate(columns)}
     try:
-        data = stream(rows[:, 0], found, {c: unit for c, unit in columns.items() if unit})
+        data = stream(rows[:, 0], series, {c: unit for c, unit in columns.items() if unit})
     except FlightError as error:
         raise FlightError(error.problem, where=where, channel=error.channel, hint="The file is damaged.") from None
     told = replace(provenance, damage=(*provenance.damage, *damage))

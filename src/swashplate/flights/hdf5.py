@@ -60,7 +60,7 @@ def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
             library ends its process or comes to no end.
         ValueError: for damaged bytes, in the library's words.
     """
-    found: dict[str, Group] = {}
+    groups: dict[str, Group] = {}
     for told, content in _process().ask(path, wanted):
         if "foreign" in told:
             return None
@@ -70,12 +70,12 @@ def read(path: Path, *, wanted: str) -> dict[str, Group] | None:
             problem, channel, hint = told["refused"]
             raise FlightError(problem, where=path, channel=channel, hint=hint)
         if "group" in told:
-            at = found.setdefault(told["group"], Group(told["attributes"]))
+            at = groups.setdefault(told["group"], Group(told["attributes"]))
         elif told:
             kind = np.dtype(object) if "texts" in told else np.dtype(told["dtype"])
             flat = np.array(told["texts"], kind) if "texts" in told else np.frombuffer(content, kind)
             at.variables[told["variable"]] = StoredVariable(flat.reshape(told["shape"]), told["attributes"])
-    return found
+    return groups
 
 
 class _Process:
@@ -131,14 +131,14 @@ class _Process:
 
     @staticmethod
     def _bytes(process: subprocess.Popen[bytes], count: int) -> bytearray:
-        found = bytearray(count)
-        view, at = memoryview(found), 0
+        content = bytearray(count)
+        view, at = memoryview(content), 0
         while at < count:
             got = process.stdout.readinto(view[at:])  # type: ignore[union-attr]
             if not got:
                 raise EOFError
             at += got
-        return found
+        return content
 
     @staticmethod
     def _end(process: subprocess.Popen[bytes]) -> str:

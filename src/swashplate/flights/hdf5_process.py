@@ -109,8 +109,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if isinstance(value, np.ndarray):
-        found = [_plain(entry) for entry in value.ravel().tolist()]
-        return found[0] if len(found) == 1 else found
+        entries = [_plain(entry) for entry in value.ravel().tolist()]
+        return entries[0] if len(entries) == 1 else entries
     if isinstance(value, np.generic):
         return _plain(value.item())
     return value if isinstance(value, str | int | float | bool) else str(value)

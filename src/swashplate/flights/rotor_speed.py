@@ -94,7 +94,7 @@ def _best(
     flight: Flight, pairs: list[tuple[str, ...]], name: str, band: tuple[float, float] | None
 ) -> tuple[tuple[str, ...], float, SpectralLine]:
     """The pair of signals in which the line stands out most, their rate, and the line."""
-    source, found, shown = flight.provenance.source or None, [], []
+    source, candidates, shown = flight.provenance.source or None, [], []
     for pair in pairs:
         pieces, rate = _unbroken(flight, pair)
         shown.append(HIGHEST * rate)
@@ -104,8 +104,8 @@ def _best(
                 continue
             line = track(pieces, rate, (low, high))
             if line is not None:
-                found.append((pair, rate, line))
-    if not found:
+                candidates.append((pair, rate, line))
+    if not candidates:
         asked = f"{band[0]:g} to {band[1]:g} Hz" if band else f"{LOWEST:g} Hz and more"
         raise FlightError(
             f"no line can be looked for at {asked}: the log's sampling shows up to {max(shown):.3g} Hz.",
@@ -114,7 +114,7 @@ def _best(
             hint=f"A band must rise, be wider than {2.0 / WINDOW:g} Hz and lie below that; the log must hold more than "
             f"{WINDOW:g} s without a gap.",
         )
-    best = max(found, key=lambda item: item[2].score)
+    best = max(candidates, key=lambda item: item[2].score)
     if best[2].score < STANDS_OUT:
         raise FlightError(
             f"no line stands out: the best is {best[2].score:.1f} standard deviations above what noise gives, at "

@@ -85,7 +85,7 @@ def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, f
         hertz, ratio = spectra(z, rate, band)
         tables.append(ratio)
         middles.append(t[0] + (np.arange(len(ratio)) * max(1, round(HOP * rate)) + 0.5 * (length - 1)) / rate)
-    found, paths = _mean_score(tables, hertz)
+    scores, paths = _mean_score(tables, hertz)
     usual, scatter = _of_noise(tuple(t.size for t, _ in kept), rate, band)
     resolved = 1.0 / WINDOW
     others = [_without(table, hertz[path], hertz, _LOBE * resolved) for table, path in zip(tables, paths, strict=True)]
@@ -103,7 +103,7 @@ def track(pieces: list[tuple[Array, Complex]], rate: float, band: tuple[float, f
         _between_bins(rows, place, hertz),
         _sigma(peak, rate),
         float(10.0 * np.log10(np.mean(peak))),
-        (found - usual) / scatter,
+        (scores - usual) / scatter,
         tuple(crossing),
     )
 

@@ -257,43 +257,43 @@ def harmonics(
             channel=", ".join(ROTORS),
             hint="Log the headspeed (ArduPilot: RPM sensor), or look at the spectrum alone.",
         )
-    found = spectrum(flight, channel, start=start, stop=stop)
+    measured = spectrum(flight, channel, start=start, stop=stop)
     time, speed = flight.time(name), flight.values(name)
-    there = speed[(time >= found.start) & (time <= found.stop) & np.isfinite(speed)]
+    there = speed[(time >= measured.start) & (time <= measured.stop) & np.isfinite(speed)]
     turning = float(np.median(there)) / (2.0 * np.pi) if there.size else 0.0
     if not abs(turning) > 0.5:
         raise FlightError("does not turn there.", where=flight.provenance.source or None, channel=name)
-    turning, highest = abs(turning), 0.5 * found.rate
-    step = float(found.frequency[1] - found.frequency[0])
+    turning, highest = abs(turning), 0.5 * measured.rate
+    step = float(measured.frequency[1] - measured.frequency[0])
     seen = [k for k in range(1, HARMONICS + 1) if k * turning * (1.0 + _WIDTH) < highest]
     made = []
     for k in seen:
         half = max(_WIDTH * turning, 2.0 * step)
-        rms = found.rms(k * turning - half, k * turning + half)
-        made.append(Harmonic(k, k * turning, rms, _above(found, k, turning, half, rms)))
-    total = found.rms(2.0, highest)
+        rms = measured.rms(k * turning - half, k * turning + half)
+        made.append(Harmonic(k, k * turning, rms, _above(measured, k, turning, half, rms)))
+    total = measured.rms(2.0, highest)
     if not made:
         words = (
-            f"nothing of the rotor can be seen: it turns at {turning:.2f} Hz, and {found.rate:.4g} samples a second "
+            f"nothing of the rotor can be seen: it turns at {turning:.2f} Hz, and {measured.rate:.4g} samples a second "
             f"show up to {highest:.4g} Hz. What it shakes folds back to other frequencies: log faster."
         )
     else:
         most = max(made, key=lambda harmonic: harmonic.rms)
         share = (most.rms / total) ** 2 if total > 0.0 else 0.0
         words = (
-            f"the strongest is {most.number} x at {most.frequency:.2f} Hz with {most.rms:.3g} {found.unit} rms, "
+            f"the strongest is {most.number} x at {most.frequency:.2f} Hz with {most.rms:.3g} {measured.unit} rms, "
             f"{100.0 * share:.0f} % of the power above 2 Hz."
         )
     flown = np.abs(there) / (2.0 * np.pi)
-    return Harmonics(found, name, turning, tuple(made), total, words, _notches(found.unit, flown, made))
+    return Harmonics(measured, name, turning, tuple(made), total, words, _notches(measured.unit, flown, made))
 
 
-def _above(found: Spectrum, number: int, turning: float, half: float, rms: float) -> float | None:
+def _above(measured: Spectrum, number: int, turning: float, half: float, rms: float) -> float | None:
     """How far a harmonic's power is above that of the densities half a multiple around it [dB]."""
-    apart = np.abs(found.frequency - number * turning)
-    floor = found.density[(apart > half) & (apart < 0.5 * turning)]
-    inside = np.count_nonzero(apart <= half) * float(found.frequency[1] - found.frequency[0])
-    if floor.size < _BESIDE or found.windows < _AVERAGED:
+    apart = np.abs(measured.frequency - number * turning)
+    floor = measured.density[(apart > half) & (apart < 0.5 * turning)]
+    inside = np.count_nonzero(apart <= half) * float(measured.frequency[1] - measured.frequency[0])
+    if floor.size < _BESIDE or measured.windows < _AVERAGED:
         return None
     tiny = np.finfo(np.float64).tiny
     return float(10.0 * np.log10(max(rms**2, tiny) / max(float(np.median(floor)) * inside, tiny)))

@@ -104,10 +104,10 @@ def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
     if "time" not in group.variables:
         raise FlightError("has no time.", where=place, channel=name, hint="Save it again.")
     time = group.variables["time"].values
-    for variable, found in group.variables.items():
-        if found.values.shape != time.shape or found.values.ndim != 1 or found.values.dtype.kind not in "fiub":
+    for variable, column in group.variables.items():
+        if column.values.shape != time.shape or column.values.ndim != 1 or column.values.dtype.kind not in "fiub":
             raise FlightError(
-                f"has the shape {found.values.shape} and the type {found.values.dtype}, expected numbers over time.",
+                f"has the shape {column.values.shape} and the type {column.values.dtype}, expected numbers over time.",
                 where=place,
                 channel=f"{name}/{variable}",
                 hint="Save it again.",
@@ -119,7 +119,7 @@ def _stream(name: str, group: hdf5.Group, place: Path) -> xr.Dataset:
             channel=f"{name}/time",
             hint="Copy it again.",
         )
-    made = {variable: ("time", found.values, found.attributes) for variable, found in group.variables.items()}
+    made = {variable: ("time", column.values, column.attributes) for variable, column in group.variables.items()}
     return xr.Dataset(made, coords={"time": made.pop("time")}, attrs=group.attributes)
 
 

@@ -116,13 +116,13 @@ def _laplace(result: Result[Any, Any], *, draws: int, chains: int, seed: int, wh
         raise IdentificationError(told, where=where, channel=", ".join(vague) or None)
     low, high = bounds_of(result.solution, result.names)
     mean = np.array([result[name].value for name in result.names])
-    found = normal_within(mean, covariance, low, high, count=draws * chains, seed=seed, where=where)
+    rows = normal_within(mean, covariance, low, high, count=draws * chains, seed=seed, where=where)
     return Posterior(
         "laplace",
         result.names,
         len(result.names),
         tuple(result[name].unit for name in result.names),
-        found.reshape(chains, draws, -1),
+        rows.reshape(chains, draws, -1),
         seed=seed,
     )
 
@@ -144,11 +144,11 @@ def _drawn(
     covariance = accuracy.covariance(row, information, row.prior(fitted.row)[2])
     k = len(result.names)
 
-    def enough(found: Chains) -> bool:
-        if found.rows.shape[1] < min(draws, _LEAST):
+    def enough(so_far: Chains) -> bool:
+        if so_far.rows.shape[1] < min(draws, _LEAST):
             return False
-        good = np.all(effective(found.rows[:, :, :k]) >= LEAST_ESS)
-        return bool(good and np.all(split_rhat(found.rows) < SPLIT_RHAT))
+        good = np.all(effective(so_far.rows[:, :, :k]) >= LEAST_ESS)
+        return bool(good and np.all(split_rhat(so_far.rows) < SPLIT_RHAT))
 
     if method == "nuts":
         from swashplate.identification.core import nuts
@@ -156,7 +156,7 @@ def _drawn(
         draw = partial(nuts.sample, likelihood.traced(), row)
     else:
         draw = partial(metropolis.sample, likelihood)
-    found = draw(
+    sampled = draw(
         fitted.row,
         covariance,
         chains=chains,
@@ -172,11 +172,11 @@ def _drawn(
         row.names,
         k,
         tuple(result[name].unit for name in result.names),
-        _plain_numbers(row, found.rows),
-        split_rhat(found.rows),
-        effective(found.rows),
-        found.stats,
-        found.step,
+        _plain_numbers(row, sampled.rows),
+        split_rhat(sampled.rows),
+        effective(sampled.rows),
+        sampled.stats,
+        sampled.step,
         seed,
     )
 

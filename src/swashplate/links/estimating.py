@@ -162,12 +162,12 @@ class Estimating:
         runs += [] if self._filter is None else [self._filter]
         told: list[tuple[float | None, float | None]] = []
         for run in runs:
-            found = run.estimate()
+            estimate = run.estimate()
             names = run.plan.equation.names if isinstance(run, RecursiveRegression) else run.plan.unknown
             told += (
                 [(None, None)] * len(names)
-                if found is None
-                else list(zip(found.values.tolist(), found.sigmas.tolist(), strict=True))
+                if estimate is None
+                else list(zip(estimate.values.tolist(), estimate.sigmas.tolist(), strict=True))
             )
         return tuple(
             KnownNow(k.name, k.unit, k.model, value, sigma) for k, (value, sigma) in zip(self.known, told, strict=True)

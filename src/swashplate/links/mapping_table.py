@@ -50,40 +50,40 @@ class MappingTable:
         return made
 
     def text(self, key: str) -> str:
-        found = self._get(key, _MISSING)
-        if not isinstance(found, str):
-            raise self.error(key, f"is {found!r}, expected a text.")
-        return found
+        value = self._get(key, _MISSING)
+        if not isinstance(value, str):
+            raise self.error(key, f"is {value!r}, expected a text.")
+        return value
 
     def flag(self, key: str) -> bool:
-        found = self._get(key, False)
-        if not isinstance(found, bool):
-            raise self.error(key, f"is {found!r}, expected true or false.")
-        return found
+        value = self._get(key, False)
+        if not isinstance(value, bool):
+            raise self.error(key, f"is {value!r}, expected true or false.")
+        return value
 
     def number(self, key: str, *, missing: Any = _MISSING) -> float:
         return self._number(key, self._get(key, missing))
 
     def numbers(self, key: str, *, missing: Any = _MISSING) -> tuple[float, ...]:
-        found = self._get(key, missing)
-        if not isinstance(found, list | tuple):
-            raise self.error(key, f"is {found!r}, expected a list of numbers.")
-        return tuple(self._number(key, entry) for entry in found)
+        entries = self._get(key, missing)
+        if not isinstance(entries, list | tuple):
+            raise self.error(key, f"is {entries!r}, expected a list of numbers.")
+        return tuple(self._number(key, entry) for entry in entries)
 
     def pair(self, key: str) -> tuple[float, float]:
-        found = self.numbers(key)
-        if len(found) != 2:
-            raise self.error(key, f"has {len(found)} numbers, expected two.")
-        return found[0], found[1]
+        numbers = self.numbers(key)
+        if len(numbers) != 2:
+            raise self.error(key, f"has {len(numbers)} numbers, expected two.")
+        return numbers[0], numbers[1]
 
     def rows(self, key: str) -> tuple[tuple[float, ...], ...]:
         """A matrix, row by row; empty where it is missing."""
-        found = self._get(key, ())
-        if not isinstance(found, list | tuple) or not all(isinstance(row, list) for row in found):
-            raise self.error(key, f"is {found!r}, expected a list of lists of numbers.")
-        if len({len(row) for row in found}) > 1:
+        rows = self._get(key, ())
+        if not isinstance(rows, list | tuple) or not all(isinstance(row, list) for row in rows):
+            raise self.error(key, f"is {rows!r}, expected a list of lists of numbers.")
+        if len({len(row) for row in rows}) > 1:
             raise self.error(key, "has rows of different length.")
-        return tuple(tuple(self._number(key, entry) for entry in row) for row in found)
+        return tuple(tuple(self._number(key, entry) for entry in row) for row in rows)
 
     def servo(self, channel: float, servos: MappingTable) -> Servo:
         """The output of this number, with the travel that `servos` has for it."""

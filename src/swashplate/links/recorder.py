@@ -82,7 +82,7 @@ def recover(file: Path, say: Say) -> tuple[Path, ...]:
 
     Recordings of programs that are alive are left alone. One that cannot be read stays where it is, and is told.
     """
-    found = []
+    saved = []
     for left in sorted(file.parent.glob(f"{_escaped(file.stem)}*{SUFFIX}")):
         target = left.with_suffix(file.suffix)
         if target.stem != file.stem and not target.stem.removeprefix(f"{file.stem}-").isdecimal():
@@ -93,13 +93,13 @@ def recover(file: Path, say: Say) -> tuple[Path, ...]:
             try:
                 flight = _read(left)
                 if flight is not None:
-                    found.append(save(flight, target))
-                    say(f"an earlier recording was cut off; its {flight.duration:.1f} s are saved: {found[-1]}.")
+                    saved.append(save(flight, target))
+                    say(f"an earlier recording was cut off; its {flight.duration:.1f} s are saved: {saved[-1]}.")
             except FlightError as error:
                 say(f"an earlier recording was cut off and stays as it is: {error}")
                 continue
             left.unlink()
-    return tuple(found)
+    return tuple(saved)
 
 
 def _escaped(stem: str) -> str:

@@ -213,8 +213,8 @@ def servo_mapping(name_or_file: str | Path, vehicle: Vehicle) -> ServoMapping:
 
 def _read(name_or_file: str | Path) -> tuple[str, str]:
     if str(name_or_file) in packaged():
-        found = resources.files("swashplate.links") / "mappings" / f"{name_or_file}.toml"
-        return found.read_text(encoding="utf-8"), str(name_or_file)
+        resource = resources.files("swashplate.links") / "mappings" / f"{name_or_file}.toml"
+        return resource.read_text(encoding="utf-8"), str(name_or_file)
     path = Path(name_or_file)
     if not is_file(path):
         raise LinkError(

@@ -196,14 +196,14 @@ def disc_pair(
             return main_rotor(through, rates, tilt, flow, pitches, omega, numbers, density, xp, said, heights[i])
 
         tilt = _settled(rotor) if planes is None else Flapping(planes[i].beta, planes[i].alpha)
-        found = rotor(tilt)
-        force = force + found.acting.force.scaled(fading)
-        moment = moment + found.acting.moment.scaled(fading)
-        lift = -fading * found.acting.force.z
+        single = rotor(tilt)
+        force = force + single.acting.force.scaled(fading)
+        moment = moment + single.acting.moment.scaled(fading)
+        lift = -fading * single.acting.force.z
         tilts.append(TipPathPlane(tilt.b1, tilt.a1))
-        turns.append(TipPathPlane(found.disc.b1, found.disc.a1))
+        turns.append(TipPathPlane(single.disc.b1, single.disc.a1))
         lifts.append(lift)
-        torques.append(fading * found.torque)
+        torques.append(fading * single.torque)
         inflows.append(
             coaxial_wake.induced_rate(
                 own[i],

@@ -166,10 +166,10 @@ def inflow_doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment
     air = state.body.velocity + local_to_body(environment.wind, state.body.attitude, _XP).scaled(-1.0)
     area = math.pi * par.rotor_radius**2
     hover = math.sqrt(max(sum(acting.lift), 0.0) / (2.0 * environment.air_density * area))
-    across, found = math.hypot(air.x, air.y), {}
+    across, doubts = math.hypot(air.x, air.y), {}
     low, high = (share * hover for share in _RING)
     if low < air.z < high and across < hover:
-        found["vortex ring"] = (
+        doubts["vortex ring"] = (
             f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({low:.1f} to {high:.1f} m/s "
             f"below {hover:.1f} m/s of speed), where momentum theory is only a mean"
         )
@@ -178,11 +178,11 @@ def inflow_doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment
         tip = getattr(state.drive, f"omega_{side}") * par.rotor_radius
         loading = lift / (environment.air_density * area * max(tip, 1e-3) ** 2) / solidity
         if tip > _SLOWEST_JUDGED * par.rotor_radius * getattr(par, f"k_drive_{side}") and loading > _STALLED:
-            found[f"stall {side}"] = (
+            doubts[f"stall {side}"] = (
                 f"C_T / sigma of the {side} rotor is {loading:.3f}, above {_STALLED}: blades would stall, lift here is "
                 "linear"
             )
-    return found
+    return doubts
 
 
 _SLOWEST_JUDGED = 0.25
@@ -190,7 +190,7 @@ _SLOWEST_JUDGED = 0.25
 _BALANCING = ("k_torque_upper", "k_torque_lower", "k_thrust_upper", "k_thrust_lower")
 
 
-def balance(start: Vehicle, found: Vehicle, trims: Mapping[str, float]) -> tuple[str, ...]:
+def balance(start: Vehicle, identified: Vehicle, trims: Mapping[str, float]) -> tuple[str, ...]:
     """What takes the place of the yaw and the fall that the start's numbers leave in the hover that was flown.
 
     Args:
@@ -200,7 +200,7 @@ def balance(start: Vehicle, found: Vehicle, trims: Mapping[str, float]) -> tuple
     Returns:
         Nothing where the fit moved neither trims nor factors of torque and thrust.
     """
-    before, after = start.values(), found.values()
+    before, after = start.values(), identified.values()
     moved = {n: getattr(after, n) / getattr(before, n) - 1.0 for n in _BALANCING if getattr(before, n)}
     upper, lower = (trims.get(f"trim_motor_{side}", 0.0) for side in ("upper", "lower"))
     if not (any(moved.values()) or upper or lower):

@@ -34,10 +34,10 @@ def input_delays(vehicle: Vehicle) -> dict[str, float]:
             hint="Give the file one delay per input; fits to responses and verification hold those of entries.",
         )
     if apart := vehicle.card.observer.get(BY_OUTPUT):
-        found: dict[str, set[float]] = {}
+        by_input: dict[str, set[float]] = {}
         for name, delay in apart.items():
-            found.setdefault(name.partition("/")[2], set()).add(delay)
-        torn = {i for i, each in found.items() if len(each) > 1}
+            by_input.setdefault(name.partition("/")[2], set()).add(delay)
+        torn = {i for i, each in by_input.items() if len(each) > 1}
         listed = ", ".join(f"{n} {d:g} s" for n, d in apart.items() if n.partition("/")[2] in torn)
         raise CardError(
             f"has delays that differ between outputs ({listed}): expected one delay of each input.",
@@ -71,9 +71,9 @@ def complete_delays(vehicle: Vehicle, delays: Mapping[str, float] | float) -> di
         raise ControllerError(
             f"{', '.join(unknown)}: expected {', '.join(vehicle.input_names)}.", channel="delays", where=vehicle.name
         )
-    found = {name: float(delays.get(name, 0.0)) for name in vehicle.input_names}
-    if not all(0.0 <= d <= _LONGEST for d in found.values()):
+    complete = {name: float(delays.get(name, 0.0)) for name in vehicle.input_names}
+    if not all(0.0 <= d <= _LONGEST for d in complete.values()):
         raise ControllerError(
-            f"are {list(found.values())} s, expected 0 to {_LONGEST:g}.", channel="delays", where=vehicle.name
+            f"are {list(complete.values())} s, expected 0 to {_LONGEST:g}.", channel="delays", where=vehicle.name
         )
-    return found
+    return complete

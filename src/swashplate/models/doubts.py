@@ -32,17 +32,17 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> tu
 
 def _by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> dict[str, str]:
     said = vehicle.traits.doubts
-    found = {} if said is None else dict(said(vehicle, x, u, environment))
+    doubted = {} if said is None else dict(said(vehicle, x, u, environment))
     fastest, speed = vehicle.card.fastest, _through_the_air(vehicle, x, environment)
     if fastest is not None and speed > fastest * _ROUNDING:
-        found["speed"] = f"its air speed is {speed:.1f} m/s: the card may be trusted up to {fastest:g} m/s"
+        doubted["speed"] = f"its air speed is {speed:.1f} m/s: the card may be trusted up to {fastest:g} m/s"
     nominal = nominal_voltage(vehicle)
     if nominal is not None and abs(environment.voltage / nominal - 1.0) > _NEAR_NOMINAL:
-        found["battery"] = (
+        doubted["battery"] = (
             f"the battery gives {environment.voltage:.3g} V: the card's drive train holds about {nominal:.4g} V, and "
             "is a guess so far away"
         )
-    return found
+    return doubted
 
 
 def _through_the_air(vehicle: Vehicle, x: Array, environment: Environment) -> float:
@@ -91,15 +91,15 @@ def envelope(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
     Inputs beyond the vehicle's limits, air speed beyond its card's, and where all states are there `doubts_along`
     (inflow, stall, flapping, battery); of a log the battery alone.
     """
-    found = [words for name in vehicle.input_names for words in _beyond(vehicle, flight, name)]
+    beyond = [words for name in vehicle.input_names for words in _beyond(vehicle, flight, name)]
     if all(name in flight for name in (*vehicle.state_names, *vehicle.input_names, *_AROUND)):
         x, u, wind = (flight.array(names) for names in (vehicle.state_names, vehicle.input_names, _AROUND[:3]))
         along = flight.time(vehicle.state_names[0])
-        return (*found, *doubts_along(vehicle, along, x, u, wind, flight.values("voltage")))
+        return (*beyond, *doubts_along(vehicle, along, x, u, wind, flight.values("voltage")))
     fastest = vehicle.card.fastest
     time, speed = _ground_speed(flight)
     if fastest is not None and np.any(fast := speed > fastest * _ROUNDING):
-        found.append(
+        beyond.append(
             f"At {time[np.argmax(fast)]:.1f} s it moves faster than {fastest:g} m/s, up to which the card is trusted: "
             f"{np.nanmax(speed):.1f} m/s at most"
         )
@@ -107,10 +107,10 @@ def envelope(vehicle: Vehicle, flight: Flight) -> tuple[str, ...]:
     if nominal is not None and "voltage" in flight:
         mean = float(np.nanmean(flight.values("voltage"))) if np.any(np.isfinite(flight.values("voltage"))) else nominal
         if abs(mean / nominal - 1.0) > _NEAR_NOMINAL:
-            found.append(
+            beyond.append(
                 f"Its battery gave {mean:.3g} V in the mean, and the card's drive train holds about {nominal:.4g}"
             )
-    return tuple(found)
+    return tuple(beyond)
 
 
 _AROUND = (*Environment._fields[:3], "voltage")

@@ -132,11 +132,11 @@ def _least_norm(rows: list[list[Scalar]], wanted: Sequence[Scalar]) -> list[Scal
         for j in range(i + 1, n):
             share = table[j][i] / table[i][i]
             table[j] = [a - share * b for a, b in zip(table[j], table[i], strict=True)]
-    found: list[Scalar] = [0.0] * n
+    solved: list[Scalar] = [0.0] * n
     for i in reversed(range(n)):
-        rest = sum((table[i][j] * found[j] for j in range(i + 1, n)), start=0.0)
-        found[i] = (table[i][n] - rest) / table[i][i]
-    return [sum(row[k] * value for row, value in zip(rows, found, strict=True)) for k in range(len(rows[0]))]
+        rest = sum((table[i][j] * solved[j] for j in range(i + 1, n)), start=0.0)
+        solved[i] = (table[i][n] - rest) / table[i][i]
+    return [sum(row[k] * value for row, value in zip(rows, solved, strict=True)) for k in range(len(rows[0]))]
 
 
 def _terminal(par: Any, speeds: Sequence[Scalar], voltage: Scalar, xp: Backend) -> Scalar:

@@ -60,33 +60,33 @@ def read_published(
         raise SwashError("has no rows under its head.", where=path, hint="Columns are name,value or the states.")
     head = [cell.lower() for cell in rows[0]]
     if "name" in head and "value" in head:
-        found = _listed(head, rows[1:], path, sense)
+        derivatives = _listed(head, rows[1:], path, sense)
     else:
-        found = _matrix(rows, path, sense)
+        derivatives = _matrix(rows, path, sense)
         for name, (speed, sign) in _KINEMATIC.items():
-            if name in found and flight is not None:
-                found[name] += sign * flight[speed]
-    if not found:
+            if name in derivatives and flight is not None:
+                derivatives[name] += sign * flight[speed]
+    if not derivatives:
         raise SwashError("has no derivative in it.", where=path, hint="Columns are name,value or the states.")
-    return found
+    return derivatives
 
 
 def _listed(head: list[str], rows: list[list[str]], path: str | Path, sense: float) -> dict[str, float]:
-    found: dict[str, float] = {}
+    derivatives: dict[str, float] = {}
     for row in rows:
         cells = dict(zip(head, row, strict=False))
         text = cells.get("name", "")
         name, sign = _name(text if text[:1].upper() in ROWS else "", path, sense, shown=text)
         factor = _factor(name, cells.get("unit", ""), path)
         if (value := _number(cells.get("value", ""), path, name)) is not None:
-            if name in found:
+            if name in derivatives:
                 raise SwashError("is there twice.", where=path, channel=name)
-            found[name] = sign * factor * value
-    return found
+            derivatives[name] = sign * factor * value
+    return derivatives
 
 
 def _matrix(rows: list[list[str]], path: str | Path, sense: float) -> dict[str, float]:
-    found: dict[str, float] = {}
+    derivatives: dict[str, float] = {}
     for row in rows[1:]:
         label = _plain(row[0]).removesuffix("dot")
         if label in _ANGLES:
@@ -95,8 +95,8 @@ def _matrix(rows: list[list[str]], path: str | Path, sense: float) -> dict[str, 
             if _plain(column) not in _ANGLES:
                 name, sign = _name(label + column if len(label) == 1 else "", path, sense, shown=row[0])
                 if (value := _number(cell, path, name)) is not None:
-                    found[name] = sign * value
-    return found
+                    derivatives[name] = sign * value
+    return derivatives
 
 
 def _plain(text: str) -> str:

@@ -123,9 +123,9 @@ def joined(vehicle: Vehicle, card: Card) -> Vehicle:
     """
     _suited(vehicle)
     names = (*coefficients(vehicle), *(f"{_AT}{name}" for name in vehicle.input_names), _AHEAD)
-    found = [name for name in card.parameters if name.startswith(PREFIX)]
-    for name in (*names, *found):
-        if name not in found or name not in names:
+    on_card = [name for name in card.parameters if name.startswith(PREFIX)]
+    for name in (*names, *on_card):
+        if name not in on_card or name not in names:
             what = "is missing" if name in names else f"is no coefficient of '{vehicle.name}'"
             raise CardError(f"{what}.", where=card.where, channel=name, hint="Identify anew with --residual.")
     parameters = _wider(vehicle.parameters, names)

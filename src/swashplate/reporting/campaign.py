@@ -197,9 +197,9 @@ def _convergence(shapes: Sequence[Shape], shares: Sequence[float], rows: str) ->
             continue
         counts = np.unique(np.geomspace(min(10, values.size), values.size, _POINTS).astype(int))
         for share, (_, low, high) in zip(shares, shape.quantiles, strict=True):
-            found = np.array([np.quantile(values[:n], share, method="inverted_cdf") for n in counts])
-            found = np.where(np.isfinite(found), found, np.nan)
-            traces.append(line(counts, found, name=f"{100 * share:g} %", color=MODEL, axis=axis,
+            quantiles = np.array([np.quantile(values[:n], share, method="inverted_cdf") for n in counts])
+            quantiles = np.where(np.isfinite(quantiles), quantiles, np.nan)
+            traces.append(line(counts, quantiles, name=f"{100 * share:g} %", color=MODEL, axis=axis,
                                hover=f"{100 * share:g} %<br>%{{x:.0f}}, %{{y:.4g}}"))  # fmt: skip
             ends = np.array([low, high])
             ends = np.where(np.isfinite(ends), ends, np.nan)

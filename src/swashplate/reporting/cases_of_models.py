@@ -26,12 +26,12 @@ _ORIGIN = 1e-5
 def compare_modes(cases: Mapping[str, LinearResponse]) -> CaseParts:
     """Eigenvalues [1/s], those of the first with the nearest of the others, and the difference in per cent."""
     names = list(cases)
-    found = {name: eigenvalues(model) for name, model in cases.items()}
-    first = found[names[0]]
-    matched = {name: match(first, values) for name, values in found.items()}
+    by_case = {name: eigenvalues(model) for name, model in cases.items()}
+    first = by_case[names[0]]
+    matched = {name: match(first, values) for name, values in by_case.items()}
     rows, entries = [], []
     for k, value in enumerate(first):
-        mine = {name: None if (j := places[k]) is None else found[name][j] for name, places in matched.items()}
+        mine = {name: None if (j := places[k]) is None else by_case[name][j] for name, places in matched.items()}
         cells = [Cell(_shown(value))]
         for name in names[1:]:
             other = mine[name]
@@ -41,8 +41,8 @@ def compare_modes(cases: Mapping[str, LinearResponse]) -> CaseParts:
         rows.append((*cells,))
         entries.append({name: None if v is None else [float(v.real), float(v.imag)] for name, v in mine.items()})
     for name in names[1:]:
-        for j in sorted(set(range(len(found[name]))) - {j for j in matched[name] if j is not None}):
-            value = found[name][j]
+        for j in sorted(set(range(len(by_case[name]))) - {j for j in matched[name] if j is not None}):
+            value = by_case[name][j]
             cells = [Cell("-")]
             for column in names[1:]:
                 cells += [Cell(_shown(value)), Cell("")] if column == name else [Cell("-"), Cell("-")]
@@ -66,10 +66,10 @@ def match(first: Sequence[complex], other: Sequence[complex]) -> list[int | None
     a, b = np.array(first)[:, None], np.array(other)[None, :]
     away = np.abs(a - b) / np.maximum(np.abs(a), np.abs(b))
     rows, columns = linear_sum_assignment(np.minimum(away, 2.0 * _SAME))
-    found: list[int | None] = [None] * len(first)
+    partners: list[int | None] = [None] * len(first)
     for i, j in zip(rows, columns, strict=True):
-        found[int(i)] = int(j) if away[i, j] <= _SAME else None
-    return found
+        partners[int(i)] = int(j) if away[i, j] <= _SAME else None
+    return partners
 
 
 def _shown(value: complex) -> str:

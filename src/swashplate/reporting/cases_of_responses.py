@@ -97,5 +97,5 @@ def _at(one: FrequencyResponse, pair: tuple[str, str], omega: Array) -> tuple[Co
     known = np.isfinite(h) & (coherence >= LEAST_COHERENCE)
     where, log = np.log(one.omega[known]), np.log(np.abs(h[known])) + 1j * np.unwrap(np.angle(h[known]))
     x = np.log(omega)
-    found = np.interp(x, where, log.real) + 1j * np.interp(x, where, log.imag)
-    return np.exp(found), np.interp(x, where, error[known])
+    logarithm = np.interp(x, where, log.real) + 1j * np.interp(x, where, log.imag)
+    return np.exp(logarithm), np.interp(x, where, error[known])

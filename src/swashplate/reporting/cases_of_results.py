@@ -24,12 +24,12 @@ def compare_estimates(cases: Mapping[str, Result[Any, Any]]) -> CaseParts:
     parameters = list(dict.fromkeys(e.name for result in cases.values() for e in result.estimates))
     rows, document, told = [], {}, []
     for parameter in parameters:
-        found = {n: next((e for e in r.estimates if e.name == parameter), None) for n, r in cases.items()}
-        first = found[names[0]]
-        unit = next(e.unit for e in found.values() if e is not None)
+        by_case = {n: next((e for e in r.estimates if e.name == parameter), None) for n, r in cases.items()}
+        first = by_case[names[0]]
+        unit = next(e.unit for e in by_case.values() if e is not None)
         entry: dict[str, Any] = {"unit": unit}
         cells = [Cell(parameter), Cell(unit)]
-        for name, e in found.items():
+        for name, e in by_case.items():
             cells += _of(e)
             sigma = float("nan") if e is None or not e.free else e.best_sigma
             entry[name] = None if e is None else {"value": e.value, "sigma": _finite(sigma)}

@@ -41,8 +41,8 @@ def compose(
     """
     if fit is None and validation is None:
         raise SwashError("there is nothing to report: neither a fit nor a validation was given.")
-    found, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
-    hover = sections_sight.hover(found, problems)
+    at_hover, problems = (modes, []) if modes is not None else hover_modes(fit, validation)
+    hover = sections_sight.hover(at_hover, problems)
     parts: list[Section | None] = [
         sections_validation.verdict(validation) if validation else None,
         sections_data.asked(fit, validation),
@@ -76,14 +76,14 @@ def hover_modes(
     """Modes of the published and the identified vehicle at hover, and why one has none."""
     from swashplate.simulation.linearize import linearize  # pages of linear models need no JAX
 
-    found: dict[str, Sequence[Mode]] = {}
+    modes: dict[str, Sequence[Mode]] = {}
     problems = []
     for label, vehicle in sections_data.vehicles(fit, validation).items():
         try:
-            found[label] = linearize(vehicle).modes()
+            modes[label] = linearize(vehicle).modes()
         except SwashError as error:
             problems.append(f"The {label} vehicle has no eigenvalues at hover: {error}")
-    return found, problems
+    return modes, problems
 
 
 def _with_warnings(fit: Result[Any, Any]) -> Section:

@@ -140,15 +140,15 @@ def attitude_figure(check: ControlCheck) -> Figure:
 
 def bandwidth_chart(check: ControlCheck) -> Figure:
     """Phase delay over bandwidth, one panel an axis, with the scaled level boundaries."""
-    found = [a for a in check.attitudes if a.handling and np.isfinite(a.handling.bandwidth.value)]
-    titles = [ATTITUDE_WORDS[a.state] for a in found]
+    judged = [a for a in check.attitudes if a.handling and np.isfinite(a.handling.bandwidth.value)]
+    titles = [ATTITUDE_WORDS[a.state] for a in judged]
     layout = grid(
         titles, columns=min(3, len(titles)), height=240, x_title="bandwidth [rad/s]", y_title="phase delay [s]"
     )
-    delays = [a.handling.phase_delay.value for a in found if a.handling]
+    delays = [a.handling.phase_delay.value for a in judged if a.handling]
     highest = 1.4 * max([d for d in delays if np.isfinite(d)] or [0.1])
     traces: list[dict[str, Any]] = []
-    for i, a in enumerate(found):
+    for i, a in enumerate(judged):
         assert a.handling is not None
         number = "" if i == 0 else str(i + 1)
         bandwidth, delay = a.handling.bandwidth.value, a.handling.phase_delay.value

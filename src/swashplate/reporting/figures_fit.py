@@ -288,9 +288,9 @@ def eigenvalues(modes: Mapping[str, Sequence[Mode]]) -> Figure:
     )
     layout["yaxis"] = axis("imaginary part [rad/s]", zeroline=True, zerolinecolor="#bbb")
     traces, keys = [], []
-    for label, found in modes.items():
+    for label, group in modes.items():
         color, symbol, size = _MARKS.get(label, (GREY, "diamond", 8))
-        points = [p for m in found for p in {m.eigenvalue, m.eigenvalue.conjugate()}]
+        points = [p for m in group for p in {m.eigenvalue, m.eigenvalue.conjugate()}]
         points.sort(key=lambda p: (p.real, p.imag))
         traces.append(
             {
@@ -304,7 +304,7 @@ def eigenvalues(modes: Mapping[str, Sequence[Mode]]) -> Figure:
             }
         )
         keys.append(Key(label, color, symbol))
-    unstable = {label: sum(m.eigenvalue.real > 1e-6 for m in found) for label, found in modes.items()}
+    unstable = {label: sum(m.eigenvalue.real > 1e-6 for m in group) for label, group in modes.items()}
     counts = ", ".join(f"{label} {count}" for label, count in unstable.items())
     return Figure(
         identifier="eigenvalues",

@@ -181,12 +181,12 @@ def rate_steps_figure(suggestion: Suggestion) -> Figure | None:
     keys = {"suggested": Key("suggested", MODEL), "flown": Key("flown", FLIGHT, "dash")}
     styles = {"suggested": "solid", "flown": "dash"}
     traces = []
-    for which, found in answers.items():
+    for which, answer in answers.items():
         key = keys[which]
-        both = (found.step, np.degrees(found.disturbance))
+        both = (answer.step, np.degrees(answer.disturbance))
         traces += [
             line(
-                found.time,
+                answer.time,
                 values,
                 name=which,
                 color=key.color,
@@ -197,7 +197,7 @@ def rate_steps_figure(suggestion: Suggestion) -> Figure | None:
         ]
     ends = next(iter(answers.values())).time[[0, -1]]
     traces.append(line(ends, [1.0, 1.0], name="demand", color=PUBLISHED, dash="dot"))
-    wild = [which for which, found in answers.items() if not found.stable]
+    wild = [which for which, answer in answers.items() if not answer.stable]
     return Figure(
         identifier=f"rate-steps-{suggestion.axis.lower()}",
         spec={"data": traces, "layout": layout},
@@ -209,10 +209,10 @@ def rate_steps_figure(suggestion: Suggestion) -> Figure | None:
     )
 
 
-def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
+def mismatch_figure(misses: Sequence[Mismatch]) -> Figure:
     """Model over flight of every fitted response inside the envelopes of unnoticeable added dynamics."""
-    low = min(m.target.omega[0] for m in found)
-    high = max(m.target.omega[-1] for m in found)
+    low = min(m.target.omega[0] for m in misses)
+    high = max(m.target.omega[-1] for m in misses)
     omega = np.geomspace(low, high, 80)
     bound = envelopes(omega)
     layout = over_frequency(["model/flight [dB]", "model/flight [deg]"], height=170, unit="Hz")
@@ -224,14 +224,14 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
         edge = np.concatenate([bound[f"{kind}_high"], bound[f"{kind}_low"][::-1]])
         band = line(both, edge, name="envelope", color=BAND, width=0, axis=number)
         traces.append({**band, "fill": "toself", "fillcolor": BAND, "hoverinfo": "skip", "hovertemplate": None})
-    for k, m in enumerate(found):
+    for k, m in enumerate(misses):
         color, style = _COLORS[k % len(_COLORS)], ("solid", "dash", "dot")[(k // len(_COLORS)) % 3]
         hertz = m.target.omega / TWO_PI
         hover = f"{m.target.name}<br>%{{x:.3g}} Hz, %{{y:.3g}}"
         traces.append(line(hertz, m.gain, name=m.target.name, color=color, dash=style, hover=hover))
         traces.append(line(hertz, m.phase, name=m.target.name, color=color, dash=style, hover=hover, axis="2"))
         keys.append(Key(m.target.name, color, style))
-    inside = float(np.mean([m.inside for m in found]))
+    inside = float(np.mean([m.inside for m in misses]))
     return Figure(
         identifier="mismatch",
         spec={"data": traces, "layout": layout},
@@ -239,7 +239,7 @@ def mismatch_figure(found: Sequence[Mismatch]) -> Figure:
         caption=f"Mismatch, model over flight: {100 * inside:.0f} % of the points lie inside the envelopes of maximum "
         "unnoticeable added dynamics (after MIL-HDBK-1797; coefficients as a second program has them, not verified "
         "against its text; found for the pitch of fighters: a measure, not a requirement).",
-        alt=f"Mismatch of {len(found)} responses in gain and phase; {100 * inside:.0f} % inside the envelopes.",
+        alt=f"Mismatch of {len(misses)} responses in gain and phase; {100 * inside:.0f} % inside the envelopes.",
         keys=tuple(keys),
     )
 

@@ -13,34 +13,34 @@ from swashplate.simulation.height_velocity import HeightVelocity
 _AVOID = "rgba(213,94,0,0.35)"
 
 
-def compose_height_velocity(found: HeightVelocity, *, title: str | None = None) -> Report:
+def compose_height_velocity(diagram: HeightVelocity, *, title: str | None = None) -> Report:
     """The page's structure: the diagram, its numbers and what it stands on."""
-    heading = title or f"Height-velocity diagram of {found.vehicle.card.title}"
+    heading = title or f"Height-velocity diagram of {diagram.vehicle.card.title}"
     return Report(
         title=heading,
         banners=(),
         summary=(
-            ("Hover", hover_words(found), "plain"),
-            ("Where to trust it", found.vehicle.card.trust or "the card does not say", "plain"),
+            ("Hover", hover_words(diagram), "plain"),
+            ("Where to trust it", diagram.vehicle.card.trust or "the card does not say", "plain"),
         ),
         picture=None,
-        sections=(section_of_height_velocity(found),),
+        sections=(section_of_height_velocity(diagram),),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
-def hover_words(found: HeightVelocity) -> str:
+def hover_words(diagram: HeightVelocity) -> str:
     """The heights that a hover avoids, in words."""
-    spans = ", ".join(f"{low:.2g} to {high:.3g} m" for low, high in found.hover_to_avoid)
+    spans = ", ".join(f"{low:.2g} to {high:.3g} m" for low, high in diagram.hover_to_avoid)
     return f"an engine failure cannot be landed from {spans}" if spans else "an engine failure can always be landed"
 
 
-def section_of_height_velocity(found: HeightVelocity) -> Section:
+def section_of_height_velocity(diagram: HeightVelocity) -> Section:
     """The diagram and its assumptions."""
     return Section(
         "engine-failure",
         "Where an engine failure cannot be landed",
-        (_diagram(found), Points(found.assumptions, title="What this assumes")),
+        (_diagram(diagram), Points(diagram.assumptions, title="What this assumes")),
     )
 
 
@@ -50,17 +50,17 @@ def _edges(at: Array) -> Array:
     return np.concatenate([[at[0]], middle, [at[-1]]])
 
 
-def _diagram(found: HeightVelocity) -> Figure:
-    v, h = _edges(found.speeds), np.exp(_edges(np.log(found.heights)))
+def _diagram(diagram: HeightVelocity) -> Figure:
+    v, h = _edges(diagram.speeds), np.exp(_edges(np.log(diagram.heights)))
     x: list[float | None] = []
     y: list[float | None] = []
-    for i, k in zip(*np.nonzero(~found.safe), strict=True):
+    for i, k in zip(*np.nonzero(~diagram.safe), strict=True):
         low, high, left, right = h[i], h[i + 1], v[k], v[k + 1]
         x += [left, right, right, left, left, None]
         y += [low, low, high, high, low, None]
     avoid = line(x, y, name="avoid", color=VERMILION, width=0.0)
     traces = [avoid | {"fill": "toself", "fillcolor": _AVOID, "hoverinfo": "skip", "hovertemplate": None}]
-    for edges in found.hover_to_avoid:
+    for edges in diagram.hover_to_avoid:
         for height in edges:
             told = f"hover: {height:.3g} m"
             traces.append(
@@ -75,7 +75,7 @@ def _diagram(found: HeightVelocity) -> Figure:
         {"data": traces, "layout": layout},
         420,
         f"From the coloured heights and speeds no way to land that was tried ended within the limits, with a pilot who "
-        f"acts {found.delay:g} s after the engine has stopped. Dashed: the ends of what a hover avoids.",
-        f"Height over speed; {hover_words(found)}.",
+        f"acts {diagram.delay:g} s after the engine has stopped. Dashed: the ends of what a hover avoids.",
+        f"Height over speed; {hover_words(diagram)}.",
         (Key("avoid", VERMILION, "band"), Key("hover heights", GREY, "dash")),
     )

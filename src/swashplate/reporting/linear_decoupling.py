@@ -47,7 +47,7 @@ def compose_linear_decoupling(
     ratios = {words: coupling(model, w, by=by, **axes) for words, by in made.items()}
     pairs = [(i, k) for i in range(len(outputs)) for k in range(len(outputs)) if i != k]
     near = int(np.argmin(np.abs(w - frequency)))
-    worst = {words: max(float(found[i, k, near]) for i, k in pairs) for words, found in ratios.items()}
+    worst = {words: max(float(ratio[i, k, near]) for i, k in pairs) for words, ratio in ratios.items()}
     told = "; ".join(f"{_WORDS[words]} {100.0 * value:.3g} %" for words, value in worst.items())
     return Report(
         title=title or f"{name}: decoupling of {', '.join(outputs)}",
@@ -75,9 +75,9 @@ def _ratio_figure(
     traces = []
     for panel, (i, k) in enumerate(pairs):
         layout[f"yaxis{'' if panel == 0 else panel + 1}"]["type"] = "log"
-        for number, (words, found) in enumerate(ratios.items()):
+        for number, (words, ratio) in enumerate(ratios.items()):
             color, dash = style(number)
-            shown = 100.0 * np.maximum(found[i, k], 1e-5)  # an exact filter leaves rounding
+            shown = 100.0 * np.maximum(ratio[i, k], 1e-5)  # an exact filter leaves rounding
             hover = f"{_WORDS[words]}<br>%{{x:.3g}} rad/s, %{{y:.3g}} %"
             axis = "" if panel == 0 else str(panel + 1)
             traces.append(line(w, shown, name=words, color=color, dash=dash, hover=hover, axis=axis))

@@ -10,22 +10,22 @@ from swashplate.reporting.versions import date, versions
 
 
 def compose_observability(
-    model: str, speeds: Sequence[float], found: Sequence[Observability], *, title: str | None
+    model: str, speeds: Sequence[float], studies: Sequence[Observability], *, title: str | None
 ) -> Report:
     """The report's structure, a section for each speed [m/s]."""
-    hidden = sum(len(one.hidden) for one in found)
+    hidden = sum(len(one.hidden) for one in studies)
     words = f"{hidden} directions leave no trace" if hidden else "nothing that lasts stays unseen"
     return Report(
         title=title or f"What sensors see of {model}",
         banners=(),
         summary=(
-            ("Sensors", ", ".join(map(str, found[0].sensors)), "plain"),
+            ("Sensors", ", ".join(map(str, studies[0].sensors)), "plain"),
             ("Hidden", words, "caution" if hidden else "good"),
         ),
         picture=None,
         sections=tuple(
             Section(f"at-{i}", f"At {speed:g} m/s", _blocks(one))
-            for i, (speed, one) in enumerate(zip(speeds, found, strict=True))
+            for i, (speed, one) in enumerate(zip(speeds, studies, strict=True))
         ),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )

@@ -35,13 +35,13 @@ def page_series(path: str | Path) -> Flight:
     """
     page = Path(path)
     try:
-        found = _FIGURES.search(page.read_text(encoding="utf-8"))
+        match = _FIGURES.search(page.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ExportError(f"cannot be read: {error}.", where=page) from error
-    if found is None:
+    if match is None:
         raise ExportError("is no report of swashplate.", where=page, hint="Name a report.html, or a flight.")
     try:
-        specs = read_figures(found[1])
+        specs = read_figures(match[1])
         lines = {name: line for spec in specs for name, line in _lines(spec)}
     except (ValueError, LookupError, TypeError, OSError, EOFError, AttributeError, zlib.error) as error:
         raise ExportError(f"its figures cannot be read: {error}.", where=page, hint="Write it again.") from error

@@ -125,7 +125,7 @@ def _is_of(one: object, kind: type) -> bool:
     return isinstance(one, Result) and isinstance(one.solution, kind)
 
 
-def _only(found: Sequence[Any], what: str) -> Any:
-    if len(found) > 1:
-        raise SwashError(f"{len(found)} results of the kind '{what}' were given, a page is about one.")
-    return found[0] if found else None
+def _only(results: Sequence[Any], what: str) -> Any:
+    if len(results) > 1:
+        raise SwashError(f"{len(results)} results of the kind '{what}' were given, a page is about one.")
+    return results[0] if results else None

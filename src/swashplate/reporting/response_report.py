@@ -68,16 +68,16 @@ def _title(m: ResponseMaterial) -> str:
 
 
 def _banners(m: ResponseMaterial) -> tuple[tuple[str, str], ...]:
-    found = []
+    banners = []
     if m.verification and any("NOT A HOLD-OUT" in text for text in m.verification.warnings):
-        found.append(("caution", "NOT A HOLD-OUT: the fit has seen the records that are shown."))
+        banners.append(("caution", "NOT A HOLD-OUT: the fit has seen the records that are shown."))
     if m.verification and any(one.simulated for one in m.verification.data):
-        found.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))
+        banners.append(("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."))
     if m.fit and m.fit.problems:
-        found.append(("bad", f"PROBLEM: {' '.join(m.fit.problems)}"))
+        banners.append(("bad", f"PROBLEM: {' '.join(m.fit.problems)}"))
     if m.responses and m.responses.problems:
-        found.append(("bad", f"NOT COMPUTED: {' '.join(m.responses.problems)}"))
-    return tuple(found)
+        banners.append(("bad", f"NOT COMPUTED: {' '.join(m.responses.problems)}"))
+    return tuple(banners)
 
 
 def _summary(m: ResponseMaterial) -> tuple[tuple[str, str, str], ...]:

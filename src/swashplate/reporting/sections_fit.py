@@ -169,12 +169,12 @@ def comparison(fit: Result[Any, Any]) -> Section:
 
 
 def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, list[Series]]:
-    found: dict[str, list[Series]] = {}
+    by_channel: dict[str, list[Series]] = {}
     for piece in pieces:
         record = piece.record
         counted = np.asarray(piece.counted) > 0
         for j, name in enumerate(record.output_names):
-            found.setdefault(name, []).append(
+            by_channel.setdefault(name, []).append(
                 Series(
                     record.time,
                     record.outputs[:, j],
@@ -188,10 +188,10 @@ def _series(fit: Result[Any, Any], pieces: Sequence[Comparison]) -> dict[str, li
             motion = measured_states(record, _nuisance(fit, record.log))
             for j, name in enumerate(PREDICTED):
                 if name not in record.output_names:
-                    found.setdefault(name, []).append(
+                    by_channel.setdefault(name, []).append(
                         Series(record.time, motion[:, j], np.where(counted, piece.states[:, j], np.nan))
                     )
-    return found
+    return by_channel
 
 
 def _nuisance(fit: Result[Any, Any], log: str) -> Nuisance:

@@ -219,8 +219,8 @@ def fit_costs_section(fit: StateSpaceFit) -> Section:
     """J of each response, and the mismatch within what a pilot would not notice."""
     pairs = [(fit.solution.outputs.index(t.output), fit.solution.inputs.index(t.input), t.omega) for t in fit.targets]
     answers = [fit.solution.response(omega)[:, o, i] for o, i, omega in pairs]
-    found = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
-    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(found)]
+    misses = [mismatch(h, t) for h, t in zip(answers, fit.targets, strict=True)]
+    blocks: list[Block] = [_cost_table(fit.targets, fit.costs), of_fit(fit), mismatch_figure(misses)]
     if fit.details.left_out:
         blocks.append(Text(f"Without a coherent band, not fitted: {', '.join(fit.details.left_out)}."))
     return Section("costs", "Responses, flight against model", tuple(blocks))
@@ -233,9 +233,9 @@ def transfer_functions_section(m: ResponseMaterial) -> Section:
         blocks += [Text(f"{model!r}") for model in fit.solution]
         blocks += [_cost_table(fit.targets, fit.costs), parameter_table(fit.estimates)]
         blocks += [Points(fit.warnings, title="What to beware of")] if fit.warnings else []
-        found = [mismatch(model.response(t.omega), t) for model, t in zip(fit.solution, fit.targets, strict=True)]
+        misses = [mismatch(model.response(t.omega), t) for model, t in zip(fit.solution, fit.targets, strict=True)]
         own = "" if k == 0 else f"-{k + 1}"
-        blocks += [replace(one, identifier=f"{one.identifier}{own}") for one in (of_fit(fit), mismatch_figure(found))]
+        blocks += [replace(one, identifier=f"{one.identifier}{own}") for one in (of_fit(fit), mismatch_figure(misses))]
     if m.trials:
         chosen = m.transfer_functions[0].details.form if m.transfer_functions else None
         blocks.append(
@@ -359,16 +359,16 @@ def handling_section(m: ResponseMaterial) -> Section | None:
     if r is None:
         return None
     rows = []
-    for found in handling_lines(r, m.fits):
-        read = found.read
+    for line in handling_lines(r, m.fits):
+        read = line.read
         cells = (read.bandwidth, read.omega_180, read.phase_delay_line) if isinstance(read, Handling) else ()
         rows.append(
             (
-                Cell(found.response),
-                Cell(found.source),
+                Cell(line.response),
+                Cell(line.source),
                 *(Cell(repr(c).replace("+-", "±"), number=True) for c in cells),
                 *(Cell("–", number=True) for _ in range(3 - len(cells))),
-                Cell(found.problem),
+                Cell(line.problem),
             )
         )
     if not rows:

@@ -94,11 +94,11 @@ def hover(modes: Mapping[str, Sequence[Mode]], problems: Sequence[str] = ()) -> 
                 ),
                 tuple(
                     _row(mode, label, place)
-                    for label, found in modes.items()
-                    for place, mode in enumerate((m for m in found if m.frequency > _SLOW), start=1)
+                    for label, group in modes.items()
+                    for place, mode in enumerate((m for m in group if m.frequency > _SLOW), start=1)
                 ),
                 note="Modes at the origin (position, heading and whatever hover does not hold) are left out: "
-                + ", ".join(f"{sum(m.frequency <= _SLOW for m in found)} {label}" for label, found in modes.items())
+                + ", ".join(f"{sum(m.frequency <= _SLOW for m in group)} {label}" for label, group in modes.items())
                 + ". The states named take part most. Quadratic terms have no slope at hover.",
             )
         )

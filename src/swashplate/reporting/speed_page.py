@@ -50,14 +50,14 @@ _WIDE = 860
 """px: below this width the derivatives' small panels scroll."""
 
 
-def compose_speeds(found: TrimCurve | Derivatives, *, title: str | None = None) -> Report:
+def compose_speeds(over_speed: TrimCurve | Derivatives, *, title: str | None = None) -> Report:
     """The page's structure: trims and modes over speed, and derivatives where they were asked for.
 
     Raises:
         SwashError: where there are fewer than two speeds.
     """
-    vehicle, trims = found.vehicle, found.trims
-    tables, imperial = (found.tables, found.imperial) if isinstance(found, Derivatives) else ((), False)
+    vehicle, trims = over_speed.vehicle, over_speed.trims
+    tables, imperial = (over_speed.tables, over_speed.imperial) if isinstance(over_speed, Derivatives) else ((), False)
     remarks = TrimCurve(vehicle, trims).remarks
     if len(trims) < 2:
         raise SwashError("a plot over speed needs a range of speeds.", channel="--speed", hint='Give one, e.g. "0-15".')
@@ -117,23 +117,23 @@ def _marked(speeds: Sequence[float]) -> dict[str, Any]:
 
 def _loci(vehicle: Vehicle, trims: Sequence[Trim]) -> tuple[Figure, ...]:
     """All eigenvalues, and by themselves those that a pilot or an autopilot lives with."""
-    found = [(at.speed, mode) for at in trims for mode in linearize(vehicle, at).modes() if mode.frequency > 0.0]
-    slow = [(speed, mode) for speed, mode in found if mode.frequency < _SLOW]
+    modes = [(at.speed, mode) for at in trims for mode in linearize(vehicle, at).modes() if mode.frequency > 0.0]
+    slow = [(speed, mode) for speed, mode in modes if mode.frequency < _SLOW]
     over = f"from {trims[0].speed:g} to {trims[-1].speed:g} m/s"
-    figures = [_locus(found, "root-locus", "Eigenvalues over speed. Right of the vertical line a motion grows.", over)]
-    if 0 < len(slow) < len(found):
+    figures = [_locus(modes, "root-locus", "Eigenvalues over speed. Right of the vertical line a motion grows.", over)]
+    if 0 < len(slow) < len(modes):
         caption = f"The same within {_SLOW:g} rad/s: the slow motions of the fuselage. Point at one for its states."
         figures.append(_locus(slow, "slow-locus", caption, over))
     return tuple(figures)
 
 
-def _locus(found: Sequence[tuple[float, Mode]], identifier: str, caption: str, over: str) -> Figure:
+def _locus(modes: Sequence[tuple[float, Mode]], identifier: str, caption: str, over: str) -> Figure:
     layout = base_layout(420)
     layout["xaxis"], layout["yaxis"] = axis("real part [1/s]"), axis("imaginary part [rad/s]")
     layout["shapes"] = [{"type": "line", "x0": 0, "x1": 0, "yref": "paper", "y0": 0, "y1": 1, "line": {"color": BLACK}}]
     points = [
         (speed, mode, sign * mode.eigenvalue.imag)
-        for speed, mode in found
+        for speed, mode in modes
         for sign in ((1.0, -1.0) if mode.eigenvalue.imag else (1.0,))
     ]
     trace = {
@@ -161,7 +161,7 @@ def _mode_words(mode: Mode) -> str:
     return f"{damping}states {states}"
 
 
-def by_contributor(found: Derivatives, row: str) -> Figure:
+def by_contributor(derivatives: Derivatives, row: str) -> Figure:
     """The derivatives of one force or moment over speed: the total, and what contributes to it.
 
     Raises:
@@ -169,15 +169,15 @@ def by_contributor(found: Derivatives, row: str) -> Figure:
     """
     if row not in ROWS:
         raise SwashError(f"is '{row}', expected one of {', '.join(ROWS)}.", channel="row")
-    speeds, tables = [at.speed for at in found.trims], found.tables
+    speeds, tables = [at.speed for at in derivatives.trims], derivatives.tables
     names = [row + column for column in COLUMNS]
-    titles = [f"{name} [{unit_words(found.unit(name))}]" for name in names]
+    titles = [f"{name} [{unit_words(derivatives.unit(name))}]" for name in names]
     layout = grid(titles, columns=5, height=150, x_title="speed [m/s]", gap=0.06)
     traces = []
     parts = [part for part in tables[0].parts if part in _PART_COLORS]
     for i, name in enumerate(names):
         place = split_name(name)
-        factor = found.factor(name)
+        factor = derivatives.factor(name)
         number = "" if i == 0 else str(i + 1)
         total = [factor * table[name] for table in tables]
         hover = f"{name}<br>%{{x:.1f}} m/s, %{{y:.4g}}"

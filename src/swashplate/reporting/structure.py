@@ -144,8 +144,8 @@ class Report:
     @property
     def figures(self) -> tuple[Figure, ...]:
         """Every figure in the order of the page."""
-        found = (self.picture,) if self.picture else ()
-        return found + tuple(b for section in self.sections for b in section.blocks if isinstance(b, Figure))
+        pictures = (self.picture,) if self.picture else ()
+        return pictures + tuple(b for section in self.sections for b in section.blocks if isinstance(b, Figure))
 
     def __post_init__(self) -> None:
         names = [section.identifier for section in self.sections] + [figure.identifier for figure in self.figures]

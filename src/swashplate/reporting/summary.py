@@ -21,24 +21,24 @@ _TONES = {"good": "good", "usable": "caution", "poor": "bad"}
 
 def banners(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[tuple[str, str], ...]:
     """What stands above everything else: no aircraft flew; the fit failed; the iterations ran out."""
-    found: list[tuple[str, str]] = []
+    lines: list[tuple[str, str]] = []
     flights = (*(fit.data if fit else ()), *(validation.data if validation else ()))
     simulated = [f for f in flights if f.simulated]
     if simulated:
         names = list(dict.fromkeys(f.name or "unnamed" for f in simulated))
         part = "" if len(simulated) == len(flights) else f" ({listed(names)})"
-        found.append(("caution", f"SIMULATED FLIGHT{part}: no aircraft flew for these numbers."))
+        lines.append(("caution", f"SIMULATED FLIGHT{part}: no aircraft flew for these numbers."))
     twice = used_twice(fit, validation)
     if twice:
         names = list(dict.fromkeys(f.name or "an unnamed flight" for f in twice))
-        found.append(("caution", f"NOT A HOLD-OUT: {listed(names)} was used for the fit too."))
+        lines.append(("caution", f"NOT A HOLD-OUT: {listed(names)} was used for the fit too."))
     if fit and fit.failed:
         reasons = " ".join(fit.problems) or "See the parameters."
-        found.append(("bad", f"FAILED FIT: do not use these numbers. {reasons}"))
+        lines.append(("bad", f"FAILED FIT: do not use these numbers. {reasons}"))
     elif fit and not fit.converged:
         ended = next((text for text in fit.problems if text.startswith("stopped after")), "")
-        found.append(("caution", f"NOT CONVERGED: {ended or 'the iterations ran out before the fit settled.'}"))
-    return tuple(found)
+        lines.append(("caution", f"NOT CONVERGED: {ended or 'the iterations ran out before the fit settled.'}"))
+    return tuple(lines)
 
 
 def summary(fit: Result[Any, Any] | None, validation: Validation | None) -> tuple[Line, ...]:

@@ -81,8 +81,8 @@ def quantity(name: str, unit: str) -> str:
 
 def inputs_title(names: Sequence[str], units: Mapping[str, str] | None = None) -> str:
     """Title of the axis that several inputs share; inputs of several units keep their own."""
-    found = {(units or {}).get(name) or channel(name).unit for name in names}
-    unit = found.pop() if len(found) == 1 else ""
+    shared = {(units or {}).get(name) or channel(name).unit for name in names}
+    unit = shared.pop() if len(shared) == 1 else ""
     return quantity("input", unit) if unit else "input [own units]"
 
 

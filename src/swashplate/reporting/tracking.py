@@ -17,30 +17,30 @@ _HEIGHT = 130
 
 
 def compose_tracking(
-    source: str, found: Sequence[Tracked], notes: Sequence[str], *, simulated: bool, title: str | None
+    source: str, tracks: Sequence[Tracked], notes: Sequence[str], *, simulated: bool, title: str | None
 ) -> Report:
     """The report's structure, a section for each equation."""
-    told = sum(one.final is not None for one in found)
+    told = sum(one.final is not None for one in tracks)
     banners = (("caution", "SIMULATED FLIGHT: no aircraft flew for these numbers."),) if simulated else ()
-    missing = [one.text for one in found if one.final is None]
+    missing = [one.text for one in tracks if one.final is None]
     if missing:
         banners = (("bad", f"Not separated by this stream: {'; '.join(missing)}."), *banners)
     return Report(
         title=title or f"Identification in flight: {source}",
         banners=banners,
         summary=(
-            ("Estimated", f"{told} of {len(found)} at the end", "plain" if told == len(found) else "bad"),
-            ("Stood still", _stood(found), "caution" if any(one.frozen for one in found) else "plain"),
+            ("Estimated", f"{told} of {len(tracks)} at the end", "plain" if told == len(tracks) else "bad"),
+            ("Stood still", _stood(tracks), "caution" if any(one.frozen for one in tracks) else "plain"),
         ),
         picture=None,
-        sections=tuple(Section(f"equation-{k}", one.text, _blocks(one, k, source)) for k, one in enumerate(found))
+        sections=tuple(Section(f"equation-{k}", one.text, _blocks(one, k, source)) for k, one in enumerate(tracks))
         + ((Section("notes", "Notes", (Points(tuple(notes)),)),) if notes else ()),
         made=f"swashplate {versions()['swashplate']}, {date()}",
     )
 
 
-def _stood(found: Sequence[Tracked]) -> str:
-    times = max((len(one.frozen) for one in found), default=0)
+def _stood(tracks: Sequence[Tracked]) -> str:
+    times = max((len(one.frozen) for one in tracks), default=0)
     return f"{times} times, see below" if times else "never: no gap, no value that is no number"
 
 

@@ -44,11 +44,11 @@ def autorotations(
             where=vehicle.card.where,
             hint="Helicopters and rotors with inflow have one.",
         )
-    found = []
+    descents = []
     for speed in map(float, speeds):
         flown = partial(_sinking, vehicle, speed, lateral, environment)
-        found.append(_at(vehicle, flown, speed))
-    return tuple(found)
+        descents.append(_at(vehicle, flown, speed))
+    return tuple(descents)
 
 
 def _sinking(

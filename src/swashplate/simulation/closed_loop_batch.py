@@ -139,7 +139,7 @@ def simulate_closed_loops(
         key = jax.random.fold_in(jax.random.key(seed), first)
         fly = _fly_many_quickly_compiled if getattr(controller.step, "feels", False) else _fly_many
         as_carried = carry(vehicle, np.repeat(begin.state[:, None], count, axis=1))
-        found = fly(
+        series = fly(
             equations_of(as_carried.vehicle),
             controller.step,
             round(substeps),
@@ -161,7 +161,7 @@ def simulate_closed_loops(
             key,
             1.0 / rate,
         )
-        return tuple(np.asarray(part)[: samples // keep] for part in found)
+        return tuple(np.asarray(part)[: samples // keep] for part in series)
 
     def flown_block(first: int) -> tuple[Array, ...]:
         members = np.minimum(first + np.arange(count), size - 1)  # of one size all, so that one program flies them

@@ -110,8 +110,8 @@ def _without_damaged(folder: Path) -> None:
             if not entry.name.endswith("-cache"):
                 continue
             with suppress(OSError):
-                found = entry.stat()
-                seen = [found.st_size, found.st_mtime_ns]
+                status = entry.stat()
+                seen = [status.st_size, status.st_mtime_ns]
                 if known.get(entry.name) == seen or _unpacks(Path(entry.path).read_bytes()):
                     whole[entry.name] = seen
                 else:

@@ -74,11 +74,11 @@ def _slopes(equations: Equations, x: Array, w: Array, p: Float[jax.Array, " para
         inputs, parameters, environment = unpack_rows(equations, w, p)
         state = rebuild(vehicle.state, [x[i] for i in range(len(vehicle.state_names))])
         commands = vehicle.inputs(*(inputs[i] for i in range(len(vehicle.input_names))))
-        found = loads(state, commands, parameters, environment, jax_backend(), options=vehicle.options)
+        load = loads(state, commands, parameters, environment, jax_backend(), options=vehicle.options)
         rows = []
         for name in CONTRIBUTORS:
-            part = getattr(found, name)
+            part = getattr(load, name)
             rows += [0.0] * 6 if part is None else [*part.force, *part.moment]
-        return jnp.stack([jnp.asarray(value, x.dtype) for value in (*rows, *leaves(found.disc), *leaves(found.inflow))])
+        return jnp.stack([jnp.asarray(value, x.dtype) for value in (*rows, *leaves(load.disc), *leaves(load.inflow))])
 
     return jax.jacfwd(acting, argnums=(0, 1))(x, w)  # type: ignore[no-any-return]

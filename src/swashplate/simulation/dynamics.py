@@ -158,8 +158,8 @@ def rates_and_slopes(
     rates = row_rates(equations, padded=False)
 
     def both(x: Float[jax.Array, " states"], w: Float[jax.Array, " driving"]) -> tuple[Any, Any]:
-        found = rates(x, w, p)
-        return found, found
+        values = rates(x, w, p)
+        return values, values
 
-    (by_x, by_w), found = jax.jacfwd(both, argnums=(0, 1), has_aux=True)(x, w)
-    return found, by_x, by_w
+    (by_x, by_w), values = jax.jacfwd(both, argnums=(0, 1), has_aux=True)(x, w)
+    return values, by_x, by_w

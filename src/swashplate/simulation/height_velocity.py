@@ -214,9 +214,9 @@ def height_velocity(
     ways = ((0.0, 1.0, 2.0), _RECOVERIES, tuple(p.pace * t for t in _FLARES), _PULLS)
     H, V, T, *rest = (axis.ravel() for axis in np.meshgrid(h, v, *ways, indexing="ij"))
     target = np.choose(T.astype(int), (np.zeros_like(V), V, np.full_like(V, cruise)))
-    found = landed(p, steady(p, V, H), Autorotating(target, *rest), delay)
-    worst = np.maximum.reduce([found.sink / sink, np.abs(found.ahead) / max(run, 1e-9), np.abs(found.tilt) / _TILT])
-    worst = np.where(found.height > 0.0, np.inf, worst)
+    ends = landed(p, steady(p, V, H), Autorotating(target, *rest), delay)
+    worst = np.maximum.reduce([ends.sink / sink, np.abs(ends.ahead) / max(run, 1e-9), np.abs(ends.tilt) / _TILT])
+    worst = np.where(ends.height > 0.0, np.inf, worst)
     margin = worst.reshape(h.size, v.size, -1).min(axis=2) - 1.0
     return HeightVelocity(vehicle, v, h, margin, delay, sink, run, math.prod(map(len, ways)))
 
@@ -224,7 +224,7 @@ def height_velocity(
 def _ascending(name: str, given: Sequence[float] | None, usual: Array, *, least: float) -> Array:
     if given is None:
         return usual
-    found = np.asarray(given, dtype=np.float64)
-    if found.size < 2 or found[0] < least or not (np.diff(found) > 0.0).all() or not np.isfinite(found).all():
+    values = np.asarray(given, dtype=np.float64)
+    if values.size < 2 or values[0] < least or not (np.diff(values) > 0.0).all() or not np.isfinite(values).all():
         raise SwashError(f"are {list(given)!r:.60}, expected two or more, ascending from {least:g} on.", channel=name)
-    return found
+    return values

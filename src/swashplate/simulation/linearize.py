@@ -72,10 +72,10 @@ class LinearModel(Shown):
         share = np.abs(right * left.conj())
         share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
         integrating = _integrating(self.A, self.states)
-        found = []
+        modes = []
         for i in np.argsort(-np.abs(values), kind="stable"):
             if abs(values[i]) <= _ORIGIN:
-                found.append(Mode(0j, 0.0, 0.0, np.inf, integrating))
+                modes.append(Mode(0j, 0.0, 0.0, np.inf, integrating))
                 continue
             value = complex(values[i])
             if value.imag < 0.0:
@@ -85,7 +85,7 @@ class LinearModel(Shown):
             enough = max(_TAKES_PART, (1.0 - 1e-6) * share[order[:3][-1], i])
             order = order[: max(3, int(np.count_nonzero(share[:, i] >= enough)))]
             frequency = abs(value)
-            found.append(
+            modes.append(
                 Mode(
                     value,
                     frequency,
@@ -94,7 +94,7 @@ class LinearModel(Shown):
                     tuple((self.states[j], float(share[j, i])) for j in order),
                 )
             )
-        return tuple(found)
+        return tuple(modes)
 
     @property
     def outputs(self) -> tuple[str, ...]:

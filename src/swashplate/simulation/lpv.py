@@ -203,8 +203,8 @@ def _printed(
         zero = jnp.zeros(())
         # Stacks and slices only: XLA makes no function of a loop that gathers or scatters.
         state = jnp.stack([z[ten.index(name)] if name in ten else zero for name in names])
-        found = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
-        return jnp.stack([found[names.index(name)] for name in ten])
+        moved = rates(state, jnp.concatenate([jnp.stack([z[i] for i in order]), row]), p)
+        return jnp.stack([moved[names.index(name)] for name in ten])
 
     def step(carry: tuple[Any, Any], command: Float[jax.Array, " inputs"]) -> tuple[Any, Any]:
         x, disc = carry

@@ -189,19 +189,19 @@ def omissions(model: LinearModel) -> tuple[Omission, ...]:
     ):
         kinematic[index[row], index[column]] = value
     nominal, response = np.linalg.eigvals(model.A).astype(complex), _responses(model.A, model.B, model)
-    found = []
+    left_out = []
     for name, letter in rows.items():
         for column in rows:
             value = float(model.A[index[name], index[column]] - kinematic[index[name], index[column]])
             A = model.A.copy()
             A[index[name], index[column]] -= value
-            found.append(_omission(f"{letter}{column}", value, A, model.B, model, nominal, response))
+            left_out.append(_omission(f"{letter}{column}", value, A, model.B, model, nominal, response))
         for j, control in enumerate(model.inputs):
             B = model.B.copy()
             value = float(B[index[name], j])
             B[index[name], j] = 0.0
-            found.append(_omission(f"{letter}{control}", value, model.A, B, model, nominal, response))
-    return tuple(sorted(found, key=lambda entry: max(entry.modes, entry.response)))
+            left_out.append(_omission(f"{letter}{control}", value, model.A, B, model, nominal, response))
+    return tuple(sorted(left_out, key=lambda entry: max(entry.modes, entry.response)))
 
 
 @dataclass(frozen=True, repr=False)

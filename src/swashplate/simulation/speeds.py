@@ -25,14 +25,14 @@ def trims_over_speed(
     Raises:
         TrimError: at the first speed that cannot be flown, with the limit that stops it.
     """
-    found: list[Trim] = []
+    trims: list[Trim] = []
     for speed in speeds:
         at = partial(
             trim, vehicle, speed=float(speed), lateral=lateral, climb=climb, turn=turn, environment=environment
         )
         try:
-            found.append(at(near=found[-1] if found else None))
+            trims.append(at(near=trims[-1] if trims else None))
         except TrimError:
             # A neighbour may lead astray where the trim curve bends; what fails afresh too, fails.
-            found.append(at())
-    return tuple(found)
+            trims.append(at())
+    return tuple(trims)

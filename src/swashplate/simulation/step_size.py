@@ -24,8 +24,8 @@ def fastest_mode(vehicle: Vehicle, x: Array, u: Array, environment: Environment)
     numbers, command = vehicle.values(), [float(value) for value in u]
 
     def rates(at: Array) -> Array:
-        found = vehicle.rates([float(value) for value in at], command, numbers, environment)
-        return np.array([float(value) for value in found])
+        by_state = vehicle.rates([float(value) for value in at], command, numbers, environment)
+        return np.array([float(value) for value in by_state])
 
     step = 1e-6 * np.maximum(1.0, np.abs(x))
     moved = np.diag(step)

@@ -153,9 +153,9 @@ class XlaEngine:
     def advance(self, inputs: Sequence[float], around: Array, step: float, steps: int) -> list[float]:
         row = np.concatenate([inputs, around, (step, float(steps))])
         self._state, told = self._advance(self._state, row, self._parameters)
-        found = np.asarray(told).tolist()
-        n = len(found) // 2
-        return motion_row(found[:n], found[n:], self._gravity, _FLOATS)
+        numbers = np.asarray(told).tolist()
+        n = len(numbers) // 2
+        return motion_row(numbers[:n], numbers[n:], self._gravity, _FLOATS)
 
 
 def motion_row(states: Sequence[Scalar], rates: Sequence[Scalar], g: Scalar, xp: Backend) -> list[Scalar]:

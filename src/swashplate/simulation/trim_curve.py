@@ -84,14 +84,14 @@ class TrimCurve(Shown):
         """Speed, inputs, attitude, flapping and power by "name [unit]", one value a speed."""
         first = self.trims[0]
         names = (*self.vehicle.input_names, *(n for n in ("phi", "theta", "a1", "b1") if n in first.state_names))
-        found = {"speed [m/s]": [at.speed for at in self.trims]}
+        columns = {"speed [m/s]": [at.speed for at in self.trims]}
         if any(at.climb != first.climb for at in self.trims):
-            found["climb [m/s]"] = [at.climb for at in self.trims]
-        found |= {f"{name} [{self.shown_unit(name)}]": self.shown(name) for name in names}
+            columns["climb [m/s]"] = [at.climb for at in self.trims]
+        columns |= {f"{name} [{self.shown_unit(name)}]": self.shown(name) for name in names}
         powers = [self.power(at) for at in self.trims]
         if all(power is not None for power in powers):
-            found["power [W]"] = [float(power or 0.0) for power in powers]
-        return found
+            columns["power [W]"] = [float(power or 0.0) for power in powers]
+        return columns
 
     def as_dict(self) -> dict[str, Any]:
         """Trims, units and remarks as JSON types."""

@@ -113,9 +113,9 @@ def from_euler(row: Array) -> Array:
 
 def to_euler(row: Array, before: Array) -> Array:
     """A state row of `tumbling` as one of the vehicle, with roll and yaw counted on from `before`, a row of it."""
-    found = euler_of(Quaternion(*row[_PHI : _PHI + 4].tolist()), _FLOATS)
+    euler = euler_of(Quaternion(*row[_PHI : _PHI + 4].tolist()), _FLOATS)
     roll, _, yaw = before[_PHI:_P].tolist()
-    angles = [counted_on(found.phi, roll), found.theta, counted_on(found.psi, yaw)]
+    angles = [counted_on(euler.phi, roll), euler.theta, counted_on(euler.psi, yaw)]
     return np.concatenate([row[:_PHI], angles, row[_PHI + 4 :]])
 
 
@@ -182,11 +182,11 @@ def _as_it_is(x: Rows, shown: Rows) -> tuple[Any, Any]:
 
 
 def _as_euler(x: Rows, shown: Rows) -> tuple[Any, Any]:
-    found = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
+    euler = euler_of(Quaternion(*(x[_PHI + k] for k in range(4))), JaxBackend())
     turn = 2.0 * jnp.pi
     roll, yaw = (
         angle + turn * jnp.round((before - angle) / turn)
-        for angle, before in ((found.phi, shown[0]), (found.psi, shown[2]))
+        for angle, before in ((euler.phi, shown[0]), (euler.psi, shown[2]))
     )
-    angles = jnp.stack([roll, found.theta, yaw])
+    angles = jnp.stack([roll, euler.theta, yaw])
     return jnp.concatenate([x[:_PHI], angles, x[_PHI + 4 :]]), angles

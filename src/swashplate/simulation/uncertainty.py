@@ -39,19 +39,19 @@ class CardSpread:
 
     def modes(self) -> list[dict[str, dict[str, float]]]:
         """Every mode of the card with the 5 % and 95 % quantiles of the samples' [1/s], fastest first."""
-        found = []
+        rows = []
         for i in np.argsort(-np.abs(self.eigenvalues), kind="stable"):
             value, drawn = self.eigenvalues[i], self.samples[:, i]
             if value.imag < 0.0 or abs(value) < 1e-6:
                 continue
             real, imag = np.quantile(drawn.real, [0.05, 0.95]), np.quantile(np.abs(drawn.imag), [0.05, 0.95])
-            found.append(
+            rows.append(
                 {
                     "real": {"value": value.real, "5 %": real[0], "95 %": real[1]},
                     "imag": {"value": value.imag, "5 %": imag[0], "95 %": imag[1]},
                 }
             )
-        return found
+        return rows
 
 
 def spread(
@@ -112,15 +112,15 @@ def spread(
         raise SwashError(f"none of the samples could be trimmed; the last: {why}", where=card.where)
     low, high = np.quantile(np.array(tables), [0.05, 0.95], axis=0)
     centre = derivative_table(vehicle, at).total.ravel()
-    found = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}
-    return CardSpread(found, values, np.array(modes), len(tables), refused)
+    quantiles = {name: (float(c), float(a), float(b)) for name, c, a, b in zip(names, centre, low, high, strict=True)}
+    return CardSpread(quantiles, values, np.array(modes), len(tables), refused)
 
 
 def _matched(
-    found: NDArray[np.complexfloating[Any, Any]], wanted: NDArray[np.complexfloating[Any, Any]]
+    values: NDArray[np.complexfloating[Any, Any]], wanted: NDArray[np.complexfloating[Any, Any]]
 ) -> NDArray[np.complexfloating[Any, Any]]:
     """Eigenvalues in the order of others, by the assignment that moves them least."""
     from scipy.optimize import linear_sum_assignment
 
-    _, order = linear_sum_assignment(np.abs(wanted[:, None] - found[None, :]))
-    return np.asarray(found[order])
+    _, order = linear_sum_assignment(np.abs(wanted[:, None] - values[None, :]))
+    return np.asarray(values[order])

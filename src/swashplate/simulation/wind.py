@@ -69,7 +69,7 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
         count: how many independent series.
     """
     random = np.random.default_rng(seed)
-    found = {}
+    turbulence = {}
     for name, part in zip(_NAMES, _filters(gusts, rate), strict=True):
         x = part.start @ random.standard_normal((part.step.shape[0], count))
         series = np.empty((samples, count))
@@ -80,8 +80,8 @@ def dryden(gusts: Gusts, *, samples: int, rate: float, seed: int, count: int = 1
             states = coming[: size * len(x)] @ x + shaken[: size * len(x), : len(noise)] @ noise
             series[k], x = part.output @ x, states[-len(x) :]
             series[k + 1 : k + size] = part.output @ states[: -len(x)].reshape(size - 1, len(x), count)
-        found[name] = series
-    return found
+        turbulence[name] = series
+    return turbulence
 
 
 _BLOCK = 64
@@ -138,7 +138,7 @@ class _Filter(NamedTuple):
 
 
 def _filters(gusts: Gusts, rate: float) -> list[_Filter]:
-    found = []
+    filters = []
     for i, (sigma, length) in enumerate(zip(gusts.sigma, gusts.length, strict=True)):
         T = length / gusts.speed
         if i == 0:
@@ -151,8 +151,8 @@ def _filters(gusts: Gusts, rate: float) -> list[_Filter]:
         P = scipy.linalg.solve_continuous_lyapunov(A, -b @ b.T)
         P *= sigma**2 / (c @ P @ c)
         step = scipy.linalg.expm(A / rate)
-        found.append(_Filter(step, _root(P - step @ P @ step.T), c, _root(P)))
-    return found
+        filters.append(_Filter(step, _root(P - step @ P @ step.T), c, _root(P)))
+    return filters
 
 
 def _root(P: Array) -> Array:

@@ -107,9 +107,9 @@ ROWS: tuple[tuple[str, Callable[[Band, Band], str]], ...] = (
 """What is told of the two bands of a channel: words, and the cell."""
 
 
-def pairs(found: Sequence[Band]) -> list[tuple[Band, Band]]:
+def pairs(judged: Sequence[Band]) -> list[tuple[Band, Band]]:
     """The narrow and the wide band of each channel and horizon."""
-    narrow, wide = ([band for band in found if band.promised == share] for share in SHARES)
+    narrow, wide = ([band for band in judged if band.promised == share] for share in SHARES)
     return list(zip(narrow, wide, strict=True))
 
 
@@ -171,9 +171,9 @@ def _inside(record: BandedRecord, promised: float) -> Array:
     return ((record.below >= outside) & (record.below <= record.paths - outside)).astype(float)
 
 
-def in_brief(found: Sequence[Band], horizon: float) -> str:
+def in_brief(judged: Sequence[Band], horizon: float) -> str:
     """Which bands at one horizon hold and which do not, in a sentence."""
-    rows = [band for band in found if abs(band.horizon - horizon) < 1e-9]
+    rows = [band for band in judged if abs(band.horizon - horizon) < 1e-9]
     said = []
     for level, words in _WORDS.items():
         named = [f"{b.channel} {b.held:.0f} of {b.promised:g} %" for b in rows if b.level == level]

@@ -70,5 +70,5 @@ def calibrate(
     likelihood = DifferencedError(
         table, [first_part(record, seconds)], noise=noise, estimate_noise=False, nuisance=prior
     )
-    found = likelihood.numbers(minimise(likelihood, iterations=30).row)[0]
-    return Nuisance(*found.nuisance.tolist())
+    calibrated = likelihood.numbers(minimise(likelihood, iterations=30).row)[0]
+    return Nuisance(*calibrated.nuisance.tolist())

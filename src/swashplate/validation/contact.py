@@ -88,7 +88,7 @@ def contact(name: str, time: Array, states: Array, pushes: Array) -> Contact | N
     scatter = np.maximum(residual.std(axis=0), 1e-12)
     white = (residual - residual.mean(axis=0)) / scatter
     rows = np.concatenate([white.T[None], _surrogates(white, rng)])  # (1 + surrogates, axes, n)
-    best, found = np.zeros(len(rows)), None
+    best, split = np.zeros(len(rows)), None
     for feature, column in _FEATURES:
         values = states[:, column]
         if np.ptp(values) <= 0.0:
@@ -102,14 +102,14 @@ def contact(name: str, time: Array, states: Array, pushes: Array) -> Contact | N
         size = np.abs(sums) / np.sqrt(below * (n - below) / n)
         size = np.where(allowed, size, 0.0).reshape(len(rows), -1)
         top = size.argmax(axis=1)
-        if found is None or size[0, top[0]] > best[0]:
+        if split is None or size[0, top[0]] > best[0]:
             axis, cut = divmod(int(top[0]), n - 1)
-            found = (feature, column, axis, 0.5 * float(values[order[cut]] + values[order[cut + 1]]))
+            split = (feature, column, axis, 0.5 * float(values[order[cut]] + values[order[cut + 1]]))
         best = np.maximum(best, size[np.arange(len(rows)), top])
     chance = float(np.mean(best[1:] >= best[0]) * _SURROGATES + 1.0) / (_SURROGATES + 1.0)
-    if found is None or chance > CHANCE:
+    if split is None or chance > CHANCE:
         return None
-    feature, column, axis, limit = found
+    feature, column, axis, limit = split
     values = states[:, column]
     above = bool(np.mean(values > limit) <= 0.5)  # the smaller part is the odd one
     inside = values > limit if above else values < limit

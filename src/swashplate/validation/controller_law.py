@@ -90,8 +90,8 @@ def learnt(vehicle: Vehicle, record: Record, states: Array, *, axes: Sequence[st
             left, all_of_it = np.var(answer - table @ gains), np.var(answer)
             share = 1.0 - float(left / all_of_it) if all_of_it > 0.0 else 0.0
             if share > best.explained:
-                found = tuple(float(g) for g in gains[1:])
-                best = Law(record.name, axis, names, found, lag * record.dt, share)
+                coefficients = tuple(float(g) for g in gains[1:])
+                best = Law(record.name, axis, names, coefficients, lag * record.dt, share)
         made.append(best)
     return tuple(made)
 

@@ -68,12 +68,12 @@ def prediction_errors(fit: Result[Any, Any], flights: Sequence[Flight]) -> Predi
         if piece.time[-1] - piece.time[0] < CALIBRATION + 2.0 * AHEAD:
             continue
         nuisance = calibrate(vehicle, piece, noise=noise, prior=prior)
-        found = predict(vehicle, piece, noise=noise, nuisance=nuisance, horizon=AHEAD, settling=CALIBRATION)
+        predicted = predict(vehicle, piece, noise=noise, nuisance=nuisance, horizon=AHEAD, settling=CALIBRATION)
         truth, ahead = measured_states(piece, nuisance), round(AHEAD / piece.dt)
-        counted = found.starts + ahead < piece.time.size - _EDGE
-        first = found.starts[counted]
+        counted = predicted.starts + ahead < piece.time.size - _EDGE
+        first = predicted.starts[counted]
         times.append(piece.time[first])
-        errors.append((found.states[counted, ahead - 1] - truth[first + ahead])[:, columns] ** 2)
+        errors.append((predicted.states[counted, ahead - 1] - truth[first + ahead])[:, columns] ** 2)
         moved.append((truth[first + ahead] - truth[first])[:, columns] ** 2)
     if not times:
         raise FlightError(f"no unbroken piece has {CALIBRATION + 2.0 * AHEAD:g} s.", channel="hold-out")
@@ -99,6 +99,6 @@ def _lead(sums: Any) -> Array:
     return np.asarray(100.0 * (np.sqrt(sums[..., 0] / sums[..., 1]) - np.sqrt(sums[..., 2] / sums[..., 3])))
 
 
-def as_document(found: Mapping[str, Sequence[Gain]]) -> dict[str, Any]:
+def as_document(by_effect: Mapping[str, Sequence[Gain]]) -> dict[str, Any]:
     """Gains by effect as JSON types."""
-    return {name: [vars(one) for one in rows] for name, rows in found.items()}
+    return {name: [vars(one) for one in rows] for name, rows in by_effect.items()}

@@ -147,11 +147,11 @@ def prediction_sigma(vehicle: Vehicle, record: Record, *, noise: Noise, nuisance
     Uncertainty of the start and of the gusts to come; that of the parameters is not in it.
     """
     A, _, Q, _, P = uncertainty(vehicle, record, noise=noise, nuisance=nuisance)
-    kept, found = [vehicle.index(name) for name in PREDICTED], []
+    kept, sigmas = [vehicle.index(name) for name in PREDICTED], []
     for _ in range(round(horizon / record.dt)):
         P = A @ P @ A.T + Q
-        found.append(np.sqrt(np.maximum(np.diag(P)[kept], 0.0)))
-    return np.array(found)
+        sigmas.append(np.sqrt(np.maximum(np.diag(P)[kept], 0.0)))
+    return np.array(sigmas)
 
 
 def uncertainty(

@@ -209,12 +209,12 @@ def _asked(
     change, spread = told.asked()
     sigmas = np.abs(change) / np.sqrt(1.0 + spread**2)
     matters = (np.abs(change) * loudest > UNSEEN) & (np.abs(change) * shares > MATERIAL)
-    found = []
+    asked = []
     for i in map(int, np.flatnonzero((sigmas > DOUBTED * SIGMAS) & matters)):
         p = model.parameters[bounded[i]]
         wanted = float(p.value + change[i] * p.cramer_rao)
-        found.append(AskedChange(bounded[i], p.value, wanted, float(sigmas[i]), float(abs(change[i]) * shares[i])))
-    return tuple(sorted(found, key=lambda one: -one.sigmas))
+        asked.append(AskedChange(bounded[i], p.value, wanted, float(sigmas[i]), float(abs(change[i]) * shares[i])))
+    return tuple(sorted(asked, key=lambda one: -one.sigmas))
 
 
 def _in_words(

@@ -154,34 +154,34 @@ def residuals(
     """
     if not seconds > 0.0:
         raise SwashError(f"is {seconds:g} s, expected more than 0.", channel="seconds")
-    found = along_inputs(model, flights, outputs=outputs)
-    dt = float(np.median(np.diff(found.traces[0].time)))
+    verification = along_inputs(model, flights, outputs=outputs)
+    dt = float(np.median(np.diff(verification.traces[0].time)))
     lags = max(1, round(seconds / dt))
-    samples = sum(t.time.size for t in found.traces)
-    if min(t.time.size for t in found.traces) <= lags or samples < _SAMPLES_PER_LAG * lags:
+    samples = sum(t.time.size for t in verification.traces)
+    if min(t.time.size for t in verification.traces) <= lags or samples < _SAMPLES_PER_LAG * lags:
         raise FlightError(
             f"has {samples} samples, expected at least {_SAMPLES_PER_LAG * lags} for lags up to {seconds:g} s.",
-            where=found.traces[0].source,
+            where=verification.traces[0].source,
             hint="Ask for shorter lags, or give a longer flight.",
         )
-    names = [o.output for o in found.outputs]
-    pairs = len(names) * len(found.inputs)
+    names = [o.output for o in verification.outputs]
+    pairs = len(names) * len(verification.inputs)
     single = float(ndtri(1.0 - 0.5 * _LEVEL))
     all_together = float(ndtri(1.0 - 0.5 * _LEVEL / (pairs * (lags + 1))))
-    left = {name: [_level(t.flight[:, k] - t.model[:, k]) for t in found.traces] for k, name in enumerate(names)}
-    moved = {name: [_level(t.inputs[:, k]) for t in found.traces] for k, name in enumerate(found.inputs)}
+    left = {name: [_level(t.flight[:, k] - t.model[:, k]) for t in verification.traces] for k, name in enumerate(names)}
+    moved = {name: [_level(t.inputs[:, k]) for t in verification.traces] for k, name in enumerate(verification.inputs)}
     own, theirs = ({n: _correlation(rows, rows, lags) for n, rows in each.items()} for each in (left, moved))
     times = np.asarray(dt * np.arange(-lags, lags + 1), dtype=np.float64)
     cross = []
     for output in names:
-        for name in found.inputs:
+        for name in verification.inputs:
             pooled = max(_LEAST_SPREAD, float(own[output] @ theirs[name]))
             spread = float(np.sqrt(pooled / samples))
             values = _correlation(left[output], moved[name], lags)
             cross.append(Correlation(output, name, times, values, single * spread, all_together * spread))
     bound = single / float(np.sqrt(samples))
     auto = tuple(Correlation(n, "", times[lags:], own[n][lags:], bound, bound) for n in names)
-    return Residuals(found, auto, tuple(cross), samples)
+    return Residuals(verification, auto, tuple(cross), samples)
 
 
 def _level(row: Array) -> Array:

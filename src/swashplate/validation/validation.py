@@ -199,9 +199,9 @@ class Validation(Shown):
                 lines.append(f"  {predictor:16s}" + "".join(f"{value:9.1f}" for value in row))
             beside_it = (("no contact", self.without_contact), ("loop closed", self.loop_closed))
             for words, others in beside_it:
-                found = {s.channel: s.fit for s in others if s.horizon == horizon}
-                if found:
-                    row = (found.get(channel, float("nan")) for channel in channels)
+                by_channel = {s.channel: s.fit for s in others if s.horizon == horizon}
+                if by_channel:
+                    row = (by_channel.get(channel, float("nan")) for channel in channels)
                     lines.append(f"  {words:16s}" + "".join(f"{value:9.1f}" for value in row))
             beside = {f.channel: f for f in self.floors if f.horizon == horizon}
             for words, cell in ROWS if beside else ():

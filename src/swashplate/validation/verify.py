@@ -233,8 +233,8 @@ def _flown(
     flat = (basis * weight[None, :, None]).reshape(time.size * k, -1)
     size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     wanted = np.stack([(values * weight).ravel() for values in (measured - answer, measured)], axis=1)
-    found, _, rank, _ = np.linalg.lstsq(flat / size, wanted, rcond=1e-8)
-    solved, still = (found / size[:, None]).T
+    scaled, _, rank, _ = np.linalg.lstsq(flat / size, wanted, rcond=1e-8)
+    solved, still = (scaled / size[:, None]).T
     trace = Trace(
         source=name,
         time=time,

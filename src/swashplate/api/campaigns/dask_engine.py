@@ -114,10 +114,10 @@ class DaskEngine:
                 )
 
     def _known(self) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        workers: dict[str, Any] = {}
         with suppress(Exception):  # between two connections it knows nothing
-            found = self._client.scheduler_info(n_workers=-1)["workers"]
-        return found
+            workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        return workers
 
     def _check_workers(self) -> None:
         """That the scheduler and every worker are the same program as this one, and work at one task at a time.
@@ -139,14 +139,14 @@ class DaskEngine:
                 every[f"scheduler {self._address}"] = self._client.run_on_scheduler(_program)
             except Exception as error:  # whatever its process lacks
                 every[f"scheduler {self._address}"] = error
-            for address, found in every.items():
-                if isinstance(found, BaseException):
+            for address, answer in every.items():
+                if isinstance(answer, BaseException):
                     raise CampaignError(
-                        f"it cannot say what program it is: {in_words(found)}.",
+                        f"it cannot say what program it is: {in_words(answer)}.",
                         where=address,
                         hint="Install the same swashplate[scale] there.",
                     )
-                differing = program.differences(wanted, found)
+                differing = program.differences(wanted, answer)
                 if differing:
                     raise CampaignError(
                         f"it has another program: {'; '.join(differing)}.",

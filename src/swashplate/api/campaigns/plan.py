@@ -147,24 +147,24 @@ def planned_in(store: CampaignStore) -> CampaignPlan:
 
 def changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """What differs between two plans as `CampaignPlan.stored` gives them, in words; empty where nothing does."""
-    found = []
+    changed = []
     was, is_ = _flat(before["document"]), _flat(now["document"])
     for entry in dict.fromkeys((*was, *is_)):
         if was.get(entry) != is_.get(entry):
-            found.append(f"{entry} was {was.get(entry, 'not given')}, is {is_.get(entry, 'not given')}")
+            changed.append(f"{entry} was {was.get(entry, 'not given')}, is {is_.get(entry, 'not given')}")
     for name in sorted({*before["files"], *now["files"]}):
         if before["files"].get(name) != now["files"].get(name):
-            found.append(f"the file {name} has another content")
-    found += [f"the program: {words} as it was" for words in differences(before["program"], now["program"])]
+            changed.append(f"the file {name} has another content")
+    changed += [f"the program: {words} as it was" for words in differences(before["program"], now["program"])]
     logs = [{p[3]: p[4] for p in plan["portions"] if p[3]} for plan in (before, now)]
     fresh, gone = (sorted(set(a) - set(b)) for a, b in ((logs[1], logs[0]), (logs[0], logs[1])))
     other = [name for name in logs[0] if name in logs[1] and logs[0][name] != logs[1][name]]
     for names, words in ((fresh, "new"), (gone, "gone"), (other, "changed")):
         if names:
-            found.append(f"{len(names)} {words}: {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}")
-    if not found and before["portions"] != now["portions"]:
-        found.append("its tasks are cut otherwise")
-    return found
+            changed.append(f"{len(names)} {words}: {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}")
+    if not changed and before["portions"] != now["portions"]:
+        changed.append("its tasks are cut otherwise")
+    return changed
 
 
 def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
@@ -207,13 +207,13 @@ def matters(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flat(document: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for name, value in document.items():
         if isinstance(value, Mapping) and value:
-            found |= _flat(value, f"{before}{name}.")
+            flat |= _flat(value, f"{before}{name}.")
         elif name != "title":
-            found[before + name] = value
-    return found
+            flat[before + name] = value
+    return flat
 
 
 def _measured(plan: CampaignPlan) -> CampaignPlan:

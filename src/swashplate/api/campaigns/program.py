@@ -39,20 +39,22 @@ def worker_environment() -> dict[str, str]:
 
 def program() -> dict[str, str]:
     """What a result depends on beside its task: versions, our own source and XLA's flags, by name."""
-    found = dict(_versions())
+    versions = dict(_versions())
     flags = [flag for flag in os.environ.get("XLA_FLAGS", "").split() if flag not in (_OURS, _ONE_THREAD)]
-    return found | {"XLA flags": " ".join(flags)}
+    return versions | {"XLA flags": " ".join(flags)}
 
 
 @cache
 def _versions() -> tuple[tuple[str, str], ...]:
-    found = {"python": ".".join(platform.python_version_tuple()[:2])} | {name: version_of(name) for name in _LIBRARIES}
+    versions = {"python": ".".join(platform.python_version_tuple()[:2])} | {
+        name: version_of(name) for name in _LIBRARIES
+    }
     every = metadata.entry_points()
     for group in (name for name in every.groups if name.startswith("swashplate.")):
         for point in every.select(group=group):  # packages that bring models, estimators or kinds of their own
             if point.dist is not None:
-                found[point.dist.name] = point.dist.version
-    return tuple({**found, "source": _source()}.items())
+                versions[point.dist.name] = point.dist.version
+    return tuple({**versions, "source": _source()}.items())
 
 
 def _source() -> str:
@@ -63,10 +65,10 @@ def _source() -> str:
     return digest.hexdigest()[:16]
 
 
-def differences(wanted: Mapping[str, str], found: Mapping[str, str]) -> list[str]:
+def differences(wanted: Mapping[str, str], actual: Mapping[str, str]) -> list[str]:
     """What differs between two programs, in words; empty where nothing does."""
-    names = sorted({*wanted, *found})
-    pairs = [(name, found.get(name, "nothing"), wanted.get(name, "nothing")) for name in names]
+    names = sorted({*wanted, *actual})
+    pairs = [(name, actual.get(name, "nothing"), wanted.get(name, "nothing")) for name in names]
     return [f"{name} is {is_ or 'empty'}, expected {expected or 'empty'}" for name, is_, expected in pairs
             if is_ != expected]  # fmt: skip
 
@@ -77,10 +79,10 @@ def check_program(wanted: Mapping[str, str], *, where: str) -> None:
     Raises:
         CampaignError: with what differs; results of two programs must not share a table.
     """
-    found = differences(wanted, program())
-    if found:
+    differing = differences(wanted, program())
+    if differing:
         raise CampaignError(
-            f"the worker has another program: {'; '.join(found)}.",
+            f"the worker has another program: {'; '.join(differing)}.",
             where=where,
             hint="Install the same versions there, and run `swash campaign resume`.",
         )

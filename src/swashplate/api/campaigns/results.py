@@ -79,11 +79,11 @@ class Campaign(Shown):
     @property
     def quantiles(self) -> dict[str, tuple[tuple[float, float, float], ...]]:
         """Quantiles of what is shown, in its units, by column: each with the ends of its 95 % interval."""
-        found = {}
+        by_column = {}
         for name, (_, factor) in self.findings.shown.items():
             values = factor * np.asarray(self.table[name], dtype=np.float64)
-            found[name] = tuple(quantile(values[~np.isnan(values)], share) for share in QUANTILES)
-        return found
+            by_column[name] = tuple(quantile(values[~np.isnan(values)], share) for share in QUANTILES)
+        return by_column
 
     def worst(self, count: int = _WORST) -> tuple[WorstRow, ...]:
         """Rows with the largest of the kind's measure of badness, the worst first."""
@@ -122,7 +122,7 @@ class Campaign(Shown):
             "summary": {label: words for label, words, _ in self.findings.summary},
             "careful": list(self.findings.careful),
             "quantiles": {
-                name: {f"{share:g}": list(found) for share, found in zip(QUANTILES, every, strict=True)}
+                name: {f"{share:g}": list(estimate) for share, estimate in zip(QUANTILES, every, strict=True)}
                 for name, every in self.quantiles.items()
             },
             "worst": [row._asdict() for row in self.worst()],
@@ -130,25 +130,25 @@ class Campaign(Shown):
 
     def page(self, *, title: str | None = None) -> Report:
         """What `sp.report` writes: distributions, convergence, worst rows, failures."""
-        found = self.findings
+        findings = self.findings
         shapes = [
             Shape(name, unit, factor * np.asarray(self.table[name], dtype=np.float64), quantiles)
-            for (name, (unit, factor)), quantiles in zip(found.shown.items(), self.quantiles.values(), strict=True)
+            for (name, (unit, factor)), quantiles in zip(findings.shown.items(), self.quantiles.values(), strict=True)
         ]
-        unit = found.shown.get(found.worst, ("", 1.0))[0]
+        unit = findings.shown.get(findings.worst, ("", 1.0))[0]
         return compose_campaign(
             title or str(self.document.get("title") or f"{self.of}: {self.folder.name}"),
             standing=self.standing,
             rows=CAMPAIGNS[self.of].rows,
-            summary=found.summary,
-            careful=found.careful,
+            summary=findings.summary,
+            careful=findings.careful,
             shares=QUANTILES,
             shapes=shapes,
             worst=self.worst(),
-            worst_by=f"{found.worst} [{unit}]" if unit else found.worst,
+            worst_by=f"{findings.worst} [{unit}]" if unit else findings.worst,
             folder=str(self.folder),
-            tables=found.tables,
-            curves=found.curves,
+            tables=findings.tables,
+            curves=findings.curves,
             failed=[FailedTask(told["first"], told["count"], told["seed"], told["of"], tuple(told["tries"]))
                     for told in self.failed.values()],
         )  # fmt: skip
@@ -180,7 +180,7 @@ class Campaign(Shown):
             rows = []
             for (name, (unit, _)), every in zip(self.findings.shown.items(), self.quantiles.values(), strict=True):
                 last = f"{every[-1][1]:.4g} to {every[-1][2]:.4g}"
-                rows.append((f"{name} [{unit}]" if unit else name, *(f"{found[0]:.4g}" for found in every), last))
+                rows.append((f"{name} [{unit}]" if unit else name, *(f"{estimate[0]:.4g}" for estimate in every), last))
             told.append(text_table(head, rows))
         for caption, head, cells in self.findings.tables:
             told.append(text_table(head, cells, left=(0, len(head) - 1)) if cells else caption)

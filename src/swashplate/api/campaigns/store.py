@@ -81,17 +81,17 @@ class CampaignStore:
                 "holds no campaign.", where=self.folder, hint="Begin one: swash campaign run FILE -o FOLDER"
             )
         path = self.folder / PLAN
-        found = documents.read_document(path, form="json", error=CampaignError)
-        if found.get("kind") != "campaign-plan" or found.get("schema") != _SCHEMA:
+        document = documents.read_document(path, form="json", error=CampaignError)
+        if document.get("kind") != "campaign-plan" or document.get("schema") != _SCHEMA:
             raise CampaignError(
-                f"is of schema {found.get('schema')}, expected {_SCHEMA}.",
+                f"is of schema {document.get('schema')}, expected {_SCHEMA}.",
                 where=path,
                 hint="Finish it with the version that began it, or begin anew in another folder.",
             )
         documents.checked(
-            found, _Plan, where=path, error=CampaignError, hint="It is damaged: begin anew in another folder."
+            document, _Plan, where=path, error=CampaignError, hint="It is damaged: begin anew in another folder."
         )
-        return found
+        return document
 
     def text(self) -> str:
         """The campaign's file as it was."""
@@ -118,10 +118,10 @@ class CampaignStore:
 
     def failed(self) -> dict[str, dict[str, Any]]:
         """What failed for good, by the task's name: see `give_up`."""
-        found = {}
+        failures = {}
         for name in sorted(self._names(FAILED, ".json") - self.done()):
-            found[name] = documents.read_document(self.folder / FAILED / f"{name}.json", form="json")
-        return found
+            failures[name] = documents.read_document(self.folder / FAILED / f"{name}.json", form="json")
+        return failures
 
     def _names(self, folder: str, ending: str) -> frozenset[str]:
         place = self.folder / folder
@@ -175,8 +175,8 @@ class CampaignStore:
             with zipfile.ZipFile(content) as packed:
                 if sum(entry.file_size for entry in packed.infolist()) > _LARGEST_RESULT:
                     raise ValueError("it claims more than it can hold")
-            with np.load(content, allow_pickle=False) as found:
-                return {key: found[key] for key in found.files}
+            with np.load(content, allow_pickle=False) as arrays:
+                return {key: arrays[key] for key in arrays.files}
         except Exception as error:  # whatever the libraries raise on damaged bytes is the file's fault
             raise CampaignError(
                 f"is no result of a task: {error or type(error).__name__}.",
@@ -240,7 +240,7 @@ def _locked(descriptor: int) -> bool:
 
 def _owner(path: Path) -> str:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        return f"process {found['process']} on {found['host']} since {found['since']}"
+        owner = json.loads(path.read_text(encoding="utf-8"))
+        return f"process {owner['process']} on {owner['host']} since {owner['since']}"
     except (OSError, ValueError, KeyError, TypeError):
         return "another process"

@@ -30,16 +30,16 @@ def work(task: CampaignTask) -> Columns:
     """
     kind, settings, files = opened(task)
     portion = task.portion
-    found = kind.run(settings, portion, files)
-    count = {len(values) for values in found.values()}
+    columns = kind.run(settings, portion, files)
+    count = {len(values) for values in columns.values()}
     if count != {portion.count}:
         raise CampaignError(f"gave columns of {sorted(count)} rows, expected {portion.count}.", channel=task.kind)
-    kept = chosen(tuple(found), settings.keep)
+    kept = chosen(tuple(columns), settings.keep)
     own = {
         "number": np.arange(portion.first, portion.first + portion.count),
         "seed": np.full(portion.count, portion.seed, dtype=np.int64),
     }
-    return own | {name: found[name] for name in kept}
+    return own | {name: columns[name] for name in kept}
 
 
 def replay(task: CampaignTask, row: int) -> Any:

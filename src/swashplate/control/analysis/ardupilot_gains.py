@@ -235,11 +235,11 @@ def _suggest(loop: RateLoop, known: Mapping[str, float]) -> Suggestion:
             f"sensitivity of {PEAK:g}."
         )
         return Suggestion(loop.axis, {}, NO_FIGURES, flown, as_flown, loop, words)
-    found = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
-    better = [name for name, good, _ in _changes(found) if good]
+    suggestion = Suggestion(loop.axis, gains, loop.figures(gains, omega), flown, as_flown, loop)
+    better = [name for name, good, _ in _changes(suggestion) if good]
     if flown and not better and bool(_keep(_loops(loop, _as_rows(flown), omega))[0]):
-        return replace(found, parameters=flown, figures_suggested=as_flown)
-    return found
+        return replace(suggestion, parameters=flown, figures_suggested=as_flown)
+    return suggestion
 
 
 def _judged_at(loop: RateLoop) -> Array:
@@ -322,16 +322,16 @@ def _keep(loops: Complex) -> NDArray[np.bool_]:
 
 def _with_coupling(made: Sequence[Suggestion]) -> list[Suggestion]:
     """With what the axes do to each other, where all of them have gains."""
-    found, loops = list(made), tuple(s.loop for s in made)
+    suggestions, loops = list(made), tuple(s.loop for s in made)
     for gains, figures in (("parameters", "figures_suggested"), ("flown", "figures_flown")):
         sets = tuple(getattr(s, gains) for s in made)
         if all({"P", "I", "D", "FF"} & set(short(k)) for k in sets) and all(np.isfinite(s.peak) for s in made):
             joined = couplings(loops, sets, SEEN)
-            found = [
+            suggestions = [
                 replace(s, **{figures: replace(getattr(s, figures), coupling=value)})
-                for s, value in zip(found, joined, strict=True)
+                for s, value in zip(suggestions, joined, strict=True)
             ]
-    return found
+    return suggestions
 
 
 _CHANGES = (
@@ -351,7 +351,7 @@ def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
     """What differs between flown and suggested by more than it matters: words, whether better, by how much."""
     if not (np.isfinite(s.peak) and np.isfinite(s.flown_peak)):
         return []
-    found = []
+    changes = []
     columns = [
         (f.margins.phase_margin.value, f.margins.gain_margin.value, f.margins.delay_margin.value, f.peak,
          f.bandwidth, f.rejection, f.overshoot, f.coupling)
@@ -364,8 +364,8 @@ def _changes(s: Suggestion) -> list[tuple[str, bool, float]]:
         if not abs(change) >= (least * abs(scale * before) if relative else least):
             continue  # NaN is no change either
         words = f"{what} {_plain(scale * before)} -> {_plain(scale * after)} {unit}".rstrip()
-        found.append((words, (change > 0.0) == larger, change))
-    return found
+        changes.append((words, (change > 0.0) == larger, change))
+    return changes
 
 
 def _plain(value: float) -> str:

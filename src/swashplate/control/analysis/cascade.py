@@ -98,7 +98,7 @@ def _one(s: Complex, hertz: Array | float) -> Complex:
 
 def _gyro(s: Complex, k: Sets) -> Complex:
     c = 2.0 * np.pi * float(np.max(k["INS_GYRO_FILTER"]))
-    found = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else np.ones_like(s)
+    response = c**2 / (s**2 + np.sqrt(2.0) * c * s + c**2) if c > 0.0 else np.ones_like(s)
     if float(np.max(k["INS_HNTCH_ENABLE"])) > 0.5:
         deep = 10.0 ** (-float(np.max(k["INS_HNTCH_ATT"])) / 20.0)
         for harmonic in HARMONICS:
@@ -106,8 +106,8 @@ def _gyro(s: Complex, k: Sets) -> Complex:
             octaves = 2.0 * np.log2(centre / max(centre - 0.5 * wide, 0.05 * centre))
             broad = 2.0 * np.pi * centre * (2.0**octaves - 1.0) / np.sqrt(2.0**octaves)
             turn = (2.0 * np.pi * centre) ** 2
-            found = found * (s**2 + deep * broad * s + turn) / (s**2 + broad * s + turn)
-    return np.asarray(found)
+            response = response * (s**2 + deep * broad * s + turn) / (s**2 + broad * s + turn)
+    return np.asarray(response)
 
 
 def feedback(omega: Array, k: Sets, *, height: bool = True, place: bool = True) -> Complex:
@@ -188,8 +188,8 @@ class BrokenLoops:
         crossing = (imaginary[:, :-1] > 0.0) != (imaginary[:, 1:] > 0.0)
         share = imaginary[:, :-1] / np.where(crossing, imaginary[:, :-1] - imaginary[:, 1:], 1.0)
         where = real[:, :-1] + share * (real[:, 1:] - real[:, :-1])
-        found = np.abs(20.0 * np.log10(np.maximum(-where, 1e-12)))
-        return np.asarray(np.where(crossing & (where < 0.0), found, np.inf).min(axis=1))
+        margins = np.abs(20.0 * np.log10(np.maximum(-where, 1e-12)))
+        return np.asarray(np.where(crossing & (where < 0.0), margins, np.inf).min(axis=1))
 
     @property
     def crossover(self) -> Array:

@@ -108,15 +108,15 @@ class CascadeGains:
     @property
     def problems(self) -> tuple[str, ...]:
         """Where margins are missed or a mode grows, in words."""
-        found = [
+        problems = [
             f"The {loop.name} loop keeps {loop.gain:.1f} dB, {loop.phase:.0f} degrees and a sensitivity of "
             f"{loop.peak:.2f}; expected {GAIN_KEPT:g} dB, {PHASE_KEPT:g} degrees and {PEAK_KEPT:g}."
             for loop in self.loops
             if not loop.holds
         ]
         if self.slowest.real > _EPS:
-            found.append(f"A mode grows: {self.slowest.real:+.3g} +- {abs(self.slowest.imag):.3g}j 1/s.")
-        return tuple(found)
+            problems.append(f"A mode grows: {self.slowest.real:+.3g} +- {abs(self.slowest.imag):.3g}j 1/s.")
+        return tuple(problems)
 
 
 def judge_cascade(vehicle: Vehicle, hover: Trim, law: ArduPilotLaw, *, delays: Mapping[str, float]) -> CascadeGains:
@@ -168,12 +168,12 @@ def cascade_gains(vehicle: Vehicle, hover: Trim, start: ArduPilotLaw, *, delays:
                 if loops.turns[i] in growing:
                     continue
                 chosen = {name: float(np.broadcast_to(value, kept.shape)[i]) for name, value in sets.items()}
-                found = replace(start, parameters={**k, **chosen})
-                modes = _modes(vehicle, hover, found, mode, delays)
+                tuned = replace(start, parameters={**k, **chosen})
+                modes = _modes(vehicle, hover, tuned, mode, delays)
                 modes = modes[np.abs(modes) > (0.0 if mode == "loiter" else _SLOW)]
                 if np.all(modes.real <= -_DAMPED * np.minimum(np.abs(modes), _SWIFT)):
                     k.update(chosen)
-                    law = found
+                    law = tuned
                     return
                 if np.any(modes.real > _STILL):
                     growing.add(float(loops.turns[i]))
@@ -231,7 +231,7 @@ def _attitude_sets(plant: CascadePlant, k: Mapping[str, float], axes: tuple[int,
     """P per rate per command near the crossover, I and D per P, the angle's P; the axes alike."""
     angles = (1.0, 1.5, 2.0, 2.75, 3.5, 4.5, 6.0)
     grid = np.array(list(product(_SHARES, (0.5, 1.5), (0.0, 0.02, 0.05, 0.1, 0.2), angles))).T
-    found: dict[str, Array] = {}
+    sets: dict[str, Array] = {}
     near = int(np.argmin(np.abs(plant.omega - _NEAR)))
     ones = {i: 1.0 / float(np.abs(plant.response[near, i, i])) for i in axes}
     loud = grid[0] * (1.0 + grid[2] * 2.0 * np.pi * max(k[f"ATC_RAT_{AXES[i]}_FLTD"] for i in axes))
@@ -240,9 +240,9 @@ def _attitude_sets(plant: CascadePlant, k: Mapping[str, float], axes: tuple[int,
     for i in axes:
         p = grid[0] * ones[i]
         axis = AXES[i]
-        found |= {f"ATC_RAT_{axis}_P": p, f"ATC_RAT_{axis}_I": grid[1] * p, f"ATC_RAT_{axis}_D": grid[2] * p}
-        found[f"ATC_ANG_{axis}_P"] = grid[3]
-    return found
+        sets |= {f"ATC_RAT_{axis}_P": p, f"ATC_RAT_{axis}_I": grid[1] * p, f"ATC_RAT_{axis}_D": grid[2] * p}
+        sets[f"ATC_ANG_{axis}_P"] = grid[3]
+    return sets
 
 
 def _height_sets(plant: CascadePlant, k: Mapping[str, float]) -> dict[str, Array]:
@@ -251,9 +251,9 @@ def _height_sets(plant: CascadePlant, k: Mapping[str, float]) -> dict[str, Array
     lift = 1j * plant.omega[seen] * plant.response[seen, OUTPUTS.index("down"), 3]
     one, shares = 10.0 / float(np.max(np.abs(lift))), np.geomspace(0.02, 1.5, 14)
     grid = np.array(list(product(shares, (0.5, 1.0, 2.0), (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0), (0.3, 0.5, 0.7, 1.0)))).T
-    found = {"PSC_ACCZ_P": grid[0] * one, "PSC_VELZ_P": grid[2], "PSC_POSZ_P": grid[3] * np.minimum(1.0, grid[2])}
+    sets = {"PSC_ACCZ_P": grid[0] * one, "PSC_VELZ_P": grid[2], "PSC_POSZ_P": grid[3] * np.minimum(1.0, grid[2])}
     own = k["PSC_ACCZ_I"] > 0.0
-    return found | ({"PSC_ACCZ_I": grid[1] * grid[0] * one} if own else {"PSC_VELZ_I": 0.3 * grid[1] * grid[2]})
+    return sets | ({"PSC_ACCZ_I": grid[1] * grid[0] * one} if own else {"PSC_VELZ_I": 0.3 * grid[1] * grid[2]})
 
 
 def _place_sets() -> dict[str, Array]:

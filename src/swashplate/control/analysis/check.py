@@ -214,7 +214,7 @@ def check_controller(
     steps = fly_steps(flying, controller, held, duration, problems, fly=fly)
     blown = fly_gusts(flying, controller, gusts, held if margins else (), duration, problems, notes, fly=fly)
     commanded = _commanded(loop) if told else []
-    found = ControlCheck(
+    check = ControlCheck(
         vehicle=vehicle,
         trim=trim,
         rate=controller.rate,
@@ -233,7 +233,7 @@ def check_controller(
         in_gusts=blown,
         delays=late,
     )
-    return with_delay_verdict(found, room)
+    return with_delay_verdict(check, room)
 
 
 def with_delay_verdict(check: ControlCheck, required: float) -> ControlCheck:
@@ -283,20 +283,20 @@ def _attitude(
     band = slice(first, None)
     kind = command
     try:
-        found = handling_qualities(w[band], response[band], command="attitude")
+        qualities = handling_qualities(w[band], response[band], command="attitude")
         if command == "auto":
-            low = float(np.interp(found.bandwidth_phase.value / 10.0, w, phase))
+            low = float(np.interp(qualities.bandwidth_phase.value / 10.0, w, phase))
             kind = "attitude" if low > _ATTITUDE_LAG else "rate"
         if kind == "rate":
-            found = handling_qualities(w[band], response[band])
+            qualities = handling_qualities(w[band], response[band])
     except IdentificationError as error:
         return AttitudeResponse(state, reference, w, response, None, kind, None, error.problem)
-    level = boundaries[state].level(found.bandwidth.value, scale=scale)
-    return AttitudeResponse(state, reference, w, response, found, kind, level)
+    level = boundaries[state].level(qualities.bandwidth.value, scale=scale)
+    return AttitudeResponse(state, reference, w, response, qualities, kind, level)
 
 
 def _rejections(w: Array, sizes: Mapping[str, Array], scale: float) -> tuple[Rejection, ...]:
-    found = []
+    rejections = []
     for state, size in sizes.items():
         if np.min(size) > _HALF_POWER:  # nobody holds it
             continue
@@ -312,5 +312,5 @@ def _rejections(w: Array, sizes: Mapping[str, Array], scale: float) -> tuple[Rej
         standard = REJECTION.get(state)
         level = None if standard is None else standard.level(bandwidth, scale=scale)
         peak_level = None if standard is None else REJECTION_PEAK.level(peak)
-        found.append(Rejection(state, bandwidth, peak, float(w[worst]), w, size, level, peak_level))
-    return tuple(found)
+        rejections.append(Rejection(state, bandwidth, peak, float(w[worst]), w, size, level, peak_level))
+    return tuple(rejections)

@@ -83,7 +83,7 @@ def fly_steps(
     samples = round((LEAD + duration) * rate) + 1
     on = np.arange(samples) / rate >= LEAD
     at_rest = trim.states()
-    found = []
+    steps = []
     for reference, (state, measured_rate, size) in STEPS.items():
         if reference not in answered or (reference in ("ahead", "right") and "x" in answered):
             continue  # a place that is held takes a speed back
@@ -109,8 +109,8 @@ def fly_steps(
             wanted=None if reference in ("roll", "pitch") else size,
             rates=flight.values(measured_rate)[after] if measured_rate else None,
         )
-        found.append(Step(reference, state, size, flight, metrics))
-    return found
+        steps.append(Step(reference, state, size, flight, metrics))
+    return steps
 
 
 def couplings_of(steps: Mapping[str, Step]) -> list[Coupling]:
@@ -119,7 +119,7 @@ def couplings_of(steps: Mapping[str, Step]) -> list[Coupling]:
         next((steps[r] for r in names if r in steps), None)
         for names in (("roll", "right", "y"), ("pitch", "ahead", "x"))
     )
-    found = []
+    couplings = []
     for name, step, on, off, unit, factor in (
         ("pitch from roll", lateral, "phi", "theta", "deg/deg", 1.0),
         ("roll from pitch", forward, "theta", "phi", "deg/deg", 1.0),
@@ -132,5 +132,5 @@ def couplings_of(steps: Mapping[str, Step]) -> list[Coupling]:
         part = (t >= LEAD) & (t <= LEAD + COUPLING_WITHIN)
         value = factor * cross_ratio(step.flight.values(on)[part], step.flight.values(off)[part])
         level = ATTITUDE_COUPLING.level(value) if unit == "deg/deg" else None
-        found.append(Coupling(f"{name} (step of {step.reference})", value, unit, level))
-    return found
+        couplings.append(Coupling(f"{name} (step of {step.reference})", value, unit, level))
+    return couplings

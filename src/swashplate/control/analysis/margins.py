@@ -203,9 +203,9 @@ def _perron(M: NDArray[np.complex128]) -> Array:
     size = size + 1e-12 * size.max(axis=(-2, -1), keepdims=True)
     vectors = []
     for matrix in (size, np.swapaxes(size, -1, -2)):
-        values, found = np.linalg.eig(matrix)
+        values, directions = np.linalg.eig(matrix)
         largest = np.argmax(values.real, axis=-1)[..., None, None]
-        vectors.append(np.abs(np.take_along_axis(found, largest, axis=-1)[..., 0]))
+        vectors.append(np.abs(np.take_along_axis(directions, largest, axis=-1)[..., 0]))
     right, left = vectors
     return np.asarray(0.5 * np.log(left / right), dtype=np.float64)
 

@@ -58,14 +58,14 @@ def filters_of(axis: str, known: Mapping[str, float]) -> dict[str, float]:
 def short(gains: Mapping[str, float]) -> dict[str, float]:
     """Gains as a loop of rad/s has them, by short names, from either firmware's."""
     own = {name: (axis, key) for axis in ROTORFLIGHT for key, name in names_of(axis).items()}
-    found = {}
+    by_short = {}
     for name, value in gains.items():
         if name in own:
             axis, key = own[name]
-            found[key] = float(value) * _unit(axis, key)
+            by_short[key] = float(value) * _unit(axis, key)
         else:
-            found[name.rsplit("_", 1)[-1]] = float(value)
-    return found
+            by_short[name.rsplit("_", 1)[-1]] = float(value)
+    return by_short
 
 
 def written(axis: str, gains: Mapping[str, float]) -> dict[str, float]:

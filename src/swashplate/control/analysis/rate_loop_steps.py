@@ -125,12 +125,12 @@ def stepped(
     )
     of_gyro = "FLTG" in gains
     seen, flying = _Gyro(gyro_filter, dt, m), np.ones(m, dtype=bool)
-    found = np.full((round(seconds * RATE) + 1, m), np.nan)
-    for step in range(len(found)):
+    rates = np.full((round(seconds * RATE) + 1, m), np.nan)
+    for step in range(len(rates)):
         acting = given[-late]
         y = cd @ x + dd @ acting
         flying &= np.abs(y) < _WILD * max(1.0, abs(target))
-        found[step, flying] = y[flying]
+        rates[step, flying] = y[flying]
         wanted = wanted + target_share * (target - wanted)
         slow = slow + gyro_share * (seen(np.where(flying, y, 0.0)) - slow)
         filtered = filtered + error_share * (wanted - slow - filtered)
@@ -141,7 +141,7 @@ def stepped(
         asked = k["FF"] * wanted + k["P"] * filtered + k["I"] * summed + k["D"] * sloped + disturbance
         given = np.concatenate([given[1:], asked[None]])
         x = (ad @ x + bd @ acting) * flying
-    return found
+    return rates
 
 
 class _Gyro:

@@ -96,8 +96,8 @@ class SampledLoop:
     def _closed(self, frequencies: Array, command: Array, memory: Array, state: str) -> Complex:
         drive = np.concatenate([self.by_input @ command, memory])
         matrix = self.matrix
-        found = np.linalg.solve(self._z(frequencies) * np.eye(matrix.shape[0]) - matrix, drive[:, None].astype(complex))
-        return np.asarray(found[:, self.states.index(state), 0], dtype=np.complex128)
+        x = np.linalg.solve(self._z(frequencies) * np.eye(matrix.shape[0]) - matrix, drive[:, None].astype(complex))
+        return np.asarray(x[:, self.states.index(state), 0], dtype=np.complex128)
 
     def _z(self, frequencies: Array) -> Complex:
         return np.asarray(np.exp(1j * np.asarray(frequencies) / self.rate)[:, None, None], dtype=np.complex128)

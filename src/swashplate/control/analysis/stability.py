@@ -111,17 +111,17 @@ def margins_at(
             otherwise by phase over crossover.
     """
     w, L, names = opened_at(loop, inputs, points=points)
-    found = margins(w, L, names)
+    plain = margins(w, L, names)
     if not exact or loop.later is None:
-        return found
+        return plain
     S = np.linalg.inv(np.eye(len(names)) + L)
     axes = tuple(
         replace(
             axis, delay=delay_margin(loop, [axis.name], crossing_delays(w, (1.0 / S[:, i, i] - 1.0)[:, None, None]))
         )
-        for i, axis in enumerate(found.axes)
+        for i, axis in enumerate(plain.axes)
     )
-    return replace(found, axes=axes, delay=delay_margin(loop, names, crossing_delays(w, L)))
+    return replace(plain, axes=axes, delay=delay_margin(loop, names, crossing_delays(w, L)))
 
 
 def delay_margin(loop: SampledLoop, inputs: Sequence[str], guesses: NDArray[np.float64]) -> float:

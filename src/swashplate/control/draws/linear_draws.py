@@ -22,15 +22,15 @@ def bounds_of(model: StateSpaceModel) -> dict[str, float]:
     Raises:
         ControllerError: where it carries none.
     """
-    found = {n: p.cramer_rao for n in model.free if np.isfinite((p := model.parameters[n]).cramer_rao)}
-    if not found:
+    bounds = {n: p.cramer_rao for n in model.free if np.isfinite((p := model.parameters[n]).cramer_rao)}
+    if not bounds:
         raise ControllerError(
             "no number of the file has a Cramér-Rao bound.",
             where=model.name,
             channel="--tolerances",
             hint="Take a model of `swash fit-ss` or `swash fit-time`, or say what varies: --vary Xu=5%.",
         )
-    return found
+    return bounds
 
 
 def vary_parameters(
@@ -47,7 +47,7 @@ def vary_parameters(
     Raises:
         ControllerError: for a name that the model does not have or ties to others, or a negative sigma.
     """
-    random, found = np.random.default_rng(seed), dict(about)
+    random, drawn = np.random.default_rng(seed), dict(about)
     for name, sigma in sigmas.items():
         p = model.parameters.get(name)
         if p is None or p.tie is not None:
@@ -55,8 +55,8 @@ def vary_parameters(
             raise ControllerError(f"{told}.", where=model.name, channel=name)
         if not sigma >= 0.0:
             raise ControllerError(f"varies by {sigma:g}, expected zero or more.", where=model.name, channel=name)
-        found[name] = np.clip(found.get(name, p.value) + sigma * random.standard_normal(count), p.lower, p.upper)
-    return found
+        drawn[name] = np.clip(drawn.get(name, p.value) + sigma * random.standard_normal(count), p.lower, p.upper)
+    return drawn
 
 
 def entries_of(model: StateSpaceModel, drawn: Mapping[str, Array], *, count: int) -> dict[str, Array]:

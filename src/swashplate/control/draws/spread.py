@@ -191,5 +191,5 @@ def _lean(phi: Array, theta: Array, phi_0: float, theta_0: float) -> Array:
 
 
 def _percentiles(values: Array, percents: tuple[float, ...]) -> tuple[float, ...]:
-    found = np.percentile(np.minimum(values, _HUGE), percents)
-    return tuple(float("inf") if v > 1e-6 * _HUGE else float(v) for v in found)
+    quantiles = np.percentile(np.minimum(values, _HUGE), percents)
+    return tuple(float("inf") if v > 1e-6 * _HUGE else float(v) for v in quantiles)

@@ -17,14 +17,14 @@ def tolerances_of(vehicle: Vehicle) -> dict[str, float]:
     Raises:
         ControllerError: where none has.
     """
-    found = {name: float(p.sigma) for name, p in vehicle.card.parameters.items() if p.sigma}
-    if not found:
+    sigmas = {name: float(p.sigma) for name, p in vehicle.card.parameters.items() if p.sigma}
+    if not sigmas:
         raise ControllerError(
             "no number of the card has a sigma.",
             where=vehicle.card.path or vehicle.name,
             hint="Take a card from `swash bench` or `swash identify`, or say what varies: --vary mass=5%.",
         )
-    return found
+    return sigmas
 
 
 def draw_numbers(
@@ -48,17 +48,17 @@ def draw_numbers(
         ControllerError: for a name that the card does not have, or a negative sigma.
     """
     random = np.random.default_rng(seed)
-    found = dict(about or {})
+    numbers = dict(about or {})
     for name, sigma in sigmas.items():
         if name not in vehicle.card.parameters or name not in vehicle.parameter_names:
             raise ControllerError("is not a number of the card.", where=vehicle.name, channel=name)
         if not sigma >= 0.0:
             raise ControllerError(f"varies by {sigma:g}, expected zero or more.", where=vehicle.name, channel=name)
         p = vehicle.card.parameters[name]
-        drawn = found.get(name, p.value) + sigma * random.standard_normal(count)
+        drawn = numbers.get(name, p.value) + sigma * random.standard_normal(count)
         low = -np.inf if p.lower is None else p.lower
-        found[name] = np.clip(drawn, low, np.inf if p.upper is None else p.upper)
-    return found
+        numbers[name] = np.clip(drawn, low, np.inf if p.upper is None else p.upper)
+    return numbers
 
 
 def load_them(vehicle: Vehicle, drawn: Mapping[str, Array], *, most: float, count: int, seed: int) -> dict[str, Array]:

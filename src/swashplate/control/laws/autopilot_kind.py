@@ -81,8 +81,8 @@ class AutopilotKind(ControllerKind[Autopilot]):
 
     def from_document(self, document: dict[str, Any], path: str) -> Autopilot:
         if document.get("mode") not in MODES:
-            found = document.get("mode")
-            raise ControllerError(f"is {found!r:.60}, expected {', '.join(MODES)}.", where=path, channel="mode")
+            mode = document.get("mode")
+            raise ControllerError(f"is {mode!r:.60}, expected {', '.join(MODES)}.", where=path, channel="mode")
         read = documents.checked(document, _FILE, where=path, error=ControllerError)
         if read.rate <= 0.0:
             raise ControllerError(f"is {read.rate:g} Hz, expected a positive rate.", where=path, channel="rate")

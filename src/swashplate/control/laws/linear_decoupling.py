@@ -223,10 +223,10 @@ def coupling(
     """
     A, B, C = _square(model, inputs, outputs)
     eye = np.eye(A.shape[0])
-    found = []
+    ratios = []
     for w in np.atleast_1d(np.asarray(frequencies, dtype=np.float64)):
         G = C @ np.linalg.solve(1j * w * eye - A, B)
         if by is not None:
             G = G @ np.atleast_2d(by.system(1j * w))
-        found.append(np.abs(G / np.diag(G)))
-    return np.moveaxis(np.array(found), 0, -1)
+        ratios.append(np.abs(G / np.diag(G)))
+    return np.moveaxis(np.array(ratios), 0, -1)

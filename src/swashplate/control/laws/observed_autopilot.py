@@ -91,10 +91,10 @@ class ObservedAutopilot:
 
     def memories(self, seeds: Iterable[int]) -> Array:
         """Starts with other noise and biases each, shape (memory, number of seeds)."""
-        found = self.observer.memories(seeds)
+        starts = self.observer.memories(seeds)
         end = self.observer.inner_memory.size
-        found[end - 6 : end - 1] = self.autopilot.memory[:, None]
-        return found
+        starts[end - 6 : end - 1] = self.autopilot.memory[:, None]
+        return starts
 
     def starting_at(self, trim: Trim, *, seed: int | None = None) -> ObservedAutopilot:
         """The same at another start, with other noise."""

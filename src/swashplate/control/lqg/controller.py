@@ -241,8 +241,8 @@ class Lqg:
         if own < N:
             deepest = max(at.kept for at in plan.sampling)
             for _ in range(deepest):  # every stored reading is one of the start
-                found = _stored(plan, self.numbers, mean, w)
-                mean, G = (np.asarray(part, dtype=np.float64) for part in found)
+                stored = _stored(plan, self.numbers, mean, w)
+                mean, G = (np.asarray(part, dtype=np.float64) for part in stored)
                 P = G @ P @ G.T
         return ObserverEstimate(mean, P)
 

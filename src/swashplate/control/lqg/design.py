@@ -204,13 +204,13 @@ def _slowed(
     for _ in range(_ROUNDS):
         if not np.any(np.isfinite(most)):
             break
-        found = _highest(loops, gains)
-        in_vain = np.where(found > _STUCK * lowest, in_vain + 1, 0)
-        lowest = np.minimum(lowest, found)
-        above = (found > most) & (in_vain < _PATIENCE)
+        loop_crossovers = _highest(loops, gains)
+        in_vain = np.where(loop_crossovers > _STUCK * lowest, in_vain + 1, 0)
+        lowest = np.minimum(lowest, loop_crossovers)
+        above = (loop_crossovers > most) & (in_vain < _PATIENCE)
         if not above.any():
             break
-        shares = np.where(above, shares * np.clip(most / found, _LEAST_CUT, _MOST_CUT), shares)
+        shares = np.where(above, shares * np.clip(most / loop_crossovers, _LEAST_CUT, _MOST_CUT), shares)
         gains = designed(shares)
     return gains, shares
 
@@ -265,7 +265,7 @@ def regulated(model: LinearModel, plan: ObserverPlan, holding: Holding, Q: Array
     inside = np.ix_(kept, kept)
     chosen = [names[i] for i in kept]
     K = np.zeros((G.shape[1], size))
-    found = regulator(
+    gain = regulator(
         F[inside],
         G[np.ix_(kept, moved)],
         Q[inside] * plan.dt,
@@ -274,7 +274,7 @@ def regulated(model: LinearModel, plan: ObserverPlan, holding: Holding, Q: Array
         scale=np.array([typical(name) for name in chosen]),
         where=where,
     )
-    K[np.ix_(moved, kept)] = found
+    K[np.ix_(moved, kept)] = gain
     return K
 
 

@@ -166,9 +166,9 @@ def _check_sizes(plan: ObserverPlan, f: Feedback, path: str | Path) -> None:
     expected |= {"speeds": (S,), "states": (S, n), "inputs": (S, m)}
     expected |= {"gains": (S, m, n + sum(plan.delays) + INTEGRALS)}
     for name, shape in expected.items():
-        found = np.shape(getattr(f, name))
-        if found != shape or S == 0:
-            raise ControllerError(f"has shape {found}, expected {shape}.", where=path, channel=f"feedback.{name}")
+        actual = np.shape(getattr(f, name))
+        if actual != shape or S == 0:
+            raise ControllerError(f"has shape {actual}, expected {shape}.", where=path, channel=f"feedback.{name}")
 
 
 def _array(value: Any, name: str, path: str | Path) -> Array:

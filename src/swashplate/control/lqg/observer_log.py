@@ -129,7 +129,7 @@ def along(controller: Lqg, flight: Flight, pose: Array, *, ahead: float = 0.1) -
     mean[: plan.n, 0] = controller.start.state
     mean[[vehicle.index(name) for name in POSE], 0] = pose[0]
     variance = np.diag(observer.start_variance(plan, controller.unrest))
-    found = _along(
+    arrays = _along(
         plan,
         steps,
         Numbers(*(None if part is None else jnp.asarray(part) for part in controller.numbers)),
@@ -139,7 +139,7 @@ def along(controller: Lqg, flight: Flight, pose: Array, *, ahead: float = 0.1) -
         jnp.asarray(np.column_stack([late, volts])),
         jnp.asarray(_measured_body(pose, rates, plan.dt)),
     )
-    estimates, innovations, covariances, predicted, raw = (np.asarray(part) for part in found)
+    estimates, innovations, covariances, predicted, raw = (np.asarray(part) for part in arrays)
     later = np.full((n, 3), np.nan)
     later[: n - steps] = rates[steps:]
     taken = np.arange(n) % every == 0

@@ -120,7 +120,7 @@ def trial(
             around[:, :3, i] = np.stack([blowing[name][:, 0] for name in SURROUNDINGS[:3]], axis=1)
     # The disturbing accelerations stand for the gusts, so they are no noise of the truth; the white ones are.
     spread = np.sqrt(np.asarray(controller.numbers.process)[:n])
-    found = _fly(
+    arrays = _fly(
         equations_of(vehicle),
         controller.step,
         substeps,
@@ -135,7 +135,7 @@ def trial(
         jnp.asarray(spread),
         jnp.asarray(steady_sigmas(controller)[:n] if plan.period else np.zeros(n)),
     )
-    truth, estimates, sigmas = (np.moveaxis(np.asarray(part), 0, 1) for part in found)
+    truth, estimates, sigmas = (np.moveaxis(np.asarray(part), 0, 1) for part in arrays)
     judged = slice(round(_SETTLING * plan.rate), None)
     error = estimates[judged] - truth[judged]
     psi = plan.equations.vehicle.index("psi")

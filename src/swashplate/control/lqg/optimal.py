@@ -60,7 +60,7 @@ def unseen(
     """
     balanced = F * scale[None, :] / scale[:, None], H * scale[None, :]
     outputs = balanced[1] / max(float(np.linalg.norm(balanced[1], 2)), 1e-300)
-    found: list[UnreachedDirection] = []
+    directions: list[UnreachedDirection] = []
     for z in _modes(balanced[0], all_modes):
         test = np.vstack([balanced[0] - z * np.eye(F.shape[0]), outputs])
         _, values, right = np.linalg.svd(test)
@@ -68,8 +68,8 @@ def unseen(
         if blind:
             vectors = np.column_stack([_turned_real(right[i].conj()) for i in blind])
             margin = float(values[blind[-1]] / values[0])
-            found += [UnreachedDirection(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
-    return tuple(found)
+            directions += [UnreachedDirection(complex(z), shares(vector, names), margin) for vector in plain(vectors).T]
+    return tuple(directions)
 
 
 def plain(basis: Array) -> Array:

@@ -84,7 +84,7 @@ def _answers(controller: Lqg, flying: Aircraft, margins: Margins | None) -> list
     )
     own, theirs = linearize(controller.vehicle, own_trim), linearize(flying.vehicle, flying.trim)
     crossovers = {a.name: a.crossover for a in margins.axes} if margins is not None else {}
-    found = []
+    apart = []
     for name in own.inputs:
         w = crossovers.get(name, float("nan"))
         w = w if np.isfinite(w) else 5.0
@@ -92,8 +92,8 @@ def _answers(controller: Lqg, flying: Aircraft, margins: Margins | None) -> list
         b = _answer(theirs, name, w, flying.delays.get(name, 0.0))
         size = float(np.linalg.norm(a))
         if size > 0.0:
-            found.append(f"{name} {100.0 * float(np.linalg.norm(b - a)) / size:.0f} % at {w:.3g} rad/s")
-    return [f"Answers of p, q, r and w to the inputs differ by: {', '.join(found)}."] if found else []
+            apart.append(f"{name} {100.0 * float(np.linalg.norm(b - a)) / size:.0f} % at {w:.3g} rad/s")
+    return [f"Answers of p, q, r and w to the inputs differ by: {', '.join(apart)}."] if apart else []
 
 
 def _answer(model: LinearModel, name: str, w: float, delay: float) -> NDArray[np.complex128]:

@@ -254,7 +254,7 @@ def response(z: Complex, A: Array, B: Array, C: Array, D: Array | None) -> Any:
     """C (z - A)^-1 B + D over the frequencies, by the Schur form: one decomposition for all of them."""
     T, U = scipy.linalg.schur(A, output="complex")
     right, left = U.conj().T @ B, C @ U
-    found = np.array(
+    values = np.array(
         [left @ scipy.linalg.solve_triangular(value * np.eye(len(T)) - T, right, check_finite=False) for value in z]
     )
-    return found if D is None else found + D
+    return values if D is None else values + D

@@ -46,8 +46,8 @@ class CasadiMatrices:
         key = (f.__code__, x.shape[0], w.shape[0], "value")
         if key not in self._made:
             xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
-            found = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
-            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [found])
+            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs])
         return self._made[key](x, w)
 
     def linearised(self, f: Scalars, x: Any, w: Any, /) -> tuple[Any, Any]:
@@ -57,9 +57,9 @@ class CasadiMatrices:
         key = (f.__code__, x.shape[0], w.shape[0])
         if key not in self._made:
             xs, ws = casadi.SX.sym("x", x.shape[0]), casadi.SX.sym("w", w.shape[0])
-            found = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
-            slopes = casadi.jacobian(found, xs)
-            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [found, slopes])
+            outputs = casadi.vertcat(*f(self.scalars(xs), self.scalars(ws)))
+            slopes = casadi.jacobian(outputs, xs)
+            self._made[key] = casadi.Function(f"swash_part{len(self._made)}", [xs, ws], [outputs, slopes])
         return tuple(self._made[key](x, w))
 
     def stacked(self, parts: Sequence[Any], /) -> Any:
@@ -147,8 +147,8 @@ def sensed_function(controller: Lqg, traced: TracedStep) -> Any:
     memory, reference = casadi.MX.sym("memory", inner + own.shape[0]), casadi.MX.sym("reference", len(REFERENCES))
     measured = casadi.MX.sym("measured", body + 3 + 1 + controller.drawn)
     y, carried = sensing(memory[inner:], measured[:body], measured[body : body + 3], measured[body + 4 :])
-    found = traced.function(memory[:inner], casadi.vertcat(y, measured[body + 3]), reference)
-    result = casadi.vertcat(found[:inner], carried, found[inner:])
+    stepped = traced.function(memory[:inner], casadi.vertcat(y, measured[body + 3]), reference)
+    result = casadi.vertcat(stepped[:inner], carried, stepped[inner:])
     return casadi.Function("swash_traced", [memory, measured, reference], [result])
 
 

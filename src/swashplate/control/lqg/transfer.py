@@ -64,6 +64,6 @@ def about(vehicle: Vehicle, trim: Trim) -> Vehicle:
             f"has the inputs {', '.join(vehicle.input_names)}, the aircraft {', '.join(trim.input_names)}.",
             where=vehicle.card.title,
         )
-    found = {**trim.states(), **trim.commands()}
-    names = {f"trim_{n}": found[n] for n in (*vehicle.card.options["states"], *vehicle.input_names) if n in found}
+    at_trim = {**trim.states(), **trim.commands()}
+    names = {f"trim_{n}": at_trim[n] for n in (*vehicle.card.options["states"], *vehicle.input_names) if n in at_trim}
     return vehicle.with_values(names, source="derived: the trim that it is flown at", status="derived")

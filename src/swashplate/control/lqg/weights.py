@@ -101,8 +101,8 @@ def checked_weights(
 
 def square(weights: Any) -> Array:
     """Weights as a matrix; a list is its diagonal."""
-    found = np.asarray(weights, dtype=np.float64)
-    return np.diag(found) if found.ndim == 1 else found
+    matrix = np.asarray(weights, dtype=np.float64)
+    return np.diag(matrix) if matrix.ndim == 1 else matrix
 
 
 def total_delays(plan: ObserverPlan, *, computation: float | None = None) -> Array:

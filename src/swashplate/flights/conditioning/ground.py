@@ -214,5 +214,5 @@ def cut(flight: Flight, start: float, stop: float, *, reasons: tuple[str, ...] |
 
 def trim_ground(flight: Flight, *, rule: GroundRule | None = None) -> Flight:
     """Only the flying interval; the history tells where it is and why."""
-    found = flying_interval(flight, rule=rule)
-    return cut(flight, found.start, found.stop, reasons=found.reasons)
+    flying = flying_interval(flight, rule=rule)
+    return cut(flight, flying.start, flying.stop, reasons=flying.reasons)

@@ -150,18 +150,18 @@ def _partial_coherence(
     return float(np.mean(gamma2[inside])) if inside.any() else float("nan")
 
 
-def _component(found: Mapping[str, tuple[float, float, float, float]]) -> LeverComponent:
+def _component(equations: Mapping[str, tuple[float, float, float, float]]) -> LeverComponent:
     """Equations of one component put together by their variances; where they disagree the bound grows (Birge 1932)."""
     from scipy.stats import norm
 
-    values = np.array([v for v, _, _, _ in found.values()])
-    sigmas = np.array([s for _, s, _, _ in found.values()])
+    values = np.array([v for v, _, _, _ in equations.values()])
+    sigmas = np.array([s for _, s, _, _ in equations.values()])
     weight = sigmas**-2
     value = float(np.sum(weight * values) / np.sum(weight))
     spread = float(np.sqrt(np.sum(weight * (values - value) ** 2) / max(1, values.size - 1)))
     sigma = float(np.sqrt(1.0 / np.sum(weight)) * max(1.0, spread))
     t = value / sigma
-    return LeverComponent(value, sigma, t, float(2.0 * norm.sf(abs(t))), dict(found), spread)
+    return LeverComponent(value, sigma, t, float(2.0 * norm.sf(abs(t))), dict(equations), spread)
 
 
 def lever_arm(
@@ -198,7 +198,7 @@ def lever_arm(
     arm = np.zeros(3)
     for _ in range(_PASSES):
         pieces = [_equations(part, arm, rate=rate, band=band, nuisance=nuisance) for part in parts]
-        components = [_component(found) for found in _solve(pieces, rate=rate, band=band)]
+        components = [_component(equations) for equations in _solve(pieces, rate=rate, band=band)]
         arm = np.array([component.value for component in components])
     x, y, z = components
     return LeverArm(x, y, z, percussion, band, sum(force.shape[0] for force, _, _ in pieces))
@@ -226,7 +226,7 @@ def _equations(part: Flight, arm: Array, *, rate: float, band: tuple[float, floa
 
 def _solve(pieces: list[_Piece], *, rate: float, band: tuple[float, float]) -> list[dict[str, _Equation]]:
     """Per component of the arm what each force equation says of it."""
-    found: list[dict[str, _Equation]] = [{}, {}, {}]
+    by_component: list[dict[str, _Equation]] = [{}, {}, {}]
     for axis, name in enumerate(_FORCES):
         arms = [k for k in range(3) if k != axis]  # omega_dot x l has no part along its own axis's arm
         data = [
@@ -238,13 +238,13 @@ def _solve(pieces: list[_Piece], *, rate: float, band: tuple[float, float]) -> l
         longest = max(data, key=lambda piece: piece[1].size)
         for column, arm in enumerate(arms):
             gamma2 = _partial_coherence(*longest, column, rate=rate, band=band)
-            found[arm][name] = (
+            by_component[arm][name] = (
                 float(fit.values[column]),
                 float(fit.sigma[column]),
                 float(fit.partial[column]),
                 gamma2,
             )
-    return found
+    return by_component
 
 
 def move_to_cg(flight: Flight, lever_arm: ArrayLike) -> Flight:

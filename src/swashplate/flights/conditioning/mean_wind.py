@@ -44,9 +44,9 @@ def mean_wind(flight: Flight) -> tuple[Array, Array]:
             channel=AIR_SPEED,
             hint="Fly full circles at cruise.",
         )
-    found = np.array([0.0, 0.0, 1.0])
+    estimate = np.array([0.0, 0.0, 1.0])
     for _ in range(_STEPS):
-        parts = [_linearised(part, found) for part in pieces]
+        parts = [_linearised(part, estimate) for part in pieces]
         slopes, left = np.concatenate([s for s, _ in parts]), np.concatenate([r for _, r in parts])
         scaled = slopes / np.maximum(np.sqrt(np.mean(slopes**2, axis=0)), 1e-12)
         if np.linalg.cond(scaled) > _APART:
@@ -56,13 +56,13 @@ def mean_wind(flight: Flight) -> tuple[Array, Array]:
                 hint="Fly full circles at cruise.",
             )
         step = np.linalg.lstsq(slopes, left, rcond=None)[0]
-        found = found + step
+        estimate = estimate + step
         if np.max(np.abs(step)) < 1e-9:
             break
     lag, count = round(_LASTS * _RATE), sum(map(len, pieces))
-    covariance = coloured_covariance([_linearised(part, found) for part in pieces], lag=lag)
+    covariance = coloured_covariance([_linearised(part, estimate) for part in pieces], lag=lag)
     # Short records make these weights too sure: two sigmas become 1.96 + 2.97 lag / n (Kiefer and Vogelsang 2005).
-    return found, covariance * (1.0 + 2.97 / 1.96 * lag / count) ** 2
+    return estimate, covariance * (1.0 + 2.97 / 1.96 * lag / count) ** 2
 
 
 def _linearised(part: Array, at: Array) -> tuple[Array, Array]:

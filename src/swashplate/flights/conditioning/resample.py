@@ -133,8 +133,8 @@ def _pieces(flight: Flight, max_gap: float) -> list[Interval]:
         own = _OWN_STEPS * float(np.median(np.diff(time)))
         here = unbroken(time, max_gap=max(max_gap, own))
         pieces = here if pieces is None else common(pieces, here)
-    found = pieces or []
-    return common(found, list(flight.segments)) if flight.segments else found
+    intervals = pieces or []
+    return common(intervals, list(flight.segments)) if flight.segments else intervals
 
 
 def _bridges(flight: Flight, pieces: list[Interval], *, rate: float, margin: float) -> list[Interval]:
@@ -143,14 +143,14 @@ def _bridges(flight: Flight, pieces: list[Interval], *, rate: float, margin: flo
     Args:
         rate: of the new samples [Hz]. margin: how far a filter carries such a line to either side [s].
     """
-    found = []
+    bridges = []
     for data in flight.streams.values():
         if {str(name) for name in data.data_vars} & {*POSITION, *ATTITUDE, *QUATERNION}:
             time = np.asarray(data["time"].values, dtype=np.float64)
             steps = np.diff(time)
             holes = np.flatnonzero(steps > _HOLE * max(float(np.median(steps)), 1.0 / rate))
-            found += [(float(time[k]), float(time[k + 1])) for k in holes]
-    inside = [hole for hole in sorted(found) if any(a <= hole[0] and hole[1] <= b for a, b in pieces)]
+            bridges += [(float(time[k]), float(time[k + 1])) for k in holes]
+    inside = [hole for hole in sorted(bridges) if any(a <= hole[0] and hole[1] <= b for a, b in pieces)]
     return [(first - margin, last + margin) for first, last in inside]
 
 

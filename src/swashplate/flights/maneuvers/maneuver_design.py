@@ -133,7 +133,7 @@ def checks(
         return _block_checks(maneuver, rate, known)
     low, high = maneuver.band
     per = rate / high
-    found = [
+    rules = [
         RuleCheck(
             "sample rate", f"{per:.1f} samples a period of {high:g} Hz", "at least 25", per >= _PER_FREQUENCY - 1e-9
         )
@@ -141,43 +141,43 @@ def checks(
     periods = maneuver.duration * low
     if maneuver.kind == "sine":
         whole = abs(periods - round(periods)) < 1e-6
-        found.append(
+        rules.append(
             RuleCheck("length", f"{periods:.4g} periods", "a whole number, at least 5", whole and periods > 4.999)
         )
-        return found
+        return rules
     if maneuver.kind == "sweep":
-        found.append(
+        rules.append(
             RuleCheck("length", f"{periods:.3g} periods of {low:g} Hz", "at least 4, better 5", periods > 3.999)
         )
         half = 0.5 * maneuver.duration * high
-        found.append(
+        rules.append(
             RuleCheck(
                 "windows", f"half the record holds {half:.0f} periods of {high:g} Hz", "at least 20", half > 19.999
             )
         )
         flights = int(np.ceil(5.0 / periods - 1e-9))
         words = "1 record" if flights == 1 else f"{flights} records"
-        found.append(RuleCheck("averaging", f"{words} for 5 windows at {low:g} Hz", "that many flown", flights == 1))
+        rules.append(RuleCheck("averaging", f"{words} for 5 windows at {low:g} Hz", "that many flown", flights == 1))
     else:
-        found += _multisine_checks(maneuver, rate)
-    found += _band_checks(low, full_until(maneuver, chirp=chirp), known)
+        rules += _multisine_checks(maneuver, rate)
+    rules += _band_checks(low, full_until(maneuver, chirp=chirp), known)
     if known.noise is not None and known.gain is not None:
-        found.append(_coherence_check(maneuver, rate, known, chirp))
-    return found
+        rules.append(_coherence_check(maneuver, rate, known, chirp))
+    return rules
 
 
 def _band_checks(low: float, top: float, known: ExpectedResponse) -> list[RuleCheck]:
-    found = []
+    rules = []
     if known.bandwidth is not None:
         limit = 0.5 * known.bandwidth
-        found.append(
+        rules.append(
             RuleCheck("low end", f"{low:g} Hz", f"at most {limit:.3g} Hz, half the bandwidth", low <= limit + 1e-9)
         )
     if known.f180 is not None:
         limit = 2.0 * known.f180
         words = f"at least {limit:.3g} Hz, twice that of -180 deg"
-        found.append(RuleCheck("high end", f"full amplitude up to {top:.3g} Hz", words, top >= limit - 1e-9))
-    return found
+        rules.append(RuleCheck("high end", f"full amplitude up to {top:.3g} Hz", words, top >= limit - 1e-9))
+    return rules
 
 
 def _coherence_check(maneuver: Maneuver, rate: float, known: ExpectedResponse, chirp: Chirp | None) -> RuleCheck:
@@ -201,17 +201,17 @@ def _multisine_checks(maneuver: Maneuver, rate: float) -> list[RuleCheck]:
     time = np.arange(round(maneuver.duration * rate)) / rate
     signals = np.stack(list(maneuver.signals(time).values()))
     periods = maneuver.duration * low
-    found = [
+    rules = [
         RuleCheck("length", f"{periods:.3g} periods of {low:g} Hz", "at least 2", periods > 1.999),
         RuleCheck("harmonics", f"{count} an axis", "at least 10", count >= 10),
     ]
     peak = max(relative_peak_factor(signal) for signal in signals)
-    found.append(RuleCheck("peak factor", f"{peak:.2f}", "at most 1.2 (a sine has 1)", peak <= 1.2))
+    rules.append(RuleCheck("peak factor", f"{peak:.2f}", "at most 1.2 (a sine has 1)", peak <= 1.2))
     if len(maneuver.axes) > 1:
         largest = float(np.max(np.abs(np.corrcoef(signals) - np.eye(len(signals)))))
         words = "none" if largest < 1e-9 else f"{largest:.1g}"  # below that it is rounding
-        found.append(RuleCheck("orthogonal axes", f"correlation: {words}", "at most 0.01", largest <= 0.01))
-    return found
+        rules.append(RuleCheck("orthogonal axes", f"correlation: {words}", "at most 0.01", largest <= 0.01))
+    return rules
 
 
 def excited_band(maneuver: Maneuver) -> tuple[float, float]:
@@ -233,7 +233,7 @@ def _block_checks(maneuver: Maneuver, rate: float, known: ExpectedResponse) -> l
     pieces = {"doublet": 2, "3211": 7}.get(maneuver.kind, 1)
     samples = maneuver.duration / pieces * rate
     whole = abs(samples - round(samples)) < 1e-6 * samples
-    found = [
+    rules = [
         RuleCheck(
             "sample rate", f"{samples:.4g} samples a unit", "a whole number, at least 10", whole and samples > 9.99
         )
@@ -242,14 +242,14 @@ def _block_checks(maneuver: Maneuver, rate: float, known: ExpectedResponse) -> l
     if known.bandwidth is not None:
         inside = low <= known.bandwidth <= high
         words = f"the mode at {known.bandwidth:g} Hz inside"
-        found.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", words, inside))
+        rules.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", words, inside))
     else:
-        found.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", "the mode of interest inside", True))
+        rules.append(RuleCheck("band", f"excites {low:.2g} to {high:.2g} Hz", "the mode of interest inside", True))
     if known.noise is not None and known.gain is not None:
         ratio = known.gain * maneuver.amplitude / known.noise if known.noise > 0.0 else np.inf
-        found.append(
+        rules.append(
             RuleCheck(
                 "amplitude", f"signal to noise {ratio:.3g}", f"at least {_SIGNAL_TO_NOISE:g}", ratio >= _SIGNAL_TO_NOISE
             )
         )
-    return found
+    return rules

@@ -91,9 +91,9 @@ def _optimised(
     best = phases
     steps = min(_STEPS, max(_FEWEST, _WORK // size))
     for order in _ORDERS:
-        found = minimize(norm, best, args=(order,), jac=True, method="CG", options={"maxiter": steps})
-        if np.max(np.abs(signal(found.x))) < np.max(np.abs(signal(best))):
-            best = np.asarray(found.x, dtype=np.float64)
+        optimum = minimize(norm, best, args=(order,), jac=True, method="CG", options={"maxiter": steps})
+        if np.max(np.abs(signal(optimum.x))) < np.max(np.abs(signal(best))):
+            best = np.asarray(optimum.x, dtype=np.float64)
     return _from_zero(harmonics, best, signal(best, 8 * size), weights)
 
 

@@ -198,12 +198,12 @@ def parse(text: str) -> Maneuver:
         raise ManeuverError(f"a {kind} moves one axis, found '{axes_text}'.", hint="Only a multisine moves several.")
     said: dict[str, tuple[float, ...]] = {}
     for item in items:
-        what, found = next(((what, m) for what, form in _ITEMS if (m := form.fullmatch(item))), ("", None))
-        if found is None:
+        what, match = next(((what, m) for what, form in _ITEMS if (m := form.fullmatch(item))), ("", None))
+        if match is None:
             raise ManeuverError(f"'{item}' in '{text}' is no band, time or amplitude.", hint=_EXAMPLE)
         if what in said:
             raise ManeuverError(f"'{text}' says its {what} twice.", hint=f"Leave out '{item}' or the other.")
-        said[what] = tuple(map(float, found.groups()))
+        said[what] = tuple(map(float, match.groups()))
     band = said.get("band")
     (seconds,) = said.get("time", (None,))
     (amplitude,) = said.get("amplitude", (min(DEFAULT_AMPLITUDE.get(axis, 0.1) for axis in axes),))
@@ -212,10 +212,10 @@ def parse(text: str) -> Maneuver:
 
 def _hover(text: str, rest: str) -> Maneuver:
     """`hover:20s`."""
-    found = _SECONDS.fullmatch(rest)
-    if found is None or not float(found[1]) > 0.0:
+    match = _SECONDS.fullmatch(rest)
+    if match is None or not float(match[1]) > 0.0:
         raise ManeuverError(f"'{text}' says no time alone.", hint='A hover moves nothing: "hover:20s".')
-    return Maneuver(HOVER, (), float(found[1]), 0.0)
+    return Maneuver(HOVER, (), float(match[1]), 0.0)
 
 
 def _checked(

@@ -81,9 +81,9 @@ class Course:
         others = [np.roll(values, round(share * values.size))[self.inside] for share in _OTHER_TIMES]
         levels = [_level(_envelope(other, self.phase, cycles), self.phase) for other in others]
         clear = _level(envelope, self.phase) >= _CLEAR * np.median(levels, axis=0)
-        found = np.zeros(values.shape)
-        found[self.inside] = np.where(clear, 2.0 * np.real(envelope * np.exp(1j * self.phase)), 0.0)
-        return found
+        part = np.zeros(values.shape)
+        part[self.inside] = np.where(clear, 2.0 * np.real(envelope * np.exp(1j * self.phase)), 0.0)
+        return part
 
 
 def course_of(time: Array, values: Array, ridge: Ridge) -> Course:
@@ -119,8 +119,8 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
 
     def fitted(c: float) -> tuple[float, Array]:
         columns = basis(at, c) * size[:, None]
-        found = np.linalg.lstsq(columns, phase * size, rcond=None)[0]
-        return float(np.sum((columns @ found - phase * size) ** 2)), np.asarray(found, dtype=np.float64)
+        coefficients = np.linalg.lstsq(columns, phase * size, rcond=None)[0]
+        return float(np.sum((columns @ coefficients - phase * size) ** 2)), np.asarray(coefficients, dtype=np.float64)
 
     grid = np.linspace(-2.0, 10.0, 49)
     best = int(np.argmin([fitted(float(c))[0] for c in grid]))
@@ -129,15 +129,15 @@ def _by_law(time: Array, values: Array, at: Array, phase: Array) -> Course | Non
         one, other = high - 0.618 * (high - low), low + 0.618 * (high - low)
         low, high = (low, other) if fitted(one)[0] < fitted(other)[0] else (one, high)
     c = 0.5 * (low + high)
-    found = fitted(c)[1]
-    law = basis(at, c) @ found
+    coefficients = fitted(c)[1]
+    law = basis(at, c) @ coefficients
     if np.any(np.diff(law) <= 0.0):
         return None
     signal = np.interp(at, time, values)
     kept = np.mean(np.abs(_envelope(signal, law, _BY_LAW)) ** 2)
     if kept < _STEADY * np.mean(np.abs(_envelope(signal, phase, _FINDING)) ** 2):
         return None
-    whole = basis(time, c) @ found
+    whole = basis(time, c) @ coefficients
     step = np.diff(whole, prepend=2.0 * whole[0] - whole[1])
     rises = (step > 0.0) & (step < np.pi)  # a law carried far beyond its sweep rises beyond all that samples tell
     first, last = int(np.searchsorted(time, at[0])), int(np.searchsorted(time, at[-1]))
@@ -180,5 +180,5 @@ def _envelope(values: Array, phase: Array, cycles: float) -> Complex:
     )
     places, own = (at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0
     held = np.maximum(weight, 1e-12)
-    found = np.interp(own, places, real / held) + 1j * np.interp(own, places, imaginary / held)
-    return np.asarray(found, dtype=np.complex128)
+    envelope = np.interp(own, places, real / held) + 1j * np.interp(own, places, imaginary / held)
+    return np.asarray(envelope, dtype=np.complex128)

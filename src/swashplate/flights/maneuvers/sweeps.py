@@ -67,12 +67,12 @@ class Sweep:
 def sweeps(flight: Flight) -> tuple[Sweep, ...]:
     """The sweeps in a flight, in order of time; those that the log tells of need not be seen in a signal."""
     told = tuple(_told(flight))
-    found = _seen(flight, [(sweep.start, sweep.stop) for sweep in told])
-    return tuple(sorted((*told, *found), key=lambda sweep: sweep.start))
+    seen = _seen(flight, [(sweep.start, sweep.stop) for sweep in told])
+    return tuple(sorted((*told, *seen), key=lambda sweep: sweep.start))
 
 
 def _told(flight: Flight) -> list[Sweep]:
-    found = []
+    swept = []
     for event in flight.provenance.events:
         if event.kind != "sweep":
             continue
@@ -81,8 +81,8 @@ def _told(flight: Flight) -> list[Sweep]:
         if stop > flight.start and d["start"] < flight.stop:
             axis = event.text.partition(",")[0]
             complete = stop > d["stop"] - 0.1
-            found.append(Sweep(d["start"], stop, axis, d["start_hz"], d["stop_hz"], channel, "log", complete))
-    return found
+            swept.append(Sweep(d["start"], stop, axis, d["start_hz"], d["stop_hz"], channel, "log", complete))
+    return swept
 
 
 def _number(flight: Flight, event: Event, key: str) -> float:
@@ -105,7 +105,7 @@ def _candidates(flight: Flight) -> list[str]:
 
 def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
     """Sweeps in the signals beside the `told` ones; of several channels that show one, the one that moves most."""
-    found: list[tuple[float, Sweep]] = []
+    candidates: list[tuple[float, Sweep]] = []
     for name in _candidates(flight):
         time, values = flight.time(name), flight.values(name)
         for start, stop in _unbroken(time):
@@ -115,9 +115,9 @@ def _seen(flight: Flight, told: Sequence[tuple[float, float]]) -> list[Sweep]:
                 low, high = float(ridge.frequency[0]), float(ridge.frequency[-1])
                 amplitude = float(np.median(ridge.amplitude))
                 amplitude /= 1e-3 if name.startswith("rcin_") else 1.0  # pulses move by 0.5 ms
-                found.append((amplitude, Sweep(ridge.start, ridge.stop, axis, low, high, name, "signal")))
+                candidates.append((amplitude, Sweep(ridge.start, ridge.stop, axis, low, high, name, "signal")))
     kept: list[Sweep] = []
-    for _, sweep in sorted(found, key=lambda item: -item[0]):
+    for _, sweep in sorted(candidates, key=lambda item: -item[0]):
         others = (*told, *((other.start, other.stop) for other in kept))
         if not any(sweep.start < stop and start < sweep.stop for start, stop in others):
             kept.append(sweep)

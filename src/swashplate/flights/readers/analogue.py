@@ -115,12 +115,12 @@ def _checked(options: Options, source: Source) -> tuple[Mapping[str, Any], Mappi
     """The calibration's three tables, their keys checked."""
     mapping = options.mapping
     recorder, chosen, channels = (mapping.get(key, {}) for key in ("recorder", "filter", "channels"))
-    found: list[tuple[str, object, set[str] | None]] = [
+    tables: list[tuple[str, object, set[str] | None]] = [
         ("recorder", recorder, _RECORDER),
         ("filter", chosen, set(_FILTER)),
     ]
-    found += [("channels", channels, None)]
-    for key, table, allowed in found:
+    tables += [("channels", channels, None)]
+    for key, table, allowed in tables:
         if not isinstance(table, Mapping) or (allowed is not None and set(table) - allowed):
             raise _refuse(f"the table [{key}] may hold {', '.join(sorted(allowed or ()))}; found {table!r}.", source)
     if set(mapping) - _TABLES or not channels:

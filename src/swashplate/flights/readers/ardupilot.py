@@ -128,22 +128,22 @@ def read(source: Source, options: Options) -> Flight:
     """
     refuse_mapping(options, "an ArduPilot log", where=source.name)
     text = source.text
-    found = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
-    found, end, said = _one_run(found)
-    told = story(found, end=end)
-    notes: list[str] = list(found.notes)
+    log = dataflash.messages(source.content) if text is None else dataflash_text.messages(text)
+    log, end, said = _one_run(log)
+    told = story(log, end=end)
+    notes: list[str] = list(log.notes)
     if "Plane" in told.vehicle:  # its terms are angles of control surfaces, not commands to a mixer
-        found = Messages({n: t for n, t in found.tables.items() if n[:3] != "PID"}, found.notes, found.damage)
-    streams = _streams(found, told.events, notes)
+        log = Messages({n: t for n, t in log.tables.items() if n[:3] != "PID"}, log.notes, log.damage)
+    streams = _streams(log, told.events, notes)
     if not streams:
         raise FlightError(
-            f"holds no flight: no known message has two samples ({sum(map(len, found.tables.values()))} messages of "
-            f"{len(found.tables)} kinds found).",
+            f"holds no flight: no known message has two samples ({sum(map(len, log.tables.values()))} messages of "
+            f"{len(log.tables)} kinds found).",
             where=source.name,
             hint="Copy the log again; check that ATT, RATE or IMU are in LOG_BITMASK.",
         )
-    notes += [*_filters(told.parameters, streams), *_remarks(found, streams)]
-    damage = (*found.damage, *filter(None, (said,)), *told.damage)
+    notes += [*_filters(told.parameters, streams), *_remarks(log, streams)]
+    damage = (*log.damage, *filter(None, (said,)), *told.damage)
     provenance = source.provenance(
         NAME,
         VERSION,
@@ -156,20 +156,20 @@ def read(source: Source, options: Options) -> Flight:
     return Flight(streams, provenance)
 
 
-def _one_run(found: Messages) -> tuple[Messages, float, str]:
+def _one_run(log: Messages) -> tuple[Messages, float, str]:
     """The messages of the longest run between clock resets, its last stamp [s], and what was left out."""
-    timed = [(table.place, seconds(table)) for table in found.tables.values()]
+    timed = [(table.place, seconds(table)) for table in log.tables.values()]
     timed = [(place[np.isfinite(t)], t[np.isfinite(t)]) for place, t in timed]
     place = np.concatenate([p for p, _ in timed]) if timed else np.zeros(0, np.int64)
     time = np.concatenate([t for _, t in timed]) if timed else np.zeros(0)
     order = np.argsort(place, kind="stable")
     (first, last), said = clocked.longest_run(place[order], time[order])
     if said:
-        cut = {name: t.rows((t.place >= first) & (t.place < last)) for name, t in found.tables.items()}
-        found = Messages({name: t for name, t in cut.items() if len(t)}, found.notes, found.damage)
+        cut = {name: t.rows((t.place >= first) & (t.place < last)) for name, t in log.tables.items()}
+        log = Messages({name: t for name, t in cut.items() if len(t)}, log.notes, log.damage)
     inside = time[(place >= first) & (place < last)]
     # The largest of many stamps may be a damaged one.
-    return found, float(np.quantile(inside, 0.999)) if inside.size > 2000 else float(inside.max(initial=0.0)), said
+    return log, float(np.quantile(inside, 0.999)) if inside.size > 2000 else float(inside.max(initial=0.0)), said
 
 
 def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> MessageTable:
@@ -183,14 +183,14 @@ def _chosen(table: MessageTable, wanted: tuple[tuple[str, ...], int] | None) -> 
     return table.rows(table.number(field) == number)
 
 
-def _streams(found: Messages, events: tuple[Event, ...], notes: list[str]) -> dict[str, xr.Dataset]:
+def _streams(log: Messages, events: tuple[Event, ...], notes: list[str]) -> dict[str, xr.Dataset]:
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
     target_unit = next(
         (ardupilot_chirp.AXES.get(e.details["axis"], ("", ""))[1] for e in events if e.kind == "sweep"), ""
     )
     for message in _MESSAGES:
-        table = found.get(message.name)
+        table = log.get(message.name)
         if table is None or message.stream in streams:
             continue
         table = _chosen(table, message.instance)
@@ -234,7 +234,7 @@ def _filters(parameters: Mapping[str, float], streams: Mapping[str, xr.Dataset])
     ]
 
 
-def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
+def _remarks(log: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
     remarks = []
     if "system_identification" in streams:
         remarks.append("sid_target acts one loop of the controller after its stamp")
@@ -245,7 +245,7 @@ def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
         if str(name).startswith("mixer_")
     }
     remarks += checks.constant_notes(inputs)
-    counts = {name: len(table) for name, table in found.tables.items()}
+    counts = {name: len(table) for name, table in log.tables.items()}
     if "rates" not in streams:
         remarks.append("no RATE message, so no commands to the mixer: set ATTITUDE_MED or _FAST in LOG_BITMASK")
     remarks += clocked.unread(counts, (*_STORIES, *(message.name for message in _MESSAGES)))

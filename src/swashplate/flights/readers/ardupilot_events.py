@@ -96,15 +96,15 @@ def _modes(messages: Messages) -> list[Event]:
 
 
 def _arming(messages: Messages) -> list[Event]:
-    found: list[tuple[float, bool]] = []
+    changes: list[tuple[float, bool]] = []
     if (table := messages.get("EV")) is not None:
         number = table.number("Id")
-        found += [(t, True) for t in seconds(table)[np.isin(number, _EV_ARMED)].tolist()]
-        found += [(t, False) for t in seconds(table)[number == _EV_DISARMED].tolist()]
+        changes += [(t, True) for t in seconds(table)[np.isin(number, _EV_ARMED)].tolist()]
+        changes += [(t, False) for t in seconds(table)[number == _EV_DISARMED].tolist()]
     if (table := messages.get("ARM")) is not None:
-        found += list(zip(seconds(table).tolist(), (table.number("ArmState") == 1).tolist(), strict=True))
+        changes += list(zip(seconds(table).tolist(), (table.number("ArmState") == 1).tolist(), strict=True))
     events: list[Event] = []
-    for time, armed in sorted((time, armed) for time, armed in found if math.isfinite(time)):
+    for time, armed in sorted((time, armed) for time, armed in changes if math.isfinite(time)):
         kind = "armed" if armed else "disarmed"
         if not events or events[-1].kind != kind:
             events.append(Event(time, kind, kind))

@@ -49,8 +49,8 @@ def read(source: Source, options: Options) -> Flight:
     refuse_mapping(options, "a Blackbox log", where=source.name)
     start, stop, number, note = _chosen(source, options.log)
     header = read_header(source.content, start, stop, where=source.name)
-    found = find_frames(source.content, header, stop=stop, where=source.name)
-    main = main_frames(found, header)
+    frames = find_frames(source.content, header, stop=stop, where=source.name)
+    main = main_frames(frames, header)
     fields = Fields(header, header.layouts["I"].names)
     columns = fields.columns(main.columns)
     notes = list(note)
@@ -58,26 +58,26 @@ def read(source: Source, options: Options) -> Flight:
     made = clocked.made_stream("blackbox", main.time, columns, notes=notes)
     if made is None:
         raise FlightError(
-            f"holds no flight: {len(main.time)} main frames of {found.intra.size} can be used, and two are needed.",
+            f"holds no flight: {len(main.time)} main frames of {frames.intra.size} can be used, and two are needed.",
             where=source.name,
             hint="Copy the log again; a log of nothing but a header was never written to.",
         )
     streams["blackbox"] = made
-    gps = _gps(found, header, main, notes)
+    gps = _gps(frames, header, main, notes)
     if gps is not None:
         streams["gps"] = gps
     inputs = {
         str(n): np.asarray(v.values, np.float64) for n, v in made.data_vars.items() if str(n).startswith("mixer_")
     }
-    notes += [*main.notes, *_unfinished(found), *fields.remarks(columns), *checks.constant_notes(inputs)]
+    notes += [*main.notes, *_unfinished(frames), *fields.remarks(columns), *checks.constant_notes(inputs)]
     provenance = source.provenance(
         NAME,
         VERSION,
         vehicle=" ".join(filter(None, (header.values.get("Craft name", ""), fields.firmware))),
         notes=tuple(notes),
-        damage=(*_lost(found), *main.damage),
+        damage=(*_lost(frames), *main.damage),
         parameters=_parameters(header, own=fields.rotorflight),
-        events=_events(found, header, main),
+        events=_events(frames, header, main),
     )
     if note:
         provenance = replace(provenance, source=f"{source.path.name}#{number}")
@@ -105,33 +105,33 @@ def _chosen(source: Source, wanted: int | None) -> tuple[int, int, int, tuple[st
     return starts[index], stops[index], index + 1, (note,)
 
 
-def _unfinished(found: FoundFrames) -> list[str]:
-    if found.unfinished:
-        return [f"the last {found.unfinished} bytes are an unfinished frame: not read"]
-    return [] if found.ended else ["the log has no end mark: it was cut off, or the power was"]
+def _unfinished(frames: FoundFrames) -> list[str]:
+    if frames.unfinished:
+        return [f"the last {frames.unfinished} bytes are an unfinished frame: not read"]
+    return [] if frames.ended else ["the log has no end mark: it was cut off, or the power was"]
 
 
-def _lost(found: FoundFrames) -> list[str]:
-    if not found.lost and not found.waiting:
+def _lost(frames: FoundFrames) -> list[str]:
+    if not frames.lost and not frames.waiting:
         return []
-    places = "place" if found.places == 1 else "places"
+    places = "place" if frames.places == 1 else "places"
     return [
-        f"{found.lost} bytes at {found.places} {places} belong to no frame, and {found.waiting} P frames have no I "
+        f"{frames.lost} bytes at {frames.places} {places} belong to no frame, and {frames.waiting} P frames have no I "
         "frame before them: they were skipped"
     ]
 
 
 def _parameters(header: Header, *, own: bool) -> dict[str, float]:
     """Numbers of the header by name; of a row of numbers `rollPID_0`, `rollPID_1`, ..."""
-    found = {}
+    parameters = {}
     for name, text in header.values.items():
         plain = re.sub(r"\W+", "_", name).strip("_")
         parts = text.split(",")
         for i, part in enumerate(parts[:32]):
             value = as_number(part.strip(), np.nan)
             if plain and np.isfinite(value):
-                found[plain if len(parts) == 1 else f"{plain}_{i}"] = value
-    return found | (_own_gains(found) if own else {})
+                parameters[plain if len(parts) == 1 else f"{plain}_{i}"] = value
+    return parameters | (_own_gains(parameters) if own else {})
 
 
 def _own_gains(numbers: Mapping[str, float]) -> dict[str, float]:
@@ -139,16 +139,16 @@ def _own_gains(numbers: Mapping[str, float]) -> dict[str, float]:
 
     Headers with five gains an axis (P, I, D, F, B) are of firmwares whose scales are known: `rate_gain_names`.
     """
-    found: dict[str, float] = {}
+    gains: dict[str, float] = {}
     for axis in ("roll", "pitch", "yaw"):
         for header, names in (("PID", "pidfb"), ("BW", ("gyro", "d", "b"))):
             if f"{axis}PID_4" in numbers:
-                found |= {
+                gains |= {
                     f"{axis}_{name}_{'gain' if header == 'PID' else 'cutoff'}": numbers[f"{axis}{header}_{i}"]
                     for i, name in enumerate(names)
                     if f"{axis}{header}_{i}" in numbers
                 }
-    return found
+    return gains
 
 
 def _when(after: int, main: Main) -> float:
@@ -156,17 +156,17 @@ def _when(after: int, main: Main) -> float:
     return float(main.clock[min(max(after - 1, 0), main.clock.size - 1)]) if main.clock.size else 0.0
 
 
-def _events(found: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]:
+def _events(frames: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]:
     events = []
-    for told in found.events:
+    for told in frames.events:
         time = _when(told.after, main)
         if told.kind == 14:  # a pause lies behind it
             time = _when(told.after + 1, main)
         numbers = {f"number_{i}": value for i, value in enumerate(told.numbers)}
         shown = " ".join(f"{value:g}" for value in told.numbers)
         events.append(Event(time, _KINDS.get(told.kind, "message"), f"{told.text} {shown}".strip(), numbers))
-    if "S" in found.others:
-        written, after = found.others["S"]
+    if "S" in frames.others:
+        written, after = frames.others["S"]
         for row, name in zip(written, header.layouts["S"].names, strict=True):
             changed = np.flatnonzero(np.diff(row, prepend=row[0] - 1)).tolist()
             for i in changed:
@@ -175,11 +175,11 @@ def _events(found: FoundFrames, header: Header, main: Main) -> tuple[Event, ...]
     return tuple(sorted(events, key=lambda event: event.time))
 
 
-def _gps(found: FoundFrames, header: Header, main: Main, notes: list[str]) -> xr.Dataset | None:
+def _gps(frames: FoundFrames, header: Header, main: Main, notes: list[str]) -> xr.Dataset | None:
     """GPS frames: places count from the home before them, times from the main frame before them."""
-    if "G" not in found.others or not main.clock.size:
+    if "G" not in frames.others or not main.clock.size:
         return None
-    written, after = found.others["G"]
+    written, after = frames.others["G"]
     layout = header.layouts["G"]
     base = np.array([_when(int(count), main) for count in after])
     time = np.asarray(base)
@@ -190,7 +190,7 @@ def _gps(found: FoundFrames, header: Header, main: Main, notes: list[str]) -> xr
             time = base + values / 1e6 if predictor == 10 else values / 1e6
             continue
         if predictor == 7:
-            values = values + _home(found, header, name, after)
+            values = values + _home(frames, header, name, after)
         channel, unit, factor = gps_place(name)
         columns[channel] = (values * factor, unit)
     return clocked.made_stream("gps", time, _unlike(columns), notes=notes)
@@ -201,12 +201,12 @@ def _unlike(columns: Mapping[str, tuple[Array, str]]) -> dict[str, tuple[Array, 
     return {name: column for name, column in columns.items() if name.lower().startswith(("gps", "lat", "lon"))}
 
 
-def _home(found: FoundFrames, header: Header, name: str, after: Whole) -> Array:
+def _home(frames: FoundFrames, header: Header, name: str, after: Whole) -> Array:
     """The home coordinate that stands before each GPS frame; NaN where none does."""
     home = np.full(after.size, np.nan)
-    if "H" not in found.others:
+    if "H" not in frames.others:
         return home
-    written, stands = found.others["H"]
+    written, stands = frames.others["H"]
     wanted = name.replace("coord", "home")
     names = header.layouts["H"].names
     if wanted not in names:

@@ -29,7 +29,7 @@ def groups(encodings: tuple[int, ...]) -> list[tuple[int, int, int]]:
     Neighbours of one encoding, as many as it holds. Elias delta: up to the next field that writes whole bytes, signed
     and unsigned alike, and over fields that write nothing (as the C decoder of blackbox-tools reads it).
     """
-    found, at = [], 0
+    runs, at = [], 0
     while at < len(encodings):
         kind, end = encodings[at], at + 1
         if kind in _BITS:
@@ -37,9 +37,9 @@ def groups(encodings: tuple[int, ...]) -> list[tuple[int, int, int]]:
                 end += 1
         while end < len(encodings) and encodings[end] == kind and end - at < _GROUPS.get(kind, 1):
             end += 1
-        found.append((encodings[at], at, end))
+        runs.append((encodings[at], at, end))
         at = end
-    return found
+    return runs
 
 
 def decoded(data: Bytes, places: Whole, layout: FrameLayout) -> tuple[Whole, Whole]:
@@ -84,9 +84,9 @@ class _Reading:
 
     def byte(self, chosen: Whole | slice = slice(None)) -> Whole:
         """The next byte; behind the end a zero."""
-        found = self.data[np.minimum(self.at[chosen], self.last)].astype(np.int64)
+        values = self.data[np.minimum(self.at[chosen], self.last)].astype(np.int64)
         self.at[chosen] += 1
-        return np.asarray(found)
+        return np.asarray(values)
 
     def variable(self, chosen: Whole | slice = slice(None)) -> Whole:
         """Seven bits a byte, the lowest first; at most 32 bits."""
@@ -97,9 +97,9 @@ class _Reading:
         for shift in (7, 14, 21, 28):
             if where is None or not more.size:
                 break
-            found = self.byte(where[more])
-            value[more] |= (found & 0x7F) << shift
-            more = more[(found & 0x80) != 0]
+            byte = self.byte(where[more])
+            value[more] |= (byte & 0x7F) << shift
+            more = more[(byte & 0x80) != 0]
         if where is not None and more.size:
             self.bad[where[more]] = True
         return np.asarray(value & 0xFFFFFFFF)

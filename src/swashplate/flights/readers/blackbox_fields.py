@@ -69,14 +69,14 @@ class Fields:
 
     def columns(self, values: Mapping[str, Whole]) -> dict[str, tuple[Array, str]]:
         """Numbers and their unit, by channel."""
-        found: dict[str, tuple[Array, str]] = {}
+        columns: dict[str, tuple[Array, str]] = {}
         for name in self.names:
             place = self._place(name)
-            if name in _SKIPPED or place.channel in found:
+            if name in _SKIPPED or place.channel in columns:
                 continue
             numbers = np.asarray((values[name] - place.offset) * place.factor + 0.0, dtype=np.float64)  # no -0
-            found[place.channel] = (numbers, place.unit)
-        return {**found, **self._sums(values, found)}
+            columns[place.channel] = (numbers, place.unit)
+        return {**columns, **self._sums(values, columns)}
 
     def _place(self, name: str) -> _Place:
         matched = re.fullmatch(r"(\w+)\[(\d)\]", name)
@@ -140,13 +140,13 @@ class Fields:
         return _Place(_own_name(name))
 
     def _sums(
-        self, values: Mapping[str, Whole], found: Mapping[str, tuple[Array, str]]
+        self, values: Mapping[str, Whole], columns: Mapping[str, tuple[Array, str]]
     ) -> dict[str, tuple[Array, str]]:
         """Betaflight logs no commands to its mixer: they are the sums of the terms of its PID controller."""
         made = {}
         for i, axis in enumerate(_AXES):
             terms = [values[f"axis{term}[{i}]"] for term in _TERMS if f"axis{term}[{i}]" in values]
-            if f"mixer_{axis}" in found or self.rotorflight or f"axisP[{i}]" not in values:
+            if f"mixer_{axis}" in columns or self.rotorflight or f"axisP[{i}]" not in values:
                 continue
             total = np.sum(np.asarray(terms, dtype=np.float64), axis=0)
             made[f"mixer_{axis}"] = (np.asarray(_SIGNS[i] * 1e-3 * total + 0.0), "1")
@@ -154,17 +154,17 @@ class Fields:
             self.notes.append("mixer_roll, mixer_pitch and mixer_yaw are sums of the PID terms, before their limits")
         return made
 
-    def remarks(self, found: Mapping[str, tuple[Array, str]]) -> tuple[str, ...]:
+    def remarks(self, columns: Mapping[str, tuple[Array, str]]) -> tuple[str, ...]:
         """What a user must know about the channels."""
         told = list(self.notes)
         if not self.rotorflight and "betaflight" not in self.firmware.lower():
             whose = f"the firmware is {self.firmware[:40]!r}" if self.firmware else "the header names no firmware"
             told.append(f"{whose}: signs and units are taken as Betaflight's")
-        if "p" in found and self.fine == 1.0:
+        if "p" in columns and self.fine == 1.0:
             told.append("gyros and set-points are whole degrees per second (noise of 0.29 deg/s from rounding alone)")
-        if self.rotorflight and "mixer_collective" in found:
+        if self.rotorflight and "mixer_collective" in columns:
             told.append("mixer_collective is Rotorflight's, -1 to 1")
-        if "tail_throttle" in found:
+        if "tail_throttle" in columns:
             told.append("the tail is driven by a motor: mixer[2] is its throttle (tail_throttle), not a yaw command")
         for name in ("gyro_lpf1_static_hz", "gyro_lpf2_static_hz", "gyro_lowpass_hz", "gyro_lowpass2_hz"):
             corner = self.header.number(name)

@@ -200,25 +200,25 @@ class _Walk:
         return place
 
     def _gathered(self, size: int) -> FoundFrames:
-        found = self.found
-        if not found.ended:
-            found.unfinished += max(size - self.at, 0) if self.at < size else 0
+        frames = self.found
+        if not frames.ended:
+            frames.unfinished += max(size - self.at, 0) if self.at < size else 0
         joined = {
             letter: np.concatenate(parts, axis=1)
             if parts
             else np.zeros((len(self.header.layouts[letter].names), 0), np.int64)
             for letter, parts in self.parts.items()
         }
-        found.intra = np.zeros(self.main, dtype=np.bool_)
-        found.intra[self.orders["I"]] = True
-        found.written = np.zeros((len(self.header.layouts["I"].names), self.main), dtype=np.int64)
-        found.written[:, self.orders["I"]] = joined["I"]
-        found.written[:, self.orders["P"]] = joined["P"]
-        found.broken = np.unique(np.asarray(self.broken, dtype=np.int64))
+        frames.intra = np.zeros(self.main, dtype=np.bool_)
+        frames.intra[self.orders["I"]] = True
+        frames.written = np.zeros((len(self.header.layouts["I"].names), self.main), dtype=np.int64)
+        frames.written[:, self.orders["I"]] = joined["I"]
+        frames.written[:, self.orders["P"]] = joined["P"]
+        frames.broken = np.unique(np.asarray(self.broken, dtype=np.int64))
         for letter in "SGH":
             if letter in joined and joined[letter].size:
-                found.others[letter] = (joined[letter], np.asarray(self.orders[letter], dtype=np.int64))
-        return found
+                frames.others[letter] = (joined[letter], np.asarray(self.orders[letter], dtype=np.int64))
+        return frames
 
 
 def _variable(content: bytes, place: int) -> tuple[int, int]:

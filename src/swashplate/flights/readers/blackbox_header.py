@@ -88,11 +88,11 @@ def as_number(text: str, default: float) -> float:
 
 def starts(content: bytes) -> tuple[int, ...]:
     """Where the logs of a file begin [bytes]."""
-    found, at = [], content.find(MARKER)
+    places, at = [], content.find(MARKER)
     while at >= 0:
-        found.append(at)
+        places.append(at)
         at = content.find(MARKER, at + len(MARKER))
-    return tuple(found)
+    return tuple(places)
 
 
 def read_header(content: bytes, start: int, stop: int, *, where: str) -> Header:

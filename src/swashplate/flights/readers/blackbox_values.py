@@ -60,11 +60,11 @@ def constants(header: Header) -> dict[int, int]:
     }
 
 
-def predicted(found: FoundFrames, header: Header) -> Whole:
+def predicted(frames: FoundFrames, header: Header) -> Whole:
     """Values of all main frames, shape (fields, n). Every row of frames begins with an I frame."""
     intra_layout, inter_layout = header.layouts["I"], header.layouts["P"]
     fixed, names = constants(header), intra_layout.names
-    values, intra = found.written.copy(), found.intra
+    values, intra = frames.written.copy(), frames.intra
     if not intra.size:
         return values
     starts = np.flatnonzero(intra)
@@ -144,35 +144,35 @@ def _one_by_one(row: list[int], *, signed: bool) -> list[int]:
     return row
 
 
-def main_frames(found: FoundFrames, header: Header) -> Main:
+def main_frames(frames: FoundFrames, header: Header) -> Main:
     """The values of the main frames, without those that cannot be trusted."""
     names = header.layouts["I"].names
-    values = predicted(found, header)
+    values = predicted(frames, header)
     damage, notes = list[str](), list[str]()
-    keep = _complete(found, header, damage, notes)
+    keep = _complete(frames, header, damage, notes)
     ticks = values[names.index("time")] & (_TURN - 1)
-    clock = _clock(found, ticks, keep, damage)
+    clock = _clock(frames, ticks, keep, damage)
     columns = {name: values[i][keep] for i, name in enumerate(names)}
     return Main(columns, clock[keep] / 1e6, keep, clock / 1e6, tuple(damage), tuple(notes))
 
 
-def _complete(found: FoundFrames, header: Header, damage: list[str], notes: list[str]) -> NDArray[np.bool_]:
+def _complete(frames: FoundFrames, header: Header, damage: list[str], notes: list[str]) -> NDArray[np.bool_]:
     """Leaves out P frames of rows that lack some: whichever came behind the lost one builds on the wrong history.
 
     A row is whole where it has as many frames as most rows have.
     """
-    keep = np.ones(found.intra.size, dtype=np.bool_)
+    keep = np.ones(frames.intra.size, dtype=np.bool_)
     # A frame into which the loss fell may end at a letter by chance: it would be half of one and half of another.
-    spliced = found.broken[(found.broken > 0) & (found.broken < keep.size)] - 1
+    spliced = frames.broken[(frames.broken > 0) & (frames.broken < keep.size)] - 1
     keep[spliced] = False
     if spliced.size:
         damage.append(f"{spliced.size} main frames that end where bytes were lost may be spliced: left out")
-    starts = np.flatnonzero(found.intra)
+    starts = np.flatnonzero(frames.intra)
     if starts.size < 2:
         return keep
     lengths = np.diff(starts)
-    resumed = [told.after for told in found.events if told.kind == _RESUMES]
-    plain = ~np.isin(starts[1:], found.broken) & ~np.isin(starts[1:], np.asarray(resumed, dtype=np.int64))
+    resumed = [told.after for told in frames.events if told.kind == _RESUMES]
+    plain = ~np.isin(starts[1:], frames.broken) & ~np.isin(starts[1:], np.asarray(resumed, dtype=np.int64))
     if not plain.any():
         return keep
     sizes, counts = np.unique(lengths[plain], return_counts=True)
@@ -196,9 +196,9 @@ def _complete(found: FoundFrames, header: Header, damage: list[str], notes: list
     return keep
 
 
-def _clock(found: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: list[str]) -> Array:
+def _clock(frames: FoundFrames, ticks: Whole, keep: NDArray[np.bool_], damage: list[str]) -> Array:
     """Microseconds that do not turn over; frames whose clock leaps or stands still leave `keep`."""
-    resumed = {told.after for told in found.events if told.kind == _RESUMES}
+    resumed = {told.after for told in frames.events if told.kind == _RESUMES}
     chosen = np.flatnonzero(keep)
     if not chosen.size:
         return np.zeros(ticks.size)
@@ -255,10 +255,10 @@ def _seam(early: Whole, late: Whole) -> tuple[int, int]:
 
     Wild frames, or some that stand in the log twice. The second is -1 where nothing helps.
     """
-    found = [(0, -1)]
+    seams = [(0, -1)]
     for cut in range(min(_WILD, early.size)):
         after = (late - early[-1 - cut]) % _TURN
         goes_on = (after > 0) & (after <= _LEAP)
         if goes_on.any():
-            found.append((cut, int(np.argmax(goes_on))))
-    return min(found[1:], key=sum, default=found[0])
+            seams.append((cut, int(np.argmax(goes_on))))
+    return min(seams[1:], key=sum, default=seams[0])

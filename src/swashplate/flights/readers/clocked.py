@@ -64,11 +64,11 @@ def resets(place: NDArray[np.int64], time: Array) -> NDArray[np.int64]:
 
     smooth = median_filter(time, size=_WINDOW, mode="nearest")
     falls = np.flatnonzero(np.diff(smooth) < -_FALL)
-    found = []
+    places = []
     for i in falls.tolist():
         near = np.arange(max(0, i - _WINDOW), min(time.size - 1, i + _WINDOW))
-        found.append(int(place[near[np.argmin(np.diff(time)[near])] + 1]))
-    return np.unique(np.asarray(found, dtype=np.int64))
+        places.append(int(place[near[np.argmin(np.diff(time)[near])] + 1]))
+    return np.unique(np.asarray(places, dtype=np.int64))
 
 
 def longest_run(place: NDArray[np.int64], time: Array) -> tuple[tuple[int, int], str]:
@@ -105,16 +105,16 @@ def made_stream(
         columns: values and their unit in the log, by channel.
         notes: takes a line for what was left out.
     """
-    found = {
+    channels = {
         channel_name: converted(np.asarray(v, dtype=np.float64), unit) for channel_name, (v, unit) in columns.items()
     }
-    empty = [key for key, (values, _) in found.items() if not np.isfinite(values).any()]
+    empty = [key for key, (values, _) in channels.items() if not np.isfinite(values).any()]
     for key in empty:
-        del found[key]
-    if not found or time.size < 2:
+        del channels[key]
+    if not channels or time.size < 2:
         return None
     usable = np.isfinite(time)
-    for values, _ in found.values():
+    for values, _ in channels.values():
         usable &= np.isfinite(values)
     lost = int(usable.size - usable.sum())
     if lost:
@@ -126,9 +126,9 @@ def made_stream(
     if rising.sum() < 2:
         return None
     stamps = time[usable][rising]
-    known = {key: channel(key).unit for key in found}
-    labels = {key: unit for key, (_, unit) in found.items() if not known[key]}
-    return stream(stamps, {key: values[usable][rising] for key, (values, _) in found.items()}, labels)
+    known = {key: channel(key).unit for key in channels}
+    labels = {key: unit for key, (_, unit) in channels.items() if not known[key]}
+    return stream(stamps, {key: values[usable][rising] for key, (values, _) in channels.items()}, labels)
 
 
 def unread(counts: Mapping[str, int], read: Sequence[str]) -> tuple[str, ...]:

@@ -104,8 +104,8 @@ def _in_inside_units(fields: dict[str, Array], source: Source, options: Options)
         with np.errstate(over="ignore"):  # a damaged number may be the largest there is
             typical = float(np.median(np.abs(converted[name])))
         if typical > largest:
-            found = f"{typical:.4g} {_UNITS[name].replace('1', '')}".strip()
-            problem = f"its median magnitude is {found}, expected below {largest:g}: wrong units."
+            magnitude = f"{typical:.4g} {_UNITS[name].replace('1', '')}".strip()
+            problem = f"its median magnitude is {magnitude}, expected below {largest:g}: wrong units."
             raise UnitError(problem, where=source.name, channel=f"Data.{name}", hint=hint)
     return converted
 

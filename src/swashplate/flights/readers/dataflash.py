@@ -103,11 +103,11 @@ def is_dataflash(content: bytes) -> bool:
 
 def _described(content: bytes, at: int) -> tuple[int, int, _Kind | None]:
     """Type, length and description in the FMT message at `at`; None where letters and length do not fit together."""
-    found = np.frombuffer(content, _FMT_FIELDS, count=1, offset=at + 3)[0]
-    name = bytes(found["name"]).decode("ascii", "replace")
-    letters = bytes(found["format"]).decode("ascii", "replace")
-    columns = bytes(found["columns"]).decode("ascii", "replace").split(",") if found["columns"] else []
-    kind, length = int(found["type"]), int(found["length"])
+    fields = np.frombuffer(content, _FMT_FIELDS, count=1, offset=at + 3)[0]
+    name = bytes(fields["name"]).decode("ascii", "replace")
+    letters = bytes(fields["format"]).decode("ascii", "replace")
+    columns = bytes(fields["columns"]).decode("ascii", "replace").split(",") if fields["columns"] else []
+    kind, length = int(fields["type"]), int(fields["length"])
     whole = name.isalnum() and len(columns) == len(letters) == len(set(columns)) and all(columns)
     if not whole or any(letter not in _LETTERS for letter in letters):
         return kind, length, None

@@ -69,11 +69,11 @@ def messages(text: str) -> Messages:
         places.setdefault(name, []).append(number)
     tables: dict[str, MessageTable] = {}
     unread = 0
-    for name, found in rows.items():
+    for name, texts in rows.items():
         letters, columns = formats[name]
         if "M" in letters:  # a mode: number in the binary log, often a word here
             letters = letters.replace("M", "N")
-        tables[name], left_out = _table(columns, letters, found, places[name])
+        tables[name], left_out = _table(columns, letters, texts, places[name])
         unread += left_out
     last = len(lines) - 1
     notes = ("the last line is unfinished: not read",) if torn and torn[-1] == last else ()

@@ -70,11 +70,11 @@ def recognises(source: Source) -> bool:
 
 def _split(cell: str) -> tuple[str, str | None]:
     """Name and unit of a header cell `name [unit]` or `name (unit)`; unit None where there is none."""
-    found = _HEADER_CELL.match(cell)
-    if found is None:
+    match = _HEADER_CELL.match(cell)
+    if match is None:
         return cell, None
-    unit = found["square"] if found["square"] is not None else found["round"]
-    return found["name"], unit
+    unit = match["square"] if match["square"] is not None else match["round"]
+    return match["name"], unit
 
 
 def _from_header(header: Sequence[str], source: Source) -> dict[str, _Column]:
@@ -295,9 +295,9 @@ def read(source: Source, options: Options) -> Flight:
     width = max(column.index for column in columns.values()) + 1
     short = tables.first_shorter(rows, width)
     if short is not None:
-        found = len(rows[short])
+        cells = len(rows[short])
         raise FlightError(
-            f"line {first_line + short} has {found} cell{'s' * (found != 1)}, expected {width}.",
+            f"line {first_line + short} has {cells} cell{'s' * (cells != 1)}, expected {width}.",
             where=source.name,
             hint="The line is cut off: remove or complete it.",
         )

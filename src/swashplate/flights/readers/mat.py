@@ -170,7 +170,7 @@ def _variable(data: memoryview, order: str, depth: int = 0) -> tuple[str, Any]:
 
 def _variables(source: Source, order: str) -> dict[str, Any]:
     content, at, unpacked = memoryview(source.content), _HEADER, 0
-    found = {}
+    variables = {}
     while at < source.size:
         outer = _element(content, at, order)
         inner = outer
@@ -182,9 +182,9 @@ def _variables(source: Source, order: str) -> dict[str, Any]:
         if inner.kind != _MATRIX:
             raise _DamagedError(f"an element of kind {inner.kind} stands where a variable should")
         name, value = _variable(inner.data, order)
-        found[name] = value
+        variables[name] = value
         at = outer.next
-    return found
+    return variables
 
 
 def load(source: Source) -> dict[str, Any]:

@@ -115,12 +115,12 @@ def _columns(source: Source) -> dict[str, Array]:
             channel=missing[0],
             hint="Download it again; for your own tables say which columns are which with a mapping.",
         )
-    found = {
+    columns = {
         name: tables.column(rows[1:], head.index(name), name=name, where=source.name, first_line=2) for name in _COLUMNS
     }
-    for name, values in found.items():
+    for name, values in columns.items():
         checks.finite(values, channel=name, where=source.name)
-    return found
+    return columns
 
 
 def _plausible(columns: dict[str, Array], source: Source) -> None:

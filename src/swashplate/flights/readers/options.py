@@ -48,10 +48,10 @@ def load_mapping(mapping: str | os.PathLike[str] | Mapping[str, Any] | None) -> 
     if isinstance(mapping, Mapping):
         return mapping
     hint = "Correct the mapping file; `docs/howto/your-own-csv.md` has one to copy."
-    found = documents.read_document(Path(mapping), form="toml", error=FlightError, hint=hint)
-    if not found:
+    document = documents.read_document(Path(mapping), form="toml", error=FlightError, hint=hint)
+    if not document:
         raise FlightError("says nothing.", where=Path(mapping), hint=hint)
-    return found
+    return document
 
 
 def with_mocap_table(options: Options) -> Options:

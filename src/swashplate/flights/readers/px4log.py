@@ -70,14 +70,14 @@ def read(source: Source, options: Options) -> Flight:
         FlightError: where nothing in the log can be used, or a mapping is given.
     """
     refuse_mapping(options, "a PX4 log", where=source.name)
-    found = dataflash.messages(source.content)
-    notes: list[str] = list(found.notes)
-    clock = found.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
+    log = dataflash.messages(source.content)
+    notes: list[str] = list(log.notes)
+    clock = log.get("TIME") or MessageTable({}, np.zeros(0, np.int64))
     (first, last), said = clocked.longest_run(clock.place, clock.number("StartTime") / 1e6)
     clock = clock.rows((clock.place >= first) & (clock.place < last))
     streams: dict[str, xr.Dataset] = {}
     for name, (stream_name, fields) in _MESSAGES.items():
-        table = found.get(name)
+        table = log.get(name)
         if table is None or not len(clock):
             continue
         table = table.rows((table.place > clock.place[0]) & (table.place < last))
@@ -92,15 +92,15 @@ def read(source: Source, options: Options) -> Flight:
             where=source.name,
             hint="Copy the log again.",
         )
-    notes += _remarks(found, streams)
+    notes += _remarks(log, streams)
     provenance = source.provenance(
         NAME,
         VERSION,
-        vehicle=_firmware(found),
+        vehicle=_firmware(log),
         notes=tuple(notes),
-        damage=(*found.damage, *filter(None, (said,))),
-        parameters=_parameters(found),
-        events=_states(found, clock),
+        damage=(*log.damage, *filter(None, (said,))),
+        parameters=_parameters(log),
+        events=_states(log, clock),
     )
     return Flight(streams, provenance)
 
@@ -111,16 +111,16 @@ def _stamps(table: MessageTable, clock: MessageTable) -> Array:
     return np.asarray(clock.number("StartTime")[np.maximum(group, 0)] / 1e6)
 
 
-def _parameters(found: Messages) -> dict[str, float]:
-    table = found.get("PARM")
+def _parameters(log: Messages) -> dict[str, float]:
+    table = log.get("PARM")
     if table is None:
         return {}
     rows = zip(table.text("Name"), table.number("Value").tolist(), strict=True)
     return {name: value for name, value in rows if re.fullmatch(r"\w+", name) and np.isfinite(value)}
 
 
-def _states(found: Messages, clock: MessageTable) -> tuple[Event, ...]:
-    table = found.get("STAT")
+def _states(log: Messages, clock: MessageTable) -> tuple[Event, ...]:
+    table = log.get("STAT")
     if table is None or not len(clock):
         return ()
     field = "MainState" if "MainState" in table.columns else "State"
@@ -132,12 +132,12 @@ def _states(found: Messages, clock: MessageTable) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def _firmware(found: Messages) -> str:
-    table = found.get("VER")
+def _firmware(log: Messages) -> str:
+    table = log.get("VER")
     return " ".join(field for name in ("Arch", "FwGit") for field in table.text(name)[:1]) if table is not None else ""
 
 
-def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
+def _remarks(log: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
     remarks = []
     if "inertial" in streams:
         down = float(np.median(streams["inertial"].get("az", xr.DataArray([-1.0])).values))
@@ -152,6 +152,6 @@ def _remarks(found: Messages, streams: Mapping[str, xr.Dataset]) -> list[str]:
         if str(name).startswith("mixer_")
     }
     remarks += checks.constant_notes(inputs)
-    counts = {name: len(table) for name, table in found.tables.items()}
+    counts = {name: len(table) for name, table in log.tables.items()}
     remarks += clocked.unread(counts, ("FMT", "TIME", "PARM", "VER", "STAT", *_MESSAGES))
     return remarks

@@ -114,9 +114,9 @@ def read(source: Source, options: Options) -> Flight:
     notes: list[str] = []
     streams: dict[str, xr.Dataset] = {}
     taken: set[str] = set()
-    for topic, found in rows.items():
+    for topic, received in rows.items():
         name = re.sub(r"\W+", "_", topic.strip("/")) or "topic"
-        columns = _columns(found, name, body=body, world=world)
+        columns = _columns(received, name, body=body, world=world)
         named = {c if c not in taken else f"{c}_{name}": value for c, value in columns.items()}
         made = clocked.made_stream(name, np.asarray(stamps[topic]), named, notes=notes)
         if made is not None and name not in streams:

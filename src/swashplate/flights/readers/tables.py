@@ -22,7 +22,7 @@ def separator(text: str) -> str:
     """
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     counts = {mark: {line.count(mark) for line in lines} for mark in ",;\t"}
-    regular = [mark for mark, found in counts.items() if len(found) == 1 and found != {0}]
+    regular = [mark for mark, widths in counts.items() if len(widths) == 1 and widths != {0}]
     return max(regular or ",;\t", key=text.count) if any(mark in text for mark in ",;\t") else " "
 
 

@@ -184,17 +184,17 @@ def _stream(
 
 
 def _damage(whole: Whole, log: Any) -> list[str]:
-    found = []
+    damage = []
     if whole.lost:
-        found.append(f"{whole.lost} bytes in the middle belong to no message: they were skipped")
+        damage.append(f"{whole.lost} bytes in the middle belong to no message: they were skipped")
     elif log.file_corruption:
-        found.append("some messages do not fit their descriptions: pyulog skipped them")
+        damage.append("some messages do not fit their descriptions: pyulog skipped them")
     if whole.unfinished:
-        found.append("the log is cut off: its last message is unfinished")
+        damage.append("the log is cut off: its last message is unfinished")
     lost = sum(float(dropout.duration) for dropout in log.dropouts) / 1e3
     if log.dropouts:
-        found.append(f"{len(log.dropouts)} dropouts: the logger lost {lost:.2f} s in all")
-    return found
+        damage.append(f"{len(log.dropouts)} dropouts: the logger lost {lost:.2f} s in all")
+    return damage
 
 
 def _events(log: Any, first: Mapping[str, Mapping[str, NDArray[Any]]]) -> tuple[Event, ...]:

@@ -16,16 +16,16 @@ _LOG = re.compile(r"(?P<file>.+)#(?P<number>\d{1,6})")
 def split_window(text: str | os.PathLike[str]) -> tuple[str, tuple[float, float] | None]:
     """`FILE@START-STOP` as the file and the window [s]; a file of just this name wins."""
     name = os.fspath(text)
-    found = _WINDOW.fullmatch(name)
-    if found is None or Path(name).exists():
+    match = _WINDOW.fullmatch(name)
+    if match is None or Path(name).exists():
         return name, None
-    return found["file"], (float(found["start"]), float(found["stop"]))
+    return match["file"], (float(match["start"]), float(match["stop"]))
 
 
 def split_log(text: str) -> tuple[str, int | None]:
     """`FILE#N` as the file and which of its logs is meant; a file of just this name wins."""
-    found = _LOG.fullmatch(text)
-    return (text, None) if found is None or Path(text).exists() else (found["file"], int(found["number"]))
+    match = _LOG.fullmatch(text)
+    return (text, None) if match is None or Path(text).exists() else (match["file"], int(match["number"]))
 
 
 def cut(flight: Flight, start: float, stop: float, *, where: str) -> Flight:

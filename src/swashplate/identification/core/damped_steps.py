@@ -56,11 +56,11 @@ class DampedSteps:
 
     def onward(self, at: Point) -> tuple[float, Array] | None:
         """The next row with its cost; None where nothing goes down."""
-        found = self._descent(at)
-        if found is None:
+        descent = self._descent(at)
+        if descent is None:
             return None
-        self._damping, self._caution = max(found[2] / 10.0, 1e-12), max(found[3] / 10.0, 1e-12)
-        return found[:2]
+        self._damping, self._caution = max(descent[2] / 10.0, 1e-12), max(descent[3] / 10.0, 1e-12)
+        return descent[:2]
 
     def settled(self, gained: float, tolerance: float) -> bool:
         """Whether the last step gained too little to go on for."""

@@ -55,8 +55,8 @@ def encode(value: object) -> Any:
     if isinstance(value, complex):
         return {"real": encode(value.real), "imag": encode(value.imag)}
     if hasattr(value, "tolist"):  # arrays and numbers of NumPy and JAX
-        found = np.asarray(value)
-        return _array(found) if found.ndim else encode(found.item())
+        array = np.asarray(value)
+        return _array(array) if array.ndim else encode(array.item())
     if isinstance(value, Mapping):
         return {str(key): encode(entry) for key, entry in value.items()}
     if hasattr(value, "_asdict"):
@@ -144,15 +144,15 @@ def _hints(wanted: type) -> dict[str, Any]:
 
 
 def _decoded_object(wanted: type, value: object, where: str, at: str) -> Any:
-    hints, found = _hints(wanted), {}
+    hints, entries = _hints(wanted), {}
     known = {f.name: f for f in fields(wanted)}
     for name, entry in _known(tuple(known), value, where, at):
-        found[name] = decode(hints[name], entry, where=where, at=f"{at}.{name}")
+        entries[name] = decode(hints[name], entry, where=where, at=f"{at}.{name}")
     for name, entry_field in known.items():
-        if name not in found and entry_field.default is MISSING and entry_field.default_factory is MISSING:
+        if name not in entries and entry_field.default is MISSING and entry_field.default_factory is MISSING:
             raise DocumentError("is missing.", where=where, channel=f"{at}.{name}")
     try:
-        return wanted(**found)
+        return wanted(**entries)
     except (TypeError, ValueError) as trouble:
         raise DocumentError(f"is no {wanted.__name__}: {trouble}.", where=where, channel=at) from None
 
@@ -181,8 +181,8 @@ def _decoded_array(value: object, where: str, at: str, *, complex_numbers: bool)
         if real.shape != imag.shape:
             raise DocumentError("has parts of different shapes.", where=where, channel=at)
         return real + 1j * imag
-    found = _unpacked(value, where, at) if isinstance(value, dict) else _nested(value, where, at)
-    return found.astype(np.complex128) if complex_numbers else found
+    array = _unpacked(value, where, at) if isinstance(value, dict) else _nested(value, where, at)
+    return array.astype(np.complex128) if complex_numbers else array
 
 
 def _nested(value: object, where: str, at: str) -> Any:

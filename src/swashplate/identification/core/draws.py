@@ -28,14 +28,14 @@ def normal_within(
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    found = np.empty((0, len(mean)))
+    drawn = np.empty((0, len(mean)))
     for _ in range(_TRIES):
         tried = mean + random.standard_normal((count, len(mean))) @ root.T
-        found = np.concatenate([found, tried[np.all((tried >= low) & (tried <= high), axis=1)]])[:count]
-        if len(found) == count:
-            return found
+        drawn = np.concatenate([drawn, tried[np.all((tried >= low) & (tried <= high), axis=1)]])[:count]
+        if len(drawn) == count:
+            return drawn
     raise IdentificationError(
-        f"only {len(found)} of {count * _TRIES} draws lie within the bounds of physics.",
+        f"only {len(drawn)} of {count * _TRIES} draws lie within the bounds of physics.",
         where=where,
         hint="The fit knows too little; fix parameters or add data.",
     )

@@ -95,16 +95,16 @@ def sample(
             known.append(np.concatenate([rows for rows, _, _ in told]))
             share = float(np.exp(np.mean([np.log(last) for _, _, last in told])))
             reference = _learnt(np.concatenate(known[len(known) // 2 :]), share, p)
-        found: list[list[tuple[Array, Array]]] = [[] for _ in running]
+        parts: list[list[tuple[Array, Array]]] = [[] for _ in running]
         done, chain = 0, None
         while done < most:
             size = min(block, most - done)
             jobs = [pool.submit(_walked, data, one, reference, size * THIN, THIN, learns=False) for one in running]
-            for own, job in zip(found, jobs, strict=True):
+            for own, job in zip(parts, jobs, strict=True):
                 rows, stats, _ = job.result()
                 own.append((rows, stats))
             done += size
-            chain = _together(found, data, reference.share)
+            chain = _together(parts, data, reference.share)
             if progress is not None:
                 progress(done, most)
             if enough(chain):
@@ -157,8 +157,8 @@ def _density(likelihood: Likelihood, data: Mapping[str, Array], z: Array) -> flo
     return float(total) if np.isfinite(total) else -np.inf
 
 
-def _together(found: list[list[tuple[Array, Array]]], data: Mapping[str, Array], share: float) -> Chains:
-    rows = np.stack([[unbent(data, z, np)[0] for z in np.concatenate([part for part, _ in own])] for own in found])
-    stats = np.stack([np.concatenate([part for _, part in own]) for own in found])
+def _together(parts: list[list[tuple[Array, Array]]], data: Mapping[str, Array], share: float) -> Chains:
+    rows = np.stack([[unbent(data, z, np)[0] for z in np.concatenate([part for part, _ in own])] for own in parts])
+    stats = np.stack([np.concatenate([part for _, part in own]) for own in parts])
     told = {"lp": stats[:, :, 0], "acceptance_rate": stats[:, :, 1], "diverging": np.zeros(stats.shape[:2])}
-    return Chains(rows, told, np.full(len(found), share))
+    return Chains(rows, told, np.full(len(parts), share))

@@ -67,8 +67,8 @@ class EffectTest:
         """One line: the verdict, the numbers, and what freeing it moves."""
         if self.refused:
             return f"{self.effect.name}: cannot be told: {self.refused}"
-        found = ", ".join(f"{name} = {value:.4g} ± {sigma:.2g}" for name, (value, sigma) in self.values.items())
-        told = f"{self.effect.name}: {self.verdict} (log-likelihood {self.gain:+.1f}, p = {self.adjusted:.1g}): {found}"
+        freed = ", ".join(f"{name} = {value:.4g} ± {sigma:.2g}" for name, (value, sigma) in self.values.items())
+        told = f"{self.effect.name}: {self.verdict} (log-likelihood {self.gain:+.1f}, p = {self.adjusted:.1g}): {freed}"
         large = [f"{name} by {sigmas:+.1f} sigma" for name, sigmas in self.moved.items() if abs(sigmas) > MOVED]
         if self.verdict == "needed":
             told += f"; freeing it moves {', '.join(large) or 'no other number by more than 3 sigma'}"

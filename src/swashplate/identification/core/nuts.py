@@ -69,7 +69,7 @@ def sample(
     target = (traced.function, traced.plan, data)
     states = [_alive(target, start) for start in starts]
     np.asarray(_step(*target, keys[0], states[0], _FIRST_STEP)[1])  # compiled once, before there are threads
-    found: list[list[tuple[Array, Array]]] = [[] for _ in range(chains)]
+    parts: list[list[tuple[Array, Array]]] = [[] for _ in range(chains)]
     with ThreadPoolExecutor(max_workers=min(chains, os.cpu_count() or 1)) as pool:
         states[0], step = _warmed(target, warmup, keys[0], states[0])
         settle, steps = min(warmup, _SETTLING), np.full(chains, step)
@@ -82,9 +82,9 @@ def sample(
             jobs = [pool.submit(_drawn, target, keys[c], states[c], steps[c], done, size) for c in range(chains)]
             for c, job in enumerate(jobs):
                 states[c], rows, stats = job.result()
-                found[c].append((rows, stats))
+                parts[c].append((rows, stats))
             done += size
-            chain = _together(found, steps)
+            chain = _together(parts, steps)
             if progress is not None:
                 progress(done, most)
             if enough(chain):
@@ -104,9 +104,9 @@ def _alive(target: Target, start: jax.Array) -> Any:
     return state
 
 
-def _together(found: list[list[tuple[Array, Array]]], steps: Array) -> Chains:
-    rows = np.stack([np.concatenate([rows for rows, _ in one]) for one in found])
-    stats = np.stack([np.concatenate([stats for _, stats in one]) for one in found])
+def _together(parts: list[list[tuple[Array, Array]]], steps: Array) -> Chains:
+    rows = np.stack([np.concatenate([rows for rows, _ in one]) for one in parts])
+    stats = np.stack([np.concatenate([stats for _, stats in one]) for one in parts])
     return Chains(rows, {name: stats[:, :, i] for i, name in enumerate(_STATS)}, steps)
 
 

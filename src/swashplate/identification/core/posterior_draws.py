@@ -61,8 +61,8 @@ class Posterior:
     @property
     def diverging(self) -> float:
         """Share of the draws whose trajectory ran away."""
-        found = self.stats.get("diverging")
-        return 0.0 if found is None else float(np.mean(found))
+        flags = self.stats.get("diverging")
+        return 0.0 if flags is None else float(np.mean(flags))
 
     @property
     def faults(self) -> tuple[str, ...]:

@@ -223,7 +223,7 @@ class Result(Shown, Generic[Model, Details]):
     @property
     def targets(self) -> tuple[Any, ...]:
         """The responses of a fit to frequency responses; empty for others."""
-        return tuple(found for c in self.comparisons if (found := getattr(c, "target", None)) is not None)
+        return tuple(target for c in self.comparisons if (target := getattr(c, "target", None)) is not None)
 
     @property
     def costs(self) -> tuple[float, ...]:
@@ -281,11 +281,11 @@ class Result(Shown, Generic[Model, Details]):
         low, high = bounds_of(self.solution if within is None else within, self.names)
         if self.posterior is not None and self.posterior.method != "laplace":
             both = (self.covariance, self.covariance_corrected) if corrected else None
-            found = self.posterior.drawn(low, high, count=count, seed=seed, covariances=both, where=self.name)
+            rows = self.posterior.drawn(low, high, count=count, seed=seed, covariances=both, where=self.name)
         else:
             mean = np.array([self[name].value for name in self.names])
-            found = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
-        drawn = {name: found[:, i] for i, name in enumerate(self.names)}
+            rows = normal_within(mean, covariance, low, high, count=count, seed=seed, where=where)
+        drawn = {name: rows[:, i] for i, name in enumerate(self.names)}
         return drawn | {e.name: drawn[e.tie] for e in self.estimates if e.tie in drawn}
 
     def draw(self, count: int, *, seed: int) -> tuple[Any, ...]:

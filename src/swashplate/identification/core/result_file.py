@@ -120,8 +120,8 @@ def load(path: str | os.PathLike[str], *, equations: Vehicle | None = None) -> R
         DocumentError: for a file that is none, or is damaged, naming the entry.
         CardError: for a model that cannot be made again.
     """
-    found = documents.read_document(os.fspath(path), form="json", hint=_HINT)
-    return from_document(found, where=os.fspath(path), equations=equations)
+    document = documents.read_document(os.fspath(path), form="json", hint=_HINT)
+    return from_document(document, where=os.fspath(path), equations=equations)
 
 
 # ---- models ----------------------------------------------------------------------------------------------------------
@@ -134,17 +134,17 @@ def model_document(model: Any) -> Any:
     return {"kind": "transfer-functions", "functions": [encode(one) for one in model]}
 
 
-def model_from(found: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+def model_from(document: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
     """The model of a document.
 
     Raises:
         DocumentError: for another kind of document, naming the entry.
         CardError: for a model that cannot be made again.
     """
-    kind = found.get("kind") if isinstance(found, dict) else None
+    kind = document.get("kind") if isinstance(document, dict) else None
     if kind == "vehicle":
-        path = found.get("path", "")
-        card = card_from({k: v for k, v in found.items() if k != "path"}, path=where)
+        path = document.get("path", "")
+        card = card_from({k: v for k, v in document.items() if k != "path"}, path=where)
         card = replace(card, path=path if isinstance(path, str) else "")
         if equations is not None and equations.name == card.vehicle:
             return carrying(equations, card)
@@ -158,12 +158,12 @@ def model_from(found: Any, *, where: str, at: str, equations: Vehicle | None) ->
         return from_card(card)
     if kind == "state-space":
         try:
-            text = tomli_w.dumps(found)
+            text = tomli_w.dumps(document)
         except (TypeError, ValueError):  # nothing is no value of a model's file
             raise DocumentError("has an entry that is nothing.", where=where, channel=at) from None
         return state_space_file.parse(text, path=where)
     if kind == "transfer-functions":
-        functions = decode(tuple[TransferFunction, ...], found.get("functions"), where=where, at=f"{at}.functions")
+        functions = decode(tuple[TransferFunction, ...], document.get("functions"), where=where, at=f"{at}.functions")
         return TransferFunctions(functions)
     raise DocumentError(f"is {kind!r}, expected a kind of model.", where=where, channel=f"{at}.kind")
 
@@ -184,15 +184,15 @@ def _check(result: Result[Any, Any], where: str) -> None:
         _check_covariance(getattr(result, key), result.names, key=key, where=where)
 
 
-def _check_covariance(found: Array, names: Sequence[str], *, key: str, where: str) -> None:
+def _check_covariance(P: Array, names: Sequence[str], *, key: str, where: str) -> None:
     size = len(names)
-    if found.shape != (size, size) and not (size == found.size == 0):
+    if P.shape != (size, size) and not (size == P.size == 0):
         raise DocumentError(f"is no matrix of {size} by {size} numbers.", where=where, channel=key)
-    finite = found[np.isfinite(found)]
-    if finite.size < found.size:  # a method without it, or parameters that leave no trace
+    finite = P[np.isfinite(P)]
+    if finite.size < P.size:  # a method without it, or parameters that leave no trace
         return
-    scale = np.sqrt(np.abs(np.diag(found)))
-    if not np.all(np.diag(found) >= 0.0) or np.any(np.abs(found - found.T) > 1e-6 * np.outer(scale, scale)):
+    scale = np.sqrt(np.abs(np.diag(P)))
+    if not np.all(np.diag(P) >= 0.0) or np.any(np.abs(P - P.T) > 1e-6 * np.outer(scale, scale)):
         raise DocumentError("is no covariance: expected symmetry and a positive diagonal.", where=where, channel=key)
-    if np.any(np.abs(found) > (1.0 + 1e-6) * np.outer(scale, scale)):
+    if np.any(np.abs(P) > (1.0 + 1e-6) * np.outer(scale, scale)):
         raise DocumentError("is no covariance: a correlation lies beyond 1.", where=where, channel=key)

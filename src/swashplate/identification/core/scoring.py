@@ -130,12 +130,12 @@ def minimise(
         if stopping.asked():
             break
         try:
-            found = steps.onward(at)
-            if found is None:
+            onward = steps.onward(at)
+            if onward is None:
                 converged = True  # no direction goes down any more
                 break
-            gained = at.cost - found[0]
-            at = _point(likelihood, found[1])
+            gained = at.cost - onward[0]
+            at = _point(likelihood, onward[1])
             history.append(at.cost)
             stopping.counted()
             if progress is not None:

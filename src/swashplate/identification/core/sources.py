@@ -76,13 +76,13 @@ def hashes(flights: Iterable[Flight]) -> dict[str, dict[str, str]]:
 
     Where two flights have one name (windows of a log, simulations) only what both share is told.
     """
-    found: dict[str, dict[str, str]] = {}
+    by_name: dict[str, dict[str, str]] = {}
     for flight in flights:
         name = flight.provenance.source or "flight"
         own = {"sha256": flight.provenance.sha256, "signals": _signals(flight)}
-        before = found.get(name, own)
-        found[name] = {key: value if before[key] == value else "" for key, value in own.items()}
-    return found
+        before = by_name.get(name, own)
+        by_name[name] = {key: value if before[key] == value else "" for key, value in own.items()}
+    return by_name
 
 
 _INTERVAL = re.compile(r"(?P<name>.+) -?[\d.]+-+[\d.]+ s")
@@ -92,16 +92,16 @@ def sources_named(names: Iterable[str], known: Mapping[str, Mapping[str, str]]) 
     """Records ("log 3.00-9.00 s" each) with the hashes of their flights, of `hashes`."""
     made = []
     for name in names:
-        found = _INTERVAL.fullmatch(name)
-        own = known.get(name if found is None else found["name"], {})
+        match = _INTERVAL.fullmatch(name)
+        own = known.get(name if match is None else match["name"], {})
         made.append(DataSource(name, sha256=str(own.get("sha256", "")), signals=str(own.get("signals", ""))))
     return tuple(made)
 
 
 def _signals(flight: Flight) -> str:
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for name in flight.channels:
-        found.update(name.encode())
+        digest.update(name.encode())
         for values in (flight.time(name), flight.values(name)):
-            found.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
-    return found.hexdigest()
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()

@@ -177,14 +177,14 @@ def _least(promise: Promise, low: Array, high: Array) -> tuple[Array, float]:
             way[free] = np.linalg.solve(hessian[np.ix_(free, free)], -gradient[free])
         except np.linalg.LinAlgError:
             break
-        share, found = 1.0, promise(np.clip(step + way, low, high))
-        while not found[0] < least and share > 1e-6:
+        share, promised = 1.0, promise(np.clip(step + way, low, high))
+        while not promised[0] < least and share > 1e-6:
             share *= 0.5
-            found = promise(np.clip(step + share * way, low, high))
-        if not found[0] < least:
+            promised = promise(np.clip(step + share * way, low, high))
+        if not promised[0] < least:
             break
-        gained, step = least - found[0], np.clip(step + share * way, low, high)
-        least, gradient, hessian = found
+        gained, step = least - promised[0], np.clip(step + share * way, low, high)
+        least, gradient, hessian = promised
         if gained < _EXACT:
             break
     return step, least

@@ -118,10 +118,10 @@ def effective(draws: Array) -> Array:
     total = within * (n - 1.0) / n + (draws.mean(axis=1).var(axis=0, ddof=1) if m > 1 else 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         rho = 1.0 - (within - lagged * n / (n - 1.0)) / total
-    found = np.full(p, np.nan)
+    sizes = np.full(p, np.nan)
     for i in np.flatnonzero(total > 0.0):
         pairs = rho[: 2 * (n // 2), i].reshape(-1, 2).sum(axis=1)
         positive = int(np.argmax(pairs < 0.0)) if np.any(pairs < 0.0) else pairs.size
         tau = -1.0 + 2.0 * np.minimum.accumulate(pairs[:positive]).sum() if positive else 1.0
-        found[i] = m * n / max(tau, 1.0 / np.log10(m * n))  # Stan's limit for draws that repel each other
-    return found
+        sizes[i] = m * n / max(tau, 1.0 / np.log10(m * n))  # Stan's limit for draws that repel each other
+    return sizes

@@ -45,12 +45,12 @@ def from_core(
     known = core.numbers()
     shared = {n: known[n] for n in model.free if n in known}
     flaps = "tau_f" in model.parameters
-    found = {}
+    starts = {}
     for lag in LAGS if flaps else (0.0,):
         values = shared | (_rotor(known, lag) if flaps else {})
         words = "regression on the core" + (f", tip-path plane of {lag:g} s" if flaps else "")
-        found[words] = model.with_values({n: _within(model, n, v) for n, v in values.items() if n in model.free})
-    return found
+        starts[words] = model.with_values({n: _within(model, n, v) for n, v in values.items() if n in model.free})
+    return starts
 
 
 def _rotor(known: Mapping[str, float], lag: float) -> dict[str, float]:
@@ -63,11 +63,11 @@ def _rotor(known: Mapping[str, float], lag: float) -> dict[str, float]:
         return {}
     inverse = np.linalg.inv(rates)
     roll, pitch = (1.0 / (lag * max(abs(inverse[k, k]), _LEAST)) for k in (0, 1))
-    found = {"tau_f": lag, "Lb": roll, "Ma": pitch, "Ba": lag * inverse[0, 1] * pitch, "Ab": lag * inverse[1, 0] * roll}
+    flap = {"tau_f": lag, "Lb": roll, "Ma": pitch, "Ba": lag * inverse[0, 1] * pitch, "Ab": lag * inverse[1, 0] * roll}
     for short in ("lat", "lon"):
         b, a = -lag * inverse @ np.array([known[f"L{short}"], known[f"M{short}"]])
-        found |= {f"B{short}": float(b), f"A{short}": float(a)}
-    return found
+        flap |= {f"B{short}": float(b), f"A{short}": float(a)}
+    return flap
 
 
 def _within(model: StateSpaceModel, name: str, value: float) -> float:

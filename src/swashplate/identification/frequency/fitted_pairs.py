@@ -61,12 +61,12 @@ class PairChoice:
 
     def settings(self) -> dict[str, Any]:
         """What a result keeps of it."""
-        found: dict[str, Any] = {
+        settings: dict[str, Any] = {
             "least_coherence": self.least_coherence,
             "band_hz": list(self.band) if self.band else None,
         }
-        found |= {"bands_hz": {name: list(limits) for name, limits in self.bands.items()}} if self.bands else {}
-        return found | ({"without": list(self.without)} if self.without else {})
+        settings |= {"bands_hz": {name: list(limits) for name, limits in self.bands.items()}} if self.bands else {}
+        return settings | ({"without": list(self.without)} if self.without else {})
 
     def targets(
         self, model: StateSpaceModel, responses: FrequencyResponse
@@ -88,7 +88,7 @@ class PairChoice:
                 hint=_other_names(model, responses)
                 or "Name the channels as the model does (--rename NAME=CHANNEL), or take another model.",
             )
-        found, ceilings, missing = [], [], []
+        targets, ceilings, missing = [], [], []
         for output in shared_out:
             for name in shared_in:
                 if self.leaves_out(output, name):
@@ -100,15 +100,15 @@ class PairChoice:
                     limit = ceiling(responses, output, name, band=own)
                     ceilings += [] if limit is None else [limit]
                 else:
-                    found.append(one)
-        if not found:
+                    targets.append(one)
+        if not targets:
             left = f"; left out as asked: {', '.join(self.without)}" if self.without else ""
             raise IdentificationError(
                 f"no response keeps a coherence of {self.least_coherence:g} over a band: "
                 f"{', '.join(missing) or 'none is left'}{left}.",
                 hint="Nothing can be fitted; look at the responses and fly a better sweep.",
             )
-        return found, ceilings, tuple(missing)
+        return targets, ceilings, tuple(missing)
 
 
 def _other_names(model: StateSpaceModel, responses: FrequencyResponse) -> str:

@@ -98,18 +98,18 @@ class _Curve:
 
     def crossing(self, values: Array, level: float, *, last: bool = False) -> float | None:
         """Where a curve first (last) falls through a level [rad/s], straight in log frequency."""
-        found = self.crossings(values, level, falling=True)
-        return None if not found else found[-1 if last else 0]
+        crossings = self.crossings(values, level, falling=True)
+        return None if not crossings else crossings[-1 if last else 0]
 
     def crossings(self, values: Array, level: float, *, falling: bool = False) -> list[float]:
         """Everywhere that a curve passes a level, or falls through it [rad/s]."""
         above = values >= level
         passes = above[:-1] & ~above[1:] if falling else above[:-1] != above[1:]
-        found = []
+        crossings = []
         for k in np.flatnonzero(passes):
             share = (values[k] - level) / (values[k] - values[k + 1])
-            found.append(float(self.omega[k] * (self.omega[k + 1] / self.omega[k]) ** share))
-        return found
+            crossings.append(float(self.omega[k] * (self.omega[k + 1] / self.omega[k]) ** share))
+        return crossings
 
     def at(self, values: Array, omega: float) -> float:
         return float(np.interp(np.log(omega), np.log(self.omega), values))
@@ -266,8 +266,8 @@ def _least_delay(omega: Array, loop: Complex) -> float:
     turns, above = np.floor((curve.phase + 180.0) / 360.0), curve.gain > 0.0
     if turns[0] * above[0] + np.sum(np.diff(turns)[above[:-1] & above[1:]]) != 0.0:
         return 0.0
-    found = crossing_delays(curve.omega, np.asarray(loop)[np.isfinite(loop)][:, None, None])
-    return float(found[0]) if found.size else float("nan")
+    delays = crossing_delays(curve.omega, np.asarray(loop)[np.isfinite(loop)][:, None, None])
+    return float(delays[0]) if delays.size else float("nan")
 
 
 def _wrapped(degrees: float) -> float:

@@ -124,9 +124,9 @@ def margin_lines(responses: FrequencyResponse, fit: Fitted, targets: Sequence[Ta
 
 def model_margins(fit: Fitted, output: str, input: str, omega: Array, controller: Complex) -> ResponseMargins:
     """Margins of controller and fitted model in one loop, with what the model's bounds make of them."""
-    found = _of_model("", fit, output, input, omega, lambda h: margins(omega, controller * h), ResponseMargins).read
-    assert isinstance(found, ResponseMargins)
-    return found
+    reading = _of_model("", fit, output, input, omega, lambda h: margins(omega, controller * h), ResponseMargins).read
+    assert isinstance(reading, ResponseMargins)
+    return reading
 
 
 def _of_model(
@@ -142,10 +142,10 @@ def _of_model(
 
     def numbers(h: Complex) -> Array:
         try:
-            found = read(h)
+            reading = read(h)
         except IdentificationError:
             return np.full(len(names), np.nan)
-        return np.array([getattr(found, name).value for name in names])
+        return np.array([getattr(reading, name).value for name in names])
 
     value, sigma = spread(fit, output, input, omega, numbers)
     if not np.isfinite(value).any() and kind is Handling:

@@ -36,16 +36,16 @@ def parts_in(model: StateSpaceModel) -> tuple[str, ...]:
     if composed:
         return parts_of(composed)
     states = set(model.states)
-    found = [name for name, part in PARTS.items() if part.states and set(part.states) <= states]
-    if "flap" in found:
+    parts = [name for name, part in PARTS.items() if part.states and set(part.states) <= states]
+    if "flap" in parts:
         crossed = {"Ab", "Ba"} & set(model.parameters)
-        found.remove("flap_decoupled" if crossed else "flap")
-    core = [name for name in found if PARTS[name].core]
+        parts.remove("flap_decoupled" if crossed else "flap")
+    core = [name for name in parts if PARTS[name].core]
     if "body" in core:
-        found = [name for name in found if name not in ("cyclic", "heave", "yaw")]
+        parts = [name for name in parts if name not in ("cyclic", "heave", "yaw")]
     by_letters = {"hub": {"La", "Mb"}, "forces": {"Xa", "Yb"}, "coupled": {"Xv", "Zu", "Yw"}}
-    found += [name for name, letters in by_letters.items() if letters <= set(model.parameters)]
-    return tuple(name for name in PARTS if name in found)
+    parts += [name for name, letters in by_letters.items() if letters <= set(model.parameters)]
+    return tuple(name for name in PARTS if name in parts)
 
 
 def candidates(parts: Sequence[str], missed: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
@@ -55,7 +55,7 @@ def candidates(parts: Sequence[str], missed: Sequence[tuple[str, str]]) -> dict[
         parts: that are there.
         missed: output and input of the missed responses, the worst first.
     """
-    found: dict[str, list[str]] = {}
+    lacking: dict[str, list[str]] = {}
     for name, (outputs, inputs) in BEHIND.items():
         present = {*parts, *(["flap"] if "flap_decoupled" in parts and name != "flap" else [])}
         if name in present:
@@ -67,8 +67,8 @@ def candidates(parts: Sequence[str], missed: Sequence[tuple[str, str]]) -> dict[
         if name == "flap" and "flap_decoupled" in parts:
             own = [f"{o} / {i}" for o, i in missed if o in _TURNING and (o, i) not in _CYCLIC]
         if own:
-            found[name] = own
-    return found
+            lacking[name] = own
+    return lacking
 
 
 def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
@@ -82,13 +82,13 @@ def lacking_words(model: StateSpaceModel, missed: Sequence[str]) -> str:
     if not any(PARTS[name].core for name in parts) or not known >= set(model.inputs):
         return ""
     pairs = [(o, i) for o, _, i in (name.partition(" / ") for name in missed)]
-    found = candidates(parts, pairs)
-    if not found:
+    lacking = candidates(parts, pairs)
+    if not lacking:
         return " It has every part that these responses could speak for: look at the trim, gusts and the signals."
-    best = sorted(found, key=lambda name: _rank(found[name], pairs))
-    if "flap_decoupled" in parts and "flap" in found:
+    best = sorted(lacking, key=lambda name: _rank(lacking[name], pairs))
+    if "flap_decoupled" in parts and "flap" in lacking:
         best = ["flap", *(name for name in best if name != "flap")]
-    named = ", ".join(f"'{name}' ({found[name][0]})" for name in best[:_MOST])
+    named = ", ".join(f"'{name}' ({lacking[name][0]})" for name in best[:_MOST])
     text = f" The parts that may be lacking are {named}."
     if composed := str(model.document.get("composed", "")):
         first = best[0]

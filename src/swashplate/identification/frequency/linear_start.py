@@ -35,11 +35,11 @@ def other_starts(
     band: tuple[float, float] | None = None,
 ) -> dict[str, StateSpaceModel]:
     """Starts that the responses themselves suggest, by where they come from."""
-    found = {
+    starts = {
         "regression on the responses": by_regression(model, responses, band=band),
         "controls matched to the responses": by_controls(model, targets),
     }
-    return {name: one for name, one in found.items() if one is not None}
+    return {name: one for name, one in starts.items() if one is not None}
 
 
 def by_regression(
@@ -89,8 +89,8 @@ def _states(
     """Responses of all states and their errors, (n_f, n_states, n_inputs), by outputs and parameter-free equations."""
     m = model.matrices()
     fixed = [k for k in range(len(model.states)) if not _entries(model, k)]
-    found = np.zeros((at.size, len(model.states), len(model.inputs)), dtype=np.complex128)
-    spread = np.zeros(found.shape)
+    responses = np.zeros((at.size, len(model.states), len(model.inputs)), dtype=np.complex128)
+    spread = np.zeros(responses.shape)
     for n, f in enumerate(at):
         s = 1j * part.omega[f]
         left = np.concatenate([m["H0"][rows] + s * m["H1"][rows], s * m["M"][fixed] - m["F"][fixed]])
@@ -103,20 +103,20 @@ def _states(
             if np.linalg.matrix_rank(scaled / size, tol=1e-10) < len(model.states):
                 return None, spread
             inverse = np.linalg.pinv(scaled / size, rcond=1e-13) / size[:, None]
-            found[n, :, i] = inverse @ (right[:, i] / sure[:, i])
+            responses[n, :, i] = inverse @ (right[:, i] / sure[:, i])
             spread[n, :, i] = np.linalg.norm(inverse, axis=1)
-    return found, spread
+    return responses, spread
 
 
 def _entries(model: StateSpaceModel, row: int) -> list[tuple[Element, str, float]]:
     """Entries of a row that are a free parameter, or minus one, with the sign."""
-    found = []
+    entries = []
     for e in model.elements:
         text = e.expression.text.replace(" ", "")
         name = text.lstrip("-")
         if e.matrix in ("F", "G") and e.row == row and name in model.free:
-            found.append((e, name, -1.0 if text.startswith("-") else 1.0))
-    return found
+            entries.append((e, name, -1.0 if text.startswith("-") else 1.0))
+    return entries
 
 
 def _regressed(
@@ -166,8 +166,8 @@ def _weighted(table: Complex, right: Complex, noise: Array) -> tuple[Array, int]
     scaled, target = table / noise[:, None], right / noise
     size = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
     stacked = np.concatenate([scaled.real, scaled.imag]) / size
-    found, _, rank, _ = np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=1e-6)
-    return np.asarray(found / size), int(rank)
+    solution, _, rank, _ = np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=1e-6)
+    return np.asarray(solution / size), int(rank)
 
 
 def by_controls(model: StateSpaceModel, targets: Sequence[Target]) -> StateSpaceModel | None:

@@ -75,7 +75,7 @@ def mode_accuracy(
     told = np.isfinite(np.array(list(bounds.values())))
     size = np.where(told, list(bounds.values()), 0.0)
     covariance = np.outer(size, size) * np.nan_to_num(correlation)
-    found = []
+    modes = []
     for k in np.argsort(-np.abs(values), kind="stable"):
         v = complex(values[k])
         if v.imag < 0.0 or abs(v) < _ORIGIN:
@@ -85,8 +85,8 @@ def mode_accuracy(
         damping = -moved[k].real / abs(v) + v.real / abs(v) ** 2 * frequency
         blind = bool(np.any(np.abs(moved[k][~told]) > 0.0))
         bound = [np.inf if blind else float(np.sqrt(max(s @ covariance @ s, 0.0))) for s in (frequency, damping)]
-        found.append(ModeAccuracy(v, abs(v), -v.real / abs(v), bound[0], bound[1], bool(abs(v) >= lowest)))
-    return tuple(found)
+        modes.append(ModeAccuracy(v, abs(v), -v.real / abs(v), bound[0], bound[1], bool(abs(v) >= lowest)))
+    return tuple(modes)
 
 
 def _moved(model: StateSpaceModel, names: Sequence[str], left: Complex, right: Complex) -> Complex:

@@ -117,10 +117,10 @@ def target(
         least: coherence from which on the response is used.
     """
     h, coherence, error = responses.pair(output, input)
-    found = responses.band(output, input, least=least)
-    if found is None:
+    ends = responses.band(output, input, least=least)
+    if ends is None:
         return None
-    low, high = found
+    low, high = ends
     if band is not None:
         low, high = max(low, TWO_PI * band[0]), min(high, TWO_PI * band[1])
     known = np.isfinite(h) & (responses.omega >= low * (1 - 1e-9)) & (responses.omega <= high * (1 + 1e-9))
@@ -289,9 +289,9 @@ def accuracy_of_fit(cost: ResponseCost, row: Array) -> tuple[Array, tuple[Direct
     residuals, derivatives = [b[0] for b in blocks], [b[1] for b in blocks]
     spread = np.sqrt(np.diag(information))
     plain = np.linalg.pinv(information / np.outer(spread, spread), hermitian=True) / np.outer(spread, spread)
-    found = sandwich(plain, residuals, derivatives, lags=NEIGHBOURS) * np.outer(cost.row.scale, cost.row.scale)
+    covariance = sandwich(plain, residuals, derivatives, lags=NEIGHBOURS) * np.outer(cost.row.scale, cost.row.scale)
     noise = max(float(np.mean(np.concatenate([r.ravel() for r in residuals]) ** 2)), 1e-300)
-    return found, blind_directions(names, information / noise)
+    return covariance, blind_directions(names, information / noise)
 
 
 def accuracy_of(slopes: Array) -> tuple[Array, Array, Array]:

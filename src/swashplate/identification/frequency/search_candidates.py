@@ -45,24 +45,24 @@ def cores(responses: FrequencyResponse) -> list[tuple[str, ...]]:
     cyclic = bool(inputs & _CYCLIC and outputs & (_TURNING | _MOVING))
     heave = ("heave",) if "collective" in inputs and outputs & {"w", "az"} else ()
     yaw = ("yaw",) if inputs & {"pedal", "collective"} and "r" in outputs else ()
-    found: list[tuple[str, ...]] = []
+    candidates: list[tuple[str, ...]] = []
     if cyclic:
-        found.append(("body",))
+        candidates.append(("body",))
         axes = ("cyclic", *heave, *yaw)
         seen = {state for part in axes for state in PARTS[part].states} | {"az"}
         moved = _CYCLIC | ({"collective"} if heave or yaw else set()) | ({"pedal"} if yaw else set())
         if outputs <= seen and inputs <= moved:  # compared on the same responses
-            found.append(axes)
+            candidates.append(axes)
     elif heave or yaw:
-        found.append((*heave, *yaw))
-    if not found:
+        candidates.append((*heave, *yaw))
+    if not candidates:
         raise IdentificationError(
             f"no composed structure has these responses: inputs {', '.join(responses.inputs)}, outputs "
             f"{', '.join(responses.outputs)}; it has inputs {', '.join(INPUTS)} and rates, speeds, angles, ax, ay, az.",
             hint=f"Name the channels so ({_renaming(responses.inputs)}), or name the structures to compare.",
         )
     rotors: tuple[tuple[str, ...], ...] = ((), ("flap_decoupled",), ("flap",)) if cyclic else ((),)
-    return [(*core, *rotor) for core in found for rotor in rotors]
+    return [(*core, *rotor) for core in candidates for rotor in rotors]
 
 
 _LIKELY = {"roll": "lateral", "pitch": "longitudinal", "yaw": "pedal", "collective": "collective"}
@@ -89,17 +89,17 @@ def additions(parts: Sequence[str], responses: FrequencyResponse, *, every: bool
         "quasi-steady": every,
     }
     needs = {"torque": {"collective"}, "gyro": {"pedal"}}
-    found = [
+    groups = [
         [n for n in names if n not in parts and not nonsense([*parts, n]) and needs.get(n, set()) <= inputs]
         for group, names in GROUPS.items()
         if shown[group]
     ]
-    return [group for group in found if group]
+    return [group for group in groups if group]
 
 
 def without(parts: Sequence[str]) -> dict[str, list[str]]:
     """What is left when a part is taken out, by that part; a coupled rotor becomes a decoupled one."""
-    found: dict[str, list[str]] = {}
+    smaller: dict[str, list[str]] = {}
     for name in parts:
         if PARTS[name].core:
             continue
@@ -107,15 +107,15 @@ def without(parts: Sequence[str]) -> dict[str, list[str]]:
         if name == "flap":
             kept.append("flap_decoupled")
         if not nonsense(kept):
-            found[name] = kept
-    return found
+            smaller[name] = kept
+    return smaller
 
 
 def exchanges(parts: Sequence[str], responses: FrequencyResponse) -> list[list[str]]:
     """Structures with one part exchanged for another that shows in the same responses (inflow, lead, droop, torque)."""
-    found = []
+    exchanged = []
     for old in (p for p in parts if p in _ALIKE):
         kept = [p for p in parts if p != old]
         for group in additions(kept, responses, every=False):
-            found += [[*kept, new] for new in group if new in _ALIKE and new != old]
-    return found
+            exchanged += [[*kept, new] for new in group if new in _ALIKE and new != old]
+    return exchanged

@@ -61,7 +61,7 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
     left = {
         (e.row, e.column): float(e.expression(values)) for e in model.elements if e.matrix == "M" and e.row == e.column
     }
-    found = {}
+    starts = {}
     for e in model.elements:
         if e.matrix not in ("F", "G") or model.states[e.row] not in states:
             continue
@@ -74,17 +74,17 @@ def from_linear_model(model: StateSpaceModel, linear: LinearModel) -> StateSpace
             or name in model.trim.values()
             or model.parameters[name].tie is not None
             or column not in names
-            or name in found
+            or name in starts
         ):
             continue
         row = states.index(model.states[e.row])
         number = a[row, states.index(column)] if e.matrix == "F" else b[row, linear.inputs.index(called[column])]
         parameter = model.parameters[name]
         value = sign * float(number) * left.get((e.row, e.row), 1.0)
-        found[name] = float(np.clip(value, parameter.lower, parameter.upper))
+        starts[name] = float(np.clip(value, parameter.lower, parameter.upper))
     flown = linear.trim.states()
-    found |= {name: flown[state] for state, name in model.trim.items() if state in flown}
-    return model.with_values(found)
+    starts |= {name: flown[state] for state, name in model.trim.items() if state in flown}
+    return model.with_values(starts)
 
 
 def at_flown_trim(model: StateSpaceModel, responses: FrequencyResponse) -> StateSpaceModel:
@@ -107,14 +107,14 @@ def _time_constants(model: StateSpaceModel, states: Sequence[str], a: Array) -> 
     """Parameters that alone multiply a state's rate where the right side has minus that state."""
     diagonal = [e for e in model.elements if e.row == e.column and model.states[e.row] in states]
     decays = {e.row for e in diagonal if e.matrix == "F" and e.expression.text.replace(" ", "") == "-1"}
-    found = {}
+    constants = {}
     for e in diagonal:
         name = e.expression.text.strip()
-        if e.matrix == "M" and e.row in decays and name in model.parameters and name not in found:
+        if e.matrix == "M" and e.row in decays and name in model.parameters and name not in constants:
             place, parameter = states.index(model.states[e.row]), model.parameters[name]
             if a[place, place] < 0.0 and parameter.tie is None:
-                found[name] = float(np.clip(-1.0 / a[place, place], parameter.lower, parameter.upper))
-    return found
+                constants[name] = float(np.clip(-1.0 / a[place, place], parameter.lower, parameter.upper))
+    return constants
 
 
 def _residualised(linear: LinearModel, states: Sequence[str]) -> tuple[Array, Array]:
@@ -158,5 +158,5 @@ def from_models(
 def _matched(model: StateSpaceModel, targets: Sequence[Target], *, seed: int) -> StateSpaceModel:
     if not targets:
         raise IdentificationError(f"no transfer function joins an output and an input of '{model.name}'.")
-    found = fit_targets(model, targets, seed=seed, iterations=40)
-    return model.with_values({name: found.solution.parameters[name].value for name in found.names})
+    fit = fit_targets(model, targets, seed=seed, iterations=40)
+    return model.with_values({name: fit.solution.parameters[name].value for name in fit.names})

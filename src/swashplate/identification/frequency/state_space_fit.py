@@ -141,9 +141,9 @@ def fit_targets(
     numbers = optimum.row * cost.row.scale
     _, slopes = cost.residuals(optimum.row)
     cramer_rao, insensitivity, correlation = accuracy_of(slopes / cost.row.scale)
-    found = model.with_values(dict(zip(model.free, map(float, numbers), strict=True)))
-    found = replace(
-        found,
+    fitted = model.with_values(dict(zip(model.free, map(float, numbers), strict=True)))
+    fitted = replace(
+        fitted,
         parameters={
             name: replace(
                 p,
@@ -152,7 +152,7 @@ def fit_targets(
             )
             if name in model.free
             else p
-            for name, p in found.parameters.items()
+            for name, p in fitted.parameters.items()
         },
     )
     corrected, directions = accuracy_of_fit(cost, optimum.row)
@@ -173,10 +173,10 @@ def fit_targets(
             fixed=not p.free and p.tie is None,
             at_bound=name in optimum.at_bound,
         )
-        for name, p in found.parameters.items()
+        for name, p in fitted.parameters.items()
     )
     warnings += unit_words(model)
-    warnings += misfit_words(found, targets)
+    warnings += misfit_words(fitted, targets)
     warnings += words(targets, costs, estimates, correlation, at_bound=optimum.at_bound, converged=optimum.converged)
     below = {c.name for c, above in zip(kept, every[len(targets) :], strict=True) if above <= ACCEPTABLE}
     over = [c.name for c in ceilings if c.name not in below]
@@ -188,7 +188,7 @@ def fit_targets(
     problems += [NOT_FOLLOWED] if failed else []
     return Result(
         method="frequency responses",
-        solution=found,
+        solution=fitted,
         start=model,
         estimates=estimates,
         names=model.free,
@@ -201,7 +201,7 @@ def fit_targets(
             left_out=left_out,
             ceilings=tuple(ceilings),
             modes=mode_accuracy(
-                found,
+                fitted,
                 dict(zip(model.free, map(float, cramer_rao), strict=True)),
                 correlation,
                 lowest=min(float(t.omega[0]) for t in targets),

@@ -34,25 +34,25 @@ def words(
         parameters: all of the model. correlation: of those that moved, in their order.
         at_bound: parameters that ended on a bound. converged: False where the iterations ran out.
     """
-    found = [] if converged else [stopping.unfinished()]
+    warnings = [] if converged else [stopping.unfinished()]
     poor = [f"{t.name} ({cost:.0f})" for t, cost in zip(targets, costs, strict=True) if cost > ACCEPTABLE]
     if poor:
-        found.append(f"J above {ACCEPTABLE:g}: {', '.join(poor)}.")
+        warnings.append(f"J above {ACCEPTABLE:g}: {', '.join(poor)}.")
     moving = [p for p in parameters if not p.fixed and not p.tie]
     blind = [p.name for p in moving if p.insensitivity_percent > I_TARGET]
     vague = [p.name for p in moving if p.sigma_percent > CR_TARGET]
     if blind:
-        found.append(f"insensitivity above {I_TARGET:g} %: {', '.join(blind)}.")
+        warnings.append(f"insensitivity above {I_TARGET:g} %: {', '.join(blind)}.")
     if vague:
-        found.append(f"Cramér-Rao bound above {CR_TARGET:g} %: {', '.join(vague)}.")
+        warnings.append(f"Cramér-Rao bound above {CR_TARGET:g} %: {', '.join(vague)}.")
     pairs = _one_of_two(moving, correlation)
     if pairs:
-        found.append(
+        warnings.append(
             f"told only together (correlation {ONE:g} or more): {', '.join(pairs)}. Hold one of each (--fix) or tie it."
         )
     if at_bound:
-        found.append(f"ended on a bound: {', '.join(at_bound)}.")
-    return found
+        warnings.append(f"ended on a bound: {', '.join(at_bound)}.")
+    return warnings
 
 
 def _one_of_two(moving: Sequence[Estimate], correlation: Array) -> list[str]:

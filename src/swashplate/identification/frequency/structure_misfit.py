@@ -54,7 +54,7 @@ def misfits(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[Misfit, 
     Args:
         model: with its numbers. targets: fitted responses; those without known errors are passed over.
     """
-    found = []
+    missed = []
     for t in targets:
         if t.error is None:
             continue
@@ -64,33 +64,33 @@ def misfits(model: StateSpaceModel, targets: Sequence[Target]) -> tuple[Misfit, 
         # A tenth of the points may be a notch that windows and model see elsewhere; a wrong structure misses more.
         times = float(np.sqrt(np.mean(np.sort(squared)[: round(_KEPT * squared.size)])))
         if times > MANY:
-            found.append(Misfit(t.name, times, t.omega, squared))
-    return tuple(sorted(found, key=lambda one: -one.times))
+            missed.append(Misfit(t.name, times, t.omega, squared))
+    return tuple(sorted(missed, key=lambda one: -one.times))
 
 
 def misfit_words(model: StateSpaceModel, targets: Sequence[Target]) -> list[str]:
     """That a structure cannot be the aircraft's, in words: which responses, how far off, at which end of the band."""
-    found = misfits(model, targets)
-    if not found:
+    missed = misfits(model, targets)
+    if not missed:
         return []
-    named = ", ".join(f"{one.name} ({one.times:.0f} times)" for one in found[:_NAMED])
-    named += f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+    named = ", ".join(f"{one.name} ({one.times:.0f} times)" for one in missed[:_NAMED])
+    named += f" and {len(missed) - _NAMED} more" if len(missed) > _NAMED else ""
     text = (
-        f"this structure is not all of the aircraft: {len(found)} of {len(targets)} responses are missed by more than "
-        f"{MANY:g} times their scatter: {named}{_where(found)}. Do not trust modes or derivatives that rest on them."
+        f"this structure is not all of the aircraft: {len(missed)} of {len(targets)} responses are missed by more than "
+        f"{MANY:g} times their scatter: {named}{_where(missed)}. Do not trust modes or derivatives that rest on them."
     )
-    text += lacking_words(model, [one.name for one in found])
+    text += lacking_words(model, [one.name for one in missed])
     speeds = [n for s, n in model.trim.items() if s in ("u", "v", "w")]
     if speeds and all(model.parameters[n].value == 0.0 for n in speeds):
         text += f" If this was not flown in hover, say so: --fix {speeds[0]}=..."
     return [text]
 
 
-def _where(found: Sequence[Misfit]) -> str:
-    low, high = (end(one.omega[k] for one in found) for end, k in ((min, 0), (max, -1)))
+def _where(missed: Sequence[Misfit]) -> str:
+    low, high = (end(one.omega[k] for one in missed) for end, k in ((min, 0), (max, -1)))
     middle = float(np.sqrt(low * high))
-    total = sum(float(np.sum(one.squared)) for one in found)
-    upper = sum(float(np.sum(one.squared[one.omega > middle])) for one in found) / total
+    total = sum(float(np.sum(one.squared)) for one in missed)
+    upper = sum(float(np.sum(one.squared[one.omega > middle])) for one in missed) / total
     if upper > _ONE_END:
         return f", mostly above {middle / TWO_PI:.2g} Hz"
     if upper < 1.0 - _ONE_END:

@@ -57,13 +57,13 @@ class _Search:
 
     def looks(self, models: Sequence[StateSpaceModel], *, like: Contender | None, iterations: int) -> list[Contender]:
         """A fit of each that can answer to what was measured."""
-        found = []
+        contenders = []
         for one in models:
             try:
-                found.append(self.look(one, like=like, iterations=iterations))
+                contenders.append(self.look(one, like=like, iterations=iterations))
             except IdentificationError as error:
                 self.refused[one.name] = error
-        return found
+        return contenders
 
     def look(self, model: StateSpaceModel, *, like: Contender | None, iterations: int) -> Contender:
         """A fit of a model from the better of its own start and what a relative of it has found."""
@@ -91,9 +91,9 @@ class _Search:
             settings={"sources": list(self.responses.sources), "method": self.responses.method}
             | self.choice.settings(),
         )
-        found = Contender(model.name, fit, squared_misfit(fit.solution, targets))
-        self.tried[model.name] = found
-        return found
+        contender = Contender(model.name, fit, squared_misfit(fit.solution, targets))
+        self.tried[model.name] = contender
+        return contender
 
     def score(self, one: Contender, best: Contender) -> float:
         """The information criterion, with the scatter that the best one so far leaves."""

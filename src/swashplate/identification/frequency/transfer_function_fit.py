@@ -110,7 +110,7 @@ def targets_of(
         IdentificationError: where one has no coherent band.
     """
     names = tuple(outputs) if outputs else responses.outputs
-    found = []
+    targets = []
     for name in names:
         one = target(responses, name, input, band=band, least=least)
         if one is None:
@@ -120,8 +120,8 @@ def targets_of(
                 channel=f"{name} / {input}",
                 hint="Nothing can be fitted to this response; leave it out or fly a better sweep.",
             )
-        found.append(one)
-    return found
+        targets.append(one)
+    return targets
 
 
 def as_told(fit: TransferFunctionFit, responses: FrequencyResponse) -> TransferFunctionFit:
@@ -212,8 +212,8 @@ def fit_form(targets: Sequence[Target], form: Form, *, fixed: dict[str, float], 
     rough.sort(key=lambda end: end[0].cost)
     ends = [(minimise(c, start=o.row, tolerance=1e-5, iterations=80), c) for o, c in rough[:_FOLLOWED]]
     optimum, cost = min(ends, key=lambda end: end[0].cost)
-    found = dict(zip(free, optimum.row * cost.row.scale, strict=True))
-    values = spread | found
+    fitted = dict(zip(free, optimum.row * cost.row.scale, strict=True))
+    values = spread | fitted
     _, slopes = cost.residuals(optimum.row)
     bounds = accuracy_of(slopes / cost.row.scale)
     corrected, directions = accuracy_of_fit(cost, optimum.row)

@@ -30,11 +30,11 @@ def envelopes(omega: Array) -> dict[str, Array]:
         omega: [rad/s].
     """
     s = 1j * np.asarray(omega, dtype=np.float64)
-    found = {}
+    bounds = {}
     for name, (top, bottom, lead) in _BOUNDS.items():
         h = np.polyval(top, s) / np.polyval(bottom, s) * np.exp(lead * s)
-        found[name] = 20.0 * np.log10(np.abs(h)) if name.startswith("gain") else np.degrees(np.angle(h))
-    return found
+        bounds[name] = 20.0 * np.log10(np.abs(h)) if name.startswith("gain") else np.degrees(np.angle(h))
+    return bounds
 
 
 @dataclass(frozen=True)

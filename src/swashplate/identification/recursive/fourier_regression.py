@@ -83,8 +83,8 @@ class RegressionPlan:
     def hold(self) -> Complex:
         """What the gathered sums of a channel that is held are multiplied with to be its transform, (lines,)."""
         omega = 2.0 * np.pi * self.hertz
-        found: Complex = (1.0 - np.exp(-1j * omega * self.dt)) / (1j * omega)
-        return found
+        factor: Complex = (1.0 - np.exp(-1j * omega * self.dt)) / (1j * omega)
+        return factor
 
     @property
     def factors(self) -> Complex:
@@ -256,8 +256,8 @@ class RecursiveRegression:
         size = np.linalg.norm(basis, axis=0)
         stacked = np.vstack([basis.real, basis.imag])[:, size > 0.0] / size[size > 0.0]
         told = np.vstack([right.real, right.imag])
-        found = stacked @ np.linalg.lstsq(stacked, told, rcond=None)[0]
-        return np.asarray(found[: len(right)] + 1j * found[len(right) :])
+        moved = stacked @ np.linalg.lstsq(stacked, told, rcond=None)[0]
+        return np.asarray(moved[: len(right)] + 1j * moved[len(right) :])
 
     def rows(self) -> tuple[Complex, Complex]:
         """Left side (lines) and right side (lines, unknowns) of the complex equations."""
@@ -321,8 +321,8 @@ def scatter(rows: Complex, window: Complex, first: int) -> Array:
     line = np.arange(len(rows))
     apart, together = window[np.abs(line[:, None] - line)], window[line[:, None] + line + 2 * first]
     apart = np.where(line[:, None] >= line, apart, apart.conj())
-    found: Array = 0.5 * (rows.conj().T @ apart @ rows + rows.conj().T @ together @ rows.conj()).real
-    return found
+    covariance: Array = 0.5 * (rows.conj().T @ apart @ rows + rows.conj().T @ together @ rows.conj()).real
+    return covariance
 
 
 def _factor(normal: Array) -> Array | None:

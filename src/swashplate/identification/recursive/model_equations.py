@@ -19,7 +19,7 @@ def model_equations(
         model: with matrices of named expressions.
         channels: that the stream has.
     """
-    found, left_out = [], []
+    equations, left_out = [], []
     numbers = model.numbers()
     for row, state in enumerate(model.states):
         terms, why = _terms(model, row, channels)
@@ -32,8 +32,8 @@ def model_equations(
         used = {term.partition("*")[2] for term in terms}
         known = {n: model.delays.get(f"{state}_dot/{n}", model.delays.get(n)) for n in model.inputs if n in used}
         late = {n: float(expression(numbers)) for n, expression in known.items() if expression is not None}
-        found.append(regression_equation(f"{state}_dot = {text}", delays=late))
-    return tuple(found), tuple(left_out)
+        equations.append(regression_equation(f"{state}_dot = {text}", delays=late))
+    return tuple(equations), tuple(left_out)
 
 
 def _terms(model: StateSpaceModel, row: int, channels: Collection[str]) -> tuple[list[str], str]:

@@ -116,14 +116,14 @@ def slow_plan(
 def _sizes(vehicle: Vehicle, unknown: Sequence[str], values: Mapping[str, Any]) -> Array:
     """What a share of each parameter is a share of."""
     scale = {free.name: free.scale for choice in vehicle.choices.values() for free in choice.free}
-    found = []
+    sizes = []
     for name in unknown:
         if name not in values:
             raise IdentificationError("is no parameter of it.", where=vehicle.name, channel=name)
-        found.append(max(abs(float(values[name])), scale.get(name, 0.0)))
-        if found[-1] == 0.0:
+        sizes.append(max(abs(float(values[name])), scale.get(name, 0.0)))
+        if sizes[-1] == 0.0:
             raise IdentificationError("is zero: no share of it can be unknown.", where=vehicle.name, channel=name)
-    return np.array(found)
+    return np.array(sizes)
 
 
 @dataclass

@@ -101,15 +101,15 @@ def tracked(
     def step(elapsed: float, k: int) -> str | None:
         return None if regression.step(elapsed, samples[k]) else regression.frozen
 
-    found = _watched(step, regression.estimate, time, plan.dt, len(e.names), every)
-    final, notes = found[3], []
+    watched = _watched(step, regression.estimate, time, plan.dt, len(e.names), every)
+    final, notes = watched[3], []
     if final is not None and final.determination < _EXPLAINED and not plan.instruments:
         notes.append(
             f"{100.0 * (1.0 - final.determination):.0f} % of the left side's power is left over: gusts this strong, or "
             "a term that is missing, bias the coefficients, and fewer than nine in ten lie within two standard errors. "
             "Name as instruments the commands that no controller gives: gusts then do not bias."
         )
-    return Tracked(e.text, e.names, coefficients, plan, *found, notes=tuple(notes))
+    return Tracked(e.text, e.names, coefficients, plan, *watched, notes=tuple(notes))
 
 
 def tracked_parameters(plan: SlowPlan, time: Array, inputs: Array, readings: Array, *, every: float = 0.2) -> Tracked:
@@ -130,7 +130,7 @@ def tracked_parameters(plan: SlowPlan, time: Array, inputs: Array, readings: Arr
         return running.frozen
 
     dt, vehicle = plan.observer.dt, plan.observer.equations.vehicle
-    found = _watched(step, running.estimate, time, dt, len(plan.unknown), every)
+    watched = _watched(step, running.estimate, time, dt, len(plan.unknown), every)
     notes = []
     if running.missing:
         notes.append(f"{running.missing} readings were no numbers and were left out.")
@@ -142,7 +142,7 @@ def tracked_parameters(plan: SlowPlan, time: Array, inputs: Array, readings: Arr
         )
     units = tuple(vehicle.card.parameters[name].unit for name in plan.unknown)
     sensors = ", ".join(map(str, plan.observer.sensors))
-    return Tracked(f"{vehicle.card.called}, read by {sensors}", plan.unknown, units, plan, *found, notes=tuple(notes))
+    return Tracked(f"{vehicle.card.called}, read by {sensors}", plan.unknown, units, plan, *watched, notes=tuple(notes))
 
 
 def _watched(
@@ -173,10 +173,10 @@ def _watched(
 
 def _joined(stretches: Sequence[FrozenStretch]) -> tuple[FrozenStretch, ...]:
     """Stretches for the same reason that touch as one."""
-    found: list[FrozenStretch] = []
+    joined: list[FrozenStretch] = []
     for one in stretches:
-        if found and found[-1].why == one.why and one.start <= found[-1].stop:
-            found[-1] = FrozenStretch(found[-1].start, one.stop, one.why)
+        if joined and joined[-1].why == one.why and one.start <= joined[-1].stop:
+            joined[-1] = FrozenStretch(joined[-1].start, one.stop, one.why)
         else:
-            found.append(one)
-    return tuple(found)
+            joined.append(one)
+    return tuple(joined)

@@ -76,10 +76,10 @@ def combine(
     return _made(operation, first, second, omega, h, 1.0 / (1.0 + noise), error)
 
 
-def _parts(found: FrequencyResponse) -> tuple[Complex, Array, Array]:
+def _parts(pair: FrequencyResponse) -> tuple[Complex, Array, Array]:
     """Response, noise over signal, and error of the only pair, (n,) each."""
-    c = np.clip(found.coherence[:, 0, 0], 1e-12, 1.0)
-    return found.response[:, 0, 0], (1.0 - c) / c, found.error[:, 0, 0]
+    c = np.clip(pair.coherence[:, 0, 0], 1e-12, 1.0)
+    return pair.response[:, 0, 0], (1.0 - c) / c, pair.error[:, 0, 0]
 
 
 def _together(

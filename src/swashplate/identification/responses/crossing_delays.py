@@ -23,11 +23,11 @@ def crossing_delays(frequencies: ArrayLike, loop: ArrayLike) -> Array:
     values = np.take_along_axis(values, order, axis=1)
     sizes = np.log(np.abs(values) + 1e-300)
     turned = np.mod(np.pi + np.angle(values), 2.0 * np.pi)
-    found = []
+    delays = []
     for size, phase in zip(sizes.T, turned.T, strict=True):
         for i in np.flatnonzero(np.diff(np.sign(size))):
             share = size[i] / (size[i] - size[i + 1])
             at = w[i] * (w[i + 1] / w[i]) ** share
             ends = np.unwrap(phase[i : i + 2])
-            found.append(float(np.mod(ends[0] + share * (ends[1] - ends[0]), 2.0 * np.pi) / at))
-    return np.sort(np.array(found))
+            delays.append(float(np.mod(ends[0] + share * (ends[1] - ends[0]), 2.0 * np.pi) / at))
+    return np.sort(np.array(delays))

@@ -60,7 +60,7 @@ def _closely(
 ) -> Array:
     """The smaller of a window's own share and what is left when the others' part was taken out of the record."""
     n = plain.shape[1]
-    found = plain.copy()
+    closest = plain.copy()
     seen = np.isfinite(matrix.values[:, 0, 0])
     for i in suspects:
         order = [*(j for j in range(n) if j != i), i]
@@ -77,5 +77,5 @@ def _closely(
         power = left.values[:, -1, -1].real * (1.0 - second.multiple[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):
             share = power / part[:, -1, -1].real
-        found[seen, i] = np.fmin(found[seen, i], share[seen])
-    return found
+        closest[seen, i] = np.fmin(closest[seen, i], share[seen])
+    return closest

@@ -92,8 +92,8 @@ def condition_spectra(
         a = np.diagonal(inverse, axis1=1, axis2=2).real
         strong = random_error(1.0 / (1.0 + untold * a), averages - (inputs - 1)) < WEAK
         own = np.where(strong | ~np.isfinite(own), own, 0.0)
-    found = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
-    response = np.where(own[:, None, :] > SINGULAR, found, np.nan)
+    estimate = h.transpose(0, 2, 1) if removed is None else h.transpose(0, 2, 1) + removed
+    response = np.where(own[:, None, :] > SINGULAR, estimate, np.nan)
     a = np.diagonal(inverse, axis1=1, axis2=2).real
     power = np.abs(response) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -56,15 +56,17 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
         inputs: names.
     """
     events = _events_of(flights, pieces)
-    found = [one for k, piece in enumerate(pieces) for one in _sweeps_in(k, piece, len(inputs), events[k])]
-    if not found:
+    sweeps = [one for k, piece in enumerate(pieces) for one in _sweeps_in(k, piece, len(inputs), events[k])]
+    if not sweeps:
         return None
     followed = [
         np.stack([one.course.in_signal(pieces[one.piece].values[:, i]) for i in range(len(inputs))], axis=1)
-        for one in found
+        for one in sweeps
     ]
-    power = np.array([np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(found, followed, strict=True)])
-    own = [pieces[one.piece].values[one.course.inside, : len(inputs)] for one in found]
+    power = np.array(
+        [np.mean(part[one.course.inside] ** 2, axis=0) for one, part in zip(sweeps, followed, strict=True)]
+    )
+    own = [pieces[one.piece].values[one.course.inside, : len(inputs)] for one in sweeps]
     whole = np.array([np.mean(part**2, axis=0) for part in own])
     size = np.sqrt(power)
     largest = np.maximum(size.max(axis=0), 1e-300)
@@ -74,7 +76,7 @@ def own_references(flights: Sequence[Flight], pieces: Sequence[Signals], inputs:
     swept = tuple(bool(np.any(owner == i)) for i in range(len(inputs)))
     columns = [np.zeros((len(piece.values), len(inputs))) for piece in pieces]
     words = []
-    for one, part, i in zip(found, followed, owner, strict=True):
+    for one, part, i in zip(sweeps, followed, owner, strict=True):
         columns[one.piece][:, i] += part[:, i] if one.chirp is None else one.chirp
         where = pieces[one.piece].start + np.flatnonzero(one.course.inside)[[0, -1]] * pieces[one.piece].dt
         how = "the log's law" if one.chirp is not None else "its law" if one.course.lawful else "its phase"

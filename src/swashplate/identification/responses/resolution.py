@@ -45,13 +45,13 @@ class _Between:
         return np.asarray(values[self.below] * (1.0 - self.share) + values[self.below + 1] * self.share)
 
 
-def first_guess(found: FrequencyResponse) -> Complex:
+def first_guess(responses: FrequencyResponse) -> Complex:
     """A response at every line: what is coherent, straight across holes and held at the ends; zero for hopeless pairs.
 
     Returns:
         Shape (n_f, n_outputs, n_inputs).
     """
-    return coherent_guess(found.omega, found.response, found.coherence)
+    return coherent_guess(responses.omega, responses.response, responses.coherence)
 
 
 def coherent_guess(omega: Array, response: Complex, coherence: Array) -> Complex:

@@ -269,10 +269,10 @@ def _estimate(
 def _matrices(
     pieces: Sequence[Signals], omega: Array, lengths: Sequence[float], overlap: float
 ) -> tuple[list[SpectralMatrix], list[str]]:
-    found: list[SpectralMatrix] = []
+    matrices: list[SpectralMatrix] = []
     notes: list[str] = []
     for length in lengths:
-        periods = PERIODS if found else 1.0
+        periods = PERIODS if matrices else 1.0
         matrix = spectral_matrix(pieces, omega, window=length, overlap=overlap, periods=periods)
         if matrix is None:
             notes.append(f"no record is as long as the window of {length:.3g} s; it was left out.")
@@ -280,15 +280,15 @@ def _matrices(
         short = [piece.name for piece in pieces if piece.name not in matrix.used]
         if short:
             notes.append(f"shorter than the window of {length:.3g} s and left out of it: {', '.join(short)}.")
-        found.append(matrix)
-    if not found:
+        matrices.append(matrix)
+    if not matrices:
         longest = max(piece.duration for piece in pieces)
         raise FlightError(
             f"the longest record has {longest:.3g} s, the shortest window {min(lengths):.3g} s.",
             where=", ".join(piece.name for piece in pieces),
             hint="Give shorter windows (--windows) or fly longer; a record should hold two of its longest windows.",
         )
-    return found, notes
+    return matrices, notes
 
 
 def _composed(

@@ -36,9 +36,9 @@ def _hertz(omega: Array, where: NDArray[np.bool_]) -> str:
     return f"{inside.min():.3g}-{inside.max():.3g} Hz"
 
 
-def _logs(found: FrequencyResponse) -> str:
+def _logs(pairs: FrequencyResponse) -> str:
     """The records behind responses."""
-    return ", ".join(found.sources) or "flight"
+    return ", ".join(pairs.sources) or "flight"
 
 
 def still(flights: Sequence[Flight], names: Sequence[str]) -> tuple[str, ...]:
@@ -59,55 +59,55 @@ def damaged(logs: Sequence[DataSource]) -> list[str]:
     return [f"{log.name or 'flight'}: {'; '.join(log.damage)}; what was read is used." for log in logs if log.damage]
 
 
-def correlated(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
+def correlated(pairs: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
     """Inputs that no frequency, or hardly one, tells apart."""
-    alive = [o for o, name in enumerate(found.outputs) if name not in dead]
+    alive = [o for o, name in enumerate(pairs.outputs) if name not in dead]
     together: dict[tuple[str, ...], list[str]] = {}
-    for i, name in enumerate(found.inputs):
-        lost = np.isnan(found.response[:, alive, i]).all(axis=1) & np.isfinite(found.input_power[:, i])
-        if name in dead or not alive or len(found.inputs) < 2 or not lost.any():
+    for i, name in enumerate(pairs.inputs):
+        lost = np.isnan(pairs.response[:, alive, i]).all(axis=1) & np.isfinite(pairs.input_power[:, i])
+        if name in dead or not alive or len(pairs.inputs) < 2 or not lost.any():
             continue
-        mean = np.nan_to_num(found.input_coherence[lost, i, :]).mean(axis=0)
+        mean = np.nan_to_num(pairs.input_coherence[lost, i, :]).mean(axis=0)
         mean[i] = -1.0
-        if found.method != "direct" and mean.max() < MIXED:
+        if pairs.method != "direct" and mean.max() < MIXED:
             continue  # it is not that inputs move together: references tell too little (`untold`)
-        pair = tuple(sorted((name, found.inputs[int(np.argmax(mean))])))
-        together.setdefault(pair, []).append(_hertz(found.omega, lost))
+        pair = tuple(sorted((name, pairs.inputs[int(np.argmax(mean))])))
+        together.setdefault(pair, []).append(_hertz(pairs.omega, lost))
     return [
-        f"{_logs(found)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
+        f"{_logs(pairs)}: '{one}' and '{other}' move together at {' and '.join(dict.fromkeys(bands))}: less than "
         f"{100 * SINGULAR:g} % of one's power is its own. No number is given there; move the inputs independently, "
         "best in a sweep of each."
         for (one, other), bands in together.items()
     ]
 
 
-def untold(found: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
+def untold(pairs: FrequencyResponse, *, dead: Sequence[str]) -> list[str]:
     """Inputs of which references tell too little somewhere inside the band that they tell."""
     words = []
-    for i, name in enumerate(found.inputs):
-        known = np.isfinite(found.response[:, :, i]).any(axis=1)
-        lost = ~known & np.isfinite(found.input_power[:, i])
-        if found.method == "direct" or name in dead or not lost.any():
+    for i, name in enumerate(pairs.inputs):
+        known = np.isfinite(pairs.response[:, :, i]).any(axis=1)
+        lost = ~known & np.isfinite(pairs.input_power[:, i])
+        if pairs.method == "direct" or name in dead or not lost.any():
             continue
-        weak = "the references are" if found.method == "joint" else "its sweep is"
+        weak = "the references are" if pairs.method == "joint" else "its sweep is"
         words.append(
-            f"{weak} too weak in '{name}' at {_bands(found.omega, lost)}, where a loop's response to gusts dominates: "
+            f"{weak} too weak in '{name}' at {_bands(pairs.omega, lost)}, where a loop's response to gusts dominates: "
             "no number is given there. Sweep slower or larger."
         )
     return words
 
 
-def incoherent(found: FrequencyResponse) -> list[str]:
+def incoherent(pairs: FrequencyResponse) -> list[str]:
     words = []
-    for output in found.outputs:
-        o = found.outputs.index(output)
+    for output in pairs.outputs:
+        o = pairs.outputs.index(output)
         # Where the inputs could not be told apart nearly everywhere, that is what is said.
-        if np.isfinite(found.response[:, o, :]).any(axis=1).mean() < MOST:
+        if np.isfinite(pairs.response[:, o, :]).any(axis=1).mean() < MOST:
             continue
-        if all(found.band(output, name) is None for name in found.inputs):
-            best = float(np.nanmax(found.coherence[:, o, :]))
+        if all(pairs.band(output, name) is None for name in pairs.inputs):
+            best = float(np.nanmax(pairs.coherence[:, o, :]))
             words.append(
-                f"{_logs(found)}: no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a "
+                f"{_logs(pairs)}: no input reaches a coherence of {LEAST_COHERENCE:g} with output '{output}' over a "
                 f"quarter of an octave (largest single value {best:.2f}): do not use its responses."
             )
     return words
@@ -120,13 +120,13 @@ def few_averages(matrices: Sequence[SpectralMatrix]) -> list[str]:
     return [f"the longest window fits {fewest:.1f} times into the records, expected at least 5: errors are large."]
 
 
-def mixing_words(found: FrequencyResponse) -> list[str]:
+def mixing_words(pairs: FrequencyResponse) -> list[str]:
     """Pairs of inputs that moved together, over the whole band or nearly as one in a part of it."""
     words = []
-    for i, one in enumerate(found.inputs):
-        for j, other in enumerate(found.inputs[:i]):
-            mixed = np.nan_to_num(found.input_coherence[:, i, j])
-            told = np.isfinite(found.response[:, :, [i, j]]).any(axis=(1, 2))
+    for i, one in enumerate(pairs.inputs):
+        for j, other in enumerate(pairs.inputs[:i]):
+            mixed = np.nan_to_num(pairs.input_coherence[:, i, j])
+            told = np.isfinite(pairs.response[:, :, [i, j]]).any(axis=(1, 2))
             mean = float(np.mean(mixed[told])) if told.any() else 0.0
             if mean > MIXED:
                 words.append(
@@ -134,9 +134,9 @@ def mixing_words(found: FrequencyResponse) -> list[str]:
                     "conditioning tells them apart, with larger errors."
                 )
             nearly = told & (mixed > NEARLY_ONE)
-            if nearly.any() and found.omega[nearly].max() >= found.omega[nearly].min() * 2.0**0.25:
+            if nearly.any() and pairs.omega[nearly].max() >= pairs.omega[nearly].min() * 2.0**0.25:
                 words.append(
-                    f"'{other}' and '{one}' were nearly one at {_hertz(found.omega, nearly)} (coherence up to "
+                    f"'{other}' and '{one}' were nearly one at {_hertz(pairs.omega, nearly)} (coherence up to "
                     f"{mixed[nearly].max():.2f}): what windows blur counts many times over there. Do not trust weak "
                     "responses to either, however coherent; fly one log per axis."
                 )
@@ -185,20 +185,20 @@ def _bands(omega: Array, where: NDArray[np.bool_]) -> str:
 
 
 def without_unswept(
-    found: FrequencyResponse, swept: Sequence[bool], biased: NDArray[np.bool_]
+    pairs: FrequencyResponse, swept: Sequence[bool], biased: NDArray[np.bool_]
 ) -> tuple[FrequencyResponse, list[str]]:
     """The responses less those that feedback spoils: of inputs without a sweep, up to where it biases the others'."""
     unswept = [i for i, known in enumerate(swept) if not known]
-    names = ", ".join(f"'{found.inputs[i]}'" for i in unswept)
+    names = ", ".join(f"'{pairs.inputs[i]}'" for i in unswept)
     lines = np.flatnonzero(biased.any(axis=(1, 2)))
     if not unswept:
-        return found, []
+        return pairs, []
     if not lines.size:
-        return found, [f"no sweep of {names} was found: these responses are direct, and a loop may bias them."]
-    response = found.response.copy()
+        return pairs, [f"no sweep of {names} was found: these responses are direct, and a loop may bias them."]
+    response = pairs.response.copy()
     response[: lines[-1] + 1][:, :, unswept] = np.nan
-    low, high = found.omega[lines[[0, -1]]] / TWO_PI
-    return replace(found, response=response), [
+    low, high = pairs.omega[lines[[0, -1]]] / TWO_PI
+    return replace(pairs, response=response), [
         f"no sweep of {names} was found, and at {low:.3g}-{high:.3g} Hz feedback biases the direct estimates of the "
         "other inputs: no number is given for it up to there. Name its excitation with --references; --direct gives "
         "the direct estimate."
@@ -214,12 +214,12 @@ def unused_references(
     """
     shared = set.intersection(*(set(map(str, f.streams[f.stream_of(inputs[0])].data_vars)) for f in flights))
     moving = sorted(n for n in shared - set(inputs) if n.startswith(names) and n not in still(flights, (n,)))
-    found = [n for n in moving if flights[0][n].attrs.get("units") != "Hz"]  # not the sweep's own frequency
-    enough = len(found) >= len(inputs) or (len(found) == 1 and axes >= len(inputs))
+    spare = [n for n in moving if flights[0][n].attrs.get("units") != "Hz"]  # not the sweep's own frequency
+    enough = len(spare) >= len(inputs) or (len(spare) == 1 and axes >= len(inputs))
     if not enough or any(name.startswith(names) for name in inputs):
         return []
     return [
-        f"the logs hold {', '.join(found)}: --references {','.join(found)} makes the estimate that no loop biases, "
+        f"the logs hold {', '.join(spare)}: --references {','.join(spare)} makes the estimate that no loop biases, "
         "above all where little was swept."
     ]
 
@@ -275,21 +275,21 @@ RISING = 15.0
 """Degrees by which a phase may rise over the coherent band, while the gain does not, before it is said."""
 
 
-def lead_words(found: FrequencyResponse) -> list[str]:
+def lead_words(pairs: FrequencyResponse) -> list[str]:
     """Outputs that run ahead of their input: phase that rises where the gain does not.
 
     A stable system's phase rises only with its gain (Bode 1945: 90 degrees for 20 dB per decade), and delays make it
     fall. What is left is a controller that answers the motion, a time skew, or an unstable aircraft.
     """
     words = []
-    for output in found.outputs:
-        for name in found.inputs:
-            h, _, error = found.pair(output, name)
-            band = found.band(output, name)
+    for output in pairs.outputs:
+        for name in pairs.inputs:
+            h, _, error = pairs.pair(output, name)
+            band = pairs.band(output, name)
             if band is None:
                 continue
-            inside = (found.omega >= band[0]) & (found.omega <= band[1]) & np.isfinite(h)
-            decades = np.log10(found.omega[inside])
+            inside = (pairs.omega >= band[0]) & (pairs.omega <= band[1]) & np.isfinite(h)
+            decades = np.log10(pairs.omega[inside])
             if decades.size < 8 or decades[-1] - decades[0] < 0.5:
                 continue
             weight = 1.0 / np.maximum(np.degrees(error[inside]), 1.0)
@@ -299,7 +299,7 @@ def lead_words(found: FrequencyResponse) -> list[str]:
             if ahead > RISING and phase > 3.0 * sigma and gain < 1.0:
                 words.append(
                     f"{output} / {name}: the phase rises by {ahead:.0f} degrees over "
-                    f"{_hertz(found.omega, inside)} while the gain does not: the output runs ahead of the input. A "
+                    f"{_hertz(pairs.omega, inside)} while the gain does not: the output runs ahead of the input. A "
                     "controller that answers the motion looks like this, and so do channels skewed in time or an "
                     "unstable aircraft; do not take it for the aircraft unless an injected sweep (--references) agrees."
                 )

@@ -46,23 +46,23 @@ def signals(flights: Sequence[Flight], names: Sequence[str]) -> list[Signals]:
     Raises:
         FlightError: a channel that is missing or not finite, a grid that is not uniform, flights of different rates.
     """
-    found = []
+    unbroken = []
     for flight in flights:
         for piece in flight.split():
             time, table = uniform_table(piece, names, who="the frequency response")
             dt = float((time[-1] - time[0]) / (time.size - 1))
             name = f"{piece.provenance.source or 'flight'} {time[0]:.2f}-{time[-1]:.2f} s"
-            found.append(Signals(name, dt, detrended(table), float(time[0])))
-    if not found:
+            unbroken.append(Signals(name, dt, detrended(table), float(time[0])))
+    if not unbroken:
         raise FlightError("there is no flight to work on.")
-    rates = sorted({round(1.0 / piece.dt, 3) for piece in found})
+    rates = sorted({round(1.0 / piece.dt, 3) for piece in unbroken})
     if len(rates) > 1:
         raise FlightError(
             f"the flights have different rates ({', '.join(f'{rate:g}' for rate in rates)} Hz).",
-            where=", ".join(piece.name for piece in found),
+            where=", ".join(piece.name for piece in unbroken),
             hint="Bring all of them to one rate (--rate).",
         )
-    return found
+    return unbroken
 
 
 @dataclass(frozen=True)

@@ -133,8 +133,8 @@ def begun_moved(model: StochasticModel, numbers: FilterNumbers, seen: FirstMotio
         )
     )
 
-    def moved(found: Array) -> Array:
-        return np.tensordot(_WEIGHTS, found[1:].reshape(len(_POINTS), k, *found.shape[1:]), 1) / _ASIDE
+    def moved(runs: Array) -> Array:
+        return np.tensordot(_WEIGHTS, runs[1:].reshape(len(_POINTS), k, *runs.shape[1:]), 1) / _ASIDE
 
     matrices = joined_at(model, rows, seen)
     here = A, C, Q, R = tuple(part[0] for part in matrices)
@@ -214,11 +214,11 @@ def _slopes(model: StochasticModel, x: Array, inputs: Array, parameters: Array, 
 def _measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Array:
     """Slopes of the measured channels by the states, by row: by complex steps in the angles, plain in the others."""
     names = model.vehicle.state_names
-    found = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
+    measured = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
     for place in (names.index(name) for name in ("phi", "theta", "psi")):
         turned = x + 1j * _IMAGINARY * np.eye(len(names))[place]
-        found[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / _IMAGINARY
-    return found
+        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / _IMAGINARY
+    return measured
 
 
 class _ComplexArrays(ArrayBackend):
@@ -272,7 +272,7 @@ def _steady(
 def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> Array:
     """The states that runs begin with, by row; the inner ones of the rows beside the first as in `_steady`."""
     vehicle, first = model.vehicle, seen.voltage[0]
-    found = measured_start(
+    starts = measured_start(
         vehicle,
         model.output_names,
         vehicle.parameters(*rows.parameters.T),
@@ -283,14 +283,14 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
         voltage=first,
         xp=_XP,
     )
-    found = np.array(np.broadcast_to(found, (len(rows.parameters), found.shape[-1])))
+    starts = np.array(np.broadcast_to(starts, (len(rows.parameters), starts.shape[-1])))
     if vehicle.traits.settled is not None:
-        return found
+        return starts
 
     taken = _rates_and_slopes(model)
 
     def unrest(row: int, inner: Array) -> tuple[Array, Array]:
-        state = np.concatenate([found[row, :_BODY], inner])
+        state = np.concatenate([starts[row, :_BODY], inner])
         p = numbers_and_constants(vehicle, rows.parameters[row])
         rates, slope, _ = taken(state, _driving(rows.inputs[row], first), p)
         # A governor at its stop does not move: without this the slope could not be inverted.
@@ -301,9 +301,9 @@ def _starts(model: StochasticModel, rows: FilterNumbers, seen: FirstMotion) -> A
     for _ in range(INNER_STEPS):
         value, slope = unrest(0, inner)
         inner = inner - _solved(slope, value)
-    for row in range(len(found)):
-        found[row, _BODY:] = inner - _solved(slope, unrest(row, inner)[0])
-    return found
+    for row in range(len(starts)):
+        starts[row, _BODY:] = inner - _solved(slope, unrest(row, inner)[0])
+    return starts
 
 
 def _solved(slope: Array, value: Array) -> Array:

@@ -102,7 +102,7 @@ def _of_vehicle(vehicle: Vehicle, flights: Sequence[Flight], question: Question)
         biases=question.biases,
     )
     solved = _solve(likelihood, question)
-    found = vehicle_result(
+    result = vehicle_result(
         vehicle,
         table,
         solved,
@@ -111,7 +111,7 @@ def _of_vehicle(vehicle: Vehicle, flights: Sequence[Flight], question: Question)
         settings={"outputs": list(outputs), "shifts": bool(question.shifts), "biases": list(question.biases)},
         seconds=time.perf_counter() - began,
     )
-    return _warned(found, likelihood, solved)
+    return _warned(result, likelihood, solved)
 
 
 def vehicle_errors(
@@ -175,7 +175,7 @@ def _of_structure(
         biases=question.biases,
     )
     solved = _solve(likelihood, question)
-    found = linear_result(
+    result = linear_result(
         model,
         solved,
         method=_METHOD,
@@ -183,7 +183,7 @@ def _of_structure(
         settings={"outputs": list(outputs), "shifts": shifts, "biases": list(question.biases)},
         seconds=time.perf_counter() - began,
     )
-    return _warned(found, likelihood, solved)
+    return _warned(result, likelihood, solved)
 
 
 def _solve(likelihood: CollocationErrors, question: Question) -> Solved:
@@ -199,15 +199,15 @@ _Model = TypeVar("_Model")
 
 
 def _warned(
-    found: Result[_Model, TimeDetails], likelihood: CollocationErrors, solved: Solved
+    result: Result[_Model, TimeDetails], likelihood: CollocationErrors, solved: Solved
 ) -> Result[_Model, TimeDetails]:
     """The result with what is said of steps that are too long for the model."""
     fast, error = likelihood.fastest(solved.optimum.row)
     if error <= COARSE:
-        return found
+        return result
     step = likelihood.records[0].dt
     words = (
         f"a mode at {abs(fast):.3g} 1/s is too fast for samples every {step:.3g} s: a step of collocation is wrong by "
         f"{100.0 * error:.2g} % of it. Condition the flight to a higher rate, or use a method that integrates."
     )
-    return replace(found, warnings=(*found.warnings, words))
+    return replace(result, warnings=(*result.warnings, words))

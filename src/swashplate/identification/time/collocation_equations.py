@@ -68,8 +68,8 @@ class VehiclePredictor:
         felt = any(name in FORCES for name in self.outputs)
 
         def rates(x: jax.Array, w: jax.Array) -> jax.Array:
-            found: jax.Array = equations(x, w, p)
-            return found
+            values: jax.Array = equations(x, w, p)
+            return values
 
         def seen(x: jax.Array, dx: jax.Array, w: jax.Array) -> jax.Array:
             return jnp.concatenate([x, dx, force(x, w, p)] if felt else [x, dx])[rows]
@@ -103,11 +103,11 @@ class StructurePredictor:
         n, m, k = len(model.states), len(model.inputs), len(model.outputs)
 
         def matrix(name: str, rows: int, columns: int) -> jax.Array:
-            found: list[list[Any]] = [[float(name == "M" and i == j) for j in range(columns)] for i in range(rows)]
+            entries: list[list[Any]] = [[float(name == "M" and i == j) for j in range(columns)] for i in range(rows)]
             for e in model.elements:
                 if e.matrix == name:
-                    found[e.row][e.column] = e.expression(values)
-            return jnp.array(found, dtype=float)
+                    entries[e.row][e.column] = e.expression(values)
+            return jnp.array(entries, dtype=float)
 
         F, G = matrix("F", n, n), matrix("G", n, m)
         if any(e.matrix == "M" for e in model.elements):
@@ -162,8 +162,8 @@ def _traced_local(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: 
     triples = jnp.stack([w[:-2:2], w[1::2], w[2::2]], axis=1)
     before, after = jax.vmap(jax.jacfwd(defect, argnums=(0, 1)))(x[:-1], x[1:], triples)
     here = jax.vmap(jax.jacfwd(error))(x, w[::2], given["outputs"])
-    found: Any = (*_both(plan, given, numbers, x), before, after, here)
-    return Chain(*found)
+    parts: Any = (*_both(plan, given, numbers, x), before, after, here)
+    return Chain(*parts)
 
 
 chain_at = jax.jit(_traced_local, static_argnums=0, compiler_options=QUICK_TO_COMPILE)
@@ -179,8 +179,8 @@ def moved_by_numbers(plan: CollocationPlan, given: Numbers, numbers: jax.Array, 
 def rate_slopes(plan: CollocationPlan, given: Numbers, numbers: jax.Array, x: jax.Array, sample: int) -> jax.Array:
     """Slopes of the rates by the states (s, s) at a sample's inputs."""
     w = plan.model.driving(given, numbers)[2 * sample]
-    found: jax.Array = jax.jacfwd(plan.model.functions(given, numbers)[0])(x, w)
-    return found
+    slopes: jax.Array = jax.jacfwd(plan.model.functions(given, numbers)[0])(x, w)
+    return slopes
 
 
 class Innovations(NamedTuple):
@@ -227,8 +227,8 @@ def _traced_filter(
         return (phi @ d + offset, phi @ P @ phi.T + spread @ spread.T), Innovations(*map(jnp.stack, seen))
 
     samples: Any = (local.v, local.here, moved)
-    found: Innovations = jax.lax.scan(step, (jnp.zeros(s), first), samples)[1]
-    return found
+    innovations: Innovations = jax.lax.scan(step, (jnp.zeros(s), first), samples)[1]
+    return innovations
 
 
 innovations_along = jax.jit(_traced_filter, static_argnums=0, compiler_options=QUICK_TO_COMPILE)

@@ -166,8 +166,8 @@ class CollocationErrors:
         return plain[: self._count], np.exp(plain[self._count :])
 
     def _chain(self, k: int, numbers: Array, x: Array) -> Chain:
-        found = chain_at(self._plans[k], self._given[k], jnp.asarray(numbers), jnp.asarray(x))
-        return Chain(*map(np.asarray, found))
+        parts = chain_at(self._plans[k], self._given[k], jnp.asarray(numbers), jnp.asarray(x))
+        return Chain(*map(np.asarray, parts))
 
     def _deviations(self, k: int, noise: Array) -> tuple[Array, Array]:
         """Standard deviations of defects and errors."""
@@ -198,15 +198,15 @@ class CollocationErrors:
             )
         borders = self._bordered(numbers, noise, chains, paths)
         for _ in range(_JOINT_STEPS):
-            found = eliminated(borders, damping)
-            if found is None:
+            reduced = eliminated(borders, damping)
+            if reduced is None:
                 damping = max(10.0 * damping, 1e-8)
                 if damping > _HOPELESS:
                     break
                 continue
-            matrix = found.information + prior + np.diag(damping * found.diagonal + 1e-300)
-            step = step_within(matrix, -(found.pull + prior @ (numbers - mean)), low - numbers, high - numbers)
-            moved = [x + d.reshape(x.shape) for x, d in zip(paths, found.states(step), strict=True)]
+            matrix = reduced.information + prior + np.diag(damping * reduced.diagonal + 1e-300)
+            step = step_within(matrix, -(reduced.pull + prior @ (numbers - mean)), low - numbers, high - numbers)
+            moved = [x + d.reshape(x.shape) for x, d in zip(paths, reduced.states(step), strict=True)]
             then, those = judged(numbers + step, moved)
             if then < cost:
                 gained, cost, numbers, paths, chains = cost - then, then, numbers + step, moved, those
@@ -217,15 +217,15 @@ class CollocationErrors:
                 damping *= 10.0
                 if damping > _HOPELESS:
                     break
-        found = eliminated(borders)
-        if found is None:
+        reduced = eliminated(borders)
+        if reduced is None:
             raise IdentificationError(
                 "the outputs do not tell every state.",
                 channel=", ".join(self.outputs),
                 hint="Give more outputs, or leave out states that show in none.",
             )
-        self._refuse_traceless(found, prior)
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(found.information + prior, hermitian=True)), 0.0))
+        self._refuse_traceless(reduced, prior)
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(reduced.information + prior, hermitian=True)), 0.0))
         return numbers, np.maximum(np.abs(numbers), np.clip(spread, 1e-3 * scale, 1e3 * scale)), tuple(paths)
 
     def _bordered(self, numbers: Array, noise: Array, chains: Sequence[Chain], paths: Sequence[Array]) -> list[Border]:
@@ -238,9 +238,9 @@ class CollocationErrors:
                                np.moveaxis(np.asarray(v), 0, 2) / sensor[:, None]))  # fmt: skip
         return made
 
-    def _refuse_traceless(self, found: Eliminated, prior: Array) -> None:
+    def _refuse_traceless(self, reduced: Eliminated, prior: Array) -> None:
         scale = self._row.scale[: self._count]
-        blind = (found.diagonal + np.diag(prior)) * scale**2 < _NO_TRACE
+        blind = (reduced.diagonal + np.diag(prior)) * scale**2 < _NO_TRACE
         names = [n for n, b in zip(self._row.names, blind, strict=False) if b]
         if names:
             raise IdentificationError(
@@ -283,13 +283,13 @@ class CollocationErrors:
         key = row.tobytes()
         if self._tried is None or self._tried[0] != key:
             numbers, noise = self._split(row)
-            found = []
+            paths = []
             for k, x in enumerate(self._paths):
                 path = self._settled(k, numbers, noise, x)
                 if path is None:
                     return None
-                found.append(path)
-            self._tried = key, tuple(found)
+                paths.append(path)
+            self._tried = key, tuple(paths)
         return self._tried[1]
 
     def sized(self, row: Array) -> Array:
@@ -298,14 +298,14 @@ class CollocationErrors:
 
     def refresh(self, row: Array) -> None:
         """Paths of an accepted row are where the next ones begin."""
-        found = self._paths_at(row)
-        if found is not None:
-            self._paths, self._accepted = tuple(path.x for path in found), np.array(row)
+        paths = self._paths_at(row)
+        if paths is not None:
+            self._paths, self._accepted = tuple(path.x for path in paths), np.array(row)
 
     def cost(self, row: Array) -> float:
         """Negative log-likelihood of the outputs, without constants."""
-        found = self._paths_at(row)
-        return np.inf if found is None else sum(path.cost + path.volume for path in found)
+        paths = self._paths_at(row)
+        return np.inf if paths is None else sum(path.cost + path.volume for path in paths)
 
     def _filtered(self, row: Array) -> list[Innovations]:
         numbers, noise = self._split(row)

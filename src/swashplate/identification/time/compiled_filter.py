@@ -92,13 +92,13 @@ class CompiledFilter:
         ahead: int,
     ) -> Array:
         """`record_filter.ahead_of`."""
-        found = np.empty((len(starts), ahead, self._n))
+        ahead_states = np.empty((len(starts), ahead, self._n))
         nothing = np.zeros((self._ends[-1] + self.model.n_line) * self.model.n_outputs + len(numbers.nuisance))
         given = np.concatenate([nothing, self._passing(np.asarray(numbers.noise))])
         told = _row(states), given, numbers_and_constants(self.model.vehicle, numbers.parameters), commands, voltage
         where = np.ascontiguousarray(starts, np.dtype("l"))
-        self._c.run_ahead(len(starts), ahead, self.model.dt, *map(flat, told), where, found)
-        return found
+        self._c.run_ahead(len(starts), ahead, self.model.dt, *map(flat, told), where, ahead_states)
+        return ahead_states
 
     def _state(self, rows: Array) -> FilterState:
         x, gust, drift, line = np.split(rows, self._ends, axis=-1)

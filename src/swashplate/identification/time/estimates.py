@@ -94,20 +94,20 @@ def found_at(
     return Found(table, likelihood, logs, optimum, prior, plain, corrected, -plain @ gradient)
 
 
-def estimates_of(found: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
+def estimates_of(best: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], list[str]]:
     """Every free or tied parameter with its bounds, and in words what physics forbids."""
-    table = found.table
+    table = best.table
     k = len(table.free)
-    values = table.identified(found.numbers[:k])
+    values = table.identified(best.numbers[:k])
     card = vehicle.card.parameters
-    sigma = np.sqrt(np.maximum(np.diag(found.scaled(found.plain)), 0.0))
-    corrected = np.sqrt(np.maximum(np.diag(found.scaled(found.corrected)), 0.0))
+    sigma = np.sqrt(np.maximum(np.diag(best.scaled(best.plain)), 0.0))
+    corrected = np.sqrt(np.maximum(np.diag(best.scaled(best.corrected)), 0.0))
     estimates, problems = [], []
-    scales = found.criterion.row.scale
-    total = np.diag(found.optimum.information + found.prior)[found.places]
-    insensitivity = scales[found.places] / np.sqrt(np.maximum(total, 1e-300))
+    scales = best.criterion.row.scale
+    total = np.diag(best.optimum.information + best.prior)[best.places]
+    insensitivity = scales[best.places] / np.sqrt(np.maximum(total, 1e-300))
     for i, free in enumerate(table.free):
-        exact = values[free.name] + float(found.left[i] * scales[i])
+        exact = values[free.name] + float(best.left[i] * scales[i])
         alone, apart = _against_prior(free, exact, float(sigma[i]), float(corrected[i]))
         estimates.append(
             Estimate(
@@ -121,17 +121,15 @@ def estimates_of(found: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], 
                 prior_mean=free.mean,
                 prior_sigma=free.sigma,
                 prior_share=0.0 if free.sigma is None else float(min(1.0, (sigma[i] / free.sigma) ** 2)),
-                at_bound=free.name in found.optimum.at_bound,
+                at_bound=free.name in best.optimum.at_bound,
                 prior_source=free.source if free.sigma is not None else "",
                 alone=alone,
                 disagreement=apart,
             )
         )
     for name, expression in table.ties:
-        gradient = np.array([_slope(table, found.numbers[:k], name, i) for i in range(k)])
-        sizes = [
-            float(np.sqrt(max(gradient @ found.scaled(c) @ gradient, 0.0))) for c in (found.plain, found.corrected)
-        ]
+        gradient = np.array([_slope(table, best.numbers[:k], name, i) for i in range(k)])
+        sizes = [float(np.sqrt(max(gradient @ best.scaled(c) @ gradient, 0.0))) for c in (best.plain, best.corrected)]
         estimates.append(
             Estimate(
                 name=name,
@@ -149,7 +147,7 @@ def estimates_of(found: Found, vehicle: Vehicle) -> tuple[tuple[Estimate, ...], 
         inside = (low is None or value >= low - 1e-12) and (high is None or value <= high + 1e-12)
         if not (np.isfinite(value) and inside):
             problems.append(f"{name} = {value:.4g} is not physical (allowed: {low} to {high})")
-    if not np.isfinite(found.optimum.cost):
+    if not np.isfinite(best.optimum.cost):
         problems.append("the cost is not finite")
     return tuple(estimates), problems
 
@@ -180,14 +178,14 @@ def _slope(table: Parameterization, numbers: Array, name: str, place: int) -> fl
     return float((high - low) / (2.0 * step[place]))
 
 
-def constants(found: Found) -> tuple[Constant, ...]:
+def constants(best: Found) -> tuple[Constant, ...]:
     """Delays, trims and lever arms of every log."""
-    row = found.criterion.row
-    sigma = np.sqrt(np.maximum(np.diag(found.plain), 0.0)) * row.scale
+    row = best.criterion.row
+    sigma = np.sqrt(np.maximum(np.diag(best.plain), 0.0)) * row.scale
     estimates = []
     for i in row.places("nuisance"):
         name, _, number = row.names[i].partition("[")
         unit = record_unit(name)
-        record = found.logs[int(number[:-1])]
-        estimates.append(Constant(record, name, unit, float(found.numbers[i]), float(sigma[i])))
+        record = best.logs[int(number[:-1])]
+        estimates.append(Constant(record, name, unit, float(best.numbers[i]), float(sigma[i])))
     return tuple(estimates)

@@ -59,13 +59,13 @@ def excitation(vehicle: Vehicle, record: Record, states: Array) -> tuple[AxisExc
     heading = motion["psi"]
     motion["forward"] = np.cos(heading) * motion["x"] + np.sin(heading) * motion["y"]
     motion["lateral"] = -np.sin(heading) * motion["x"] + np.cos(heading) * motion["y"]
-    found = []
+    judged = []
     for axis in vehicle.traits.axes:
         command = np.zeros(record.time.size)
         for name, weight in axis.inputs.items():
             command = command + weight * record.inputs[:, vehicle.input_names.index(name)]
-        found.append(_judge(record, axis, command, motion))
-    return tuple(found)
+        judged.append(_judge(record, axis, command, motion))
+    return tuple(judged)
 
 
 def _judge(record: Record, axis: Axis, command: Array, motion: dict[str, Array]) -> AxisExcitation:

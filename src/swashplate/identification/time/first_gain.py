@@ -31,14 +31,14 @@ def kalman_gains(phi: Array, c: Array, gusts: Iterable[Array], sensors: Array) -
         phi, c: transition and outputs.
         gusts: covariances of what drives the states within a sample. sensors: of the outputs' noise.
     """
-    found = []
+    gains = []
     for gust in gusts:
         try:
             settled = settled_covariance(through(phi, c, gust, sensors, np))
         except np.linalg.LinAlgError:
             continue  # something that lasts is not seen: no filter of this noise settles
-        found.append(np.asarray(phi @ gain_at(settled, c, sensors, np)))
-    return found
+        gains.append(np.asarray(phi @ gain_at(settled, c, sensors, np)))
+    return gains
 
 
 def first_gain(phi: Array, c: Array, candidates: Sequence[Array], run: Run) -> tuple[float, Array]:
@@ -78,8 +78,8 @@ def first_gain(phi: Array, c: Array, candidates: Sequence[Array], run: Run) -> t
 
 def _backward(pushed: Array, loop: Array) -> Array:
     """mu of the sample after each, (n_t, n), where mu = push + loop' mu of the sample after; none after the last."""
-    found, mu = np.zeros_like(pushed), np.zeros(pushed.shape[1])
+    multipliers, mu = np.zeros_like(pushed), np.zeros(pushed.shape[1])
     for at in range(len(pushed) - 1, 0, -1):
         mu = pushed[at] + mu @ loop
-        found[at - 1] = mu
-    return found
+        multipliers[at - 1] = mu
+    return multipliers

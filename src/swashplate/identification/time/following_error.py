@@ -113,9 +113,9 @@ class FollowingError(PredictionError):
 
     def scores(self, row: Array) -> tuple[float, Array, Array]:
         """Cost, gradient and Fisher information; slopes are differences of whole runs."""
-        cost, found = self._judged(row)
+        cost, judged = self._judged(row)
         gradient, information = np.zeros(len(row)), np.zeros((len(row), len(row)))
-        for white, moved, by_covariance in found:
+        for white, moved, by_covariance in judged:
             weight = robust.weights(white)
             turned = np.tril(by_covariance) * (1.0 - 0.5 * np.eye(white.shape[1]))  # as in PredictionError
             flat, covariance = moved.reshape(len(row), -1), by_covariance.reshape(len(row), -1)
@@ -129,10 +129,10 @@ class FollowingError(PredictionError):
 
         The last is the information (p, p) that lies in the innovations' covariance instead.
         """
-        _, found = self._judged(row)
-        by_covariance = [part.reshape(len(row), -1) for _, _, part in found]
+        _, by_record = self._judged(row)
+        by_covariance = [part.reshape(len(row), -1) for _, _, part in by_record]
         rest = sum((0.5 * flat @ flat.T for flat in by_covariance), np.zeros((len(row), len(row))))
-        return [white for white, _, _ in found], [moved for _, moved, _ in found], np.asarray(rest)
+        return [white for white, _, _ in by_record], [moved for _, moved, _ in by_record], np.asarray(rest)
 
     def comparisons(self, row: Array) -> tuple[Comparison, ...]:
         """Every record beside its one-step predictions; the bounds are those of the mean covariance."""
@@ -172,27 +172,29 @@ class FollowingError(PredictionError):
 
     def _whitened(self, runs: Sequence[Followed]) -> list[tuple[Array, Array, Array]]:
         """Per record: whitened innovations (n, m), slopes of theirs (p, n, m) and L^-1 dS L^-T (p, n, m, m)."""
-        found = []
+        by_record = []
         for run, counted in zip(runs, self.counted, strict=True):
             nu, S = run.innovations[:, counted], run.covariances[:, counted]
             Li = np.linalg.inv(np.linalg.cholesky(S[0]))
             turn = np.swapaxes(Li, 1, 2)
             white = (Li @ nu[0][..., None])[..., 0]
             moved = (Li @ ((nu[1:] - nu[0]) / _STEP)[..., None])[..., 0]
-            found.append((white, moved, Li @ ((S[1:] - S[0]) / _STEP) @ turn))
-        return found
+            by_record.append((white, moved, Li @ ((S[1:] - S[0]) / _STEP) @ turn))
+        return by_record
 
     def _followed(self, rows: Sequence[Array]) -> list[Followed]:
         """Every record's runs at some rows."""
         given = self.table.card_row, np.array(self.noise, dtype=np.float64)
-        found = []
+        followed = []
         for run, readings, spread in zip(self._runs, self._readings, self._spread, strict=True):
             placed = [run.placed(*given, row * self.row.scale) for row in rows]
             lanes = 1 if len(rows) == 1 else _LANES
             placed += placed[-1:] * (-len(placed) % lanes)
             blocks = [placed[first : first + lanes] for first in range(0, len(placed), lanes)]
-            found.append(whole([_along_some(self.model, run, readings, spread, block) for block in blocks], len(rows)))
-        return found
+            followed.append(
+                whole([_along_some(self.model, run, readings, spread, block) for block in blocks], len(rows))
+            )
+        return followed
 
 
 def _spread_inside(states: Array) -> Array:
@@ -226,8 +228,8 @@ def _along_some(
     for k, (read, voltage) in enumerate(stretches(readings, run.voltage)):
         here = commands[:, k * STRETCH : (k + 1) * STRETCH]
         driven = np.swapaxes(lengthened(np.swapaxes(here, 0, 1), STRETCH), 0, 1)
-        state, P, found = _along(model, state, P, numbers, read, driven, voltage)
-        parts.append(found)
+        state, P, part = _along(model, state, P, numbers, read, driven, voltage)
+        parts.append(part)
     return jax.tree.map(lambda *rows: np.concatenate(rows, axis=1)[:, :n], *parts)  # type: ignore[no-any-return]
 
 
@@ -271,8 +273,8 @@ def _along(
 
         return jax.lax.scan(sample, (state, P), (readings, commands, voltage))
 
-    (state, P), found = jax.vmap(one)(state, covariance, numbers, commands)
-    return state, P, found
+    (state, P), part = jax.vmap(one)(state, covariance, numbers, commands)
+    return state, P, part
 
 
 def _corrected(

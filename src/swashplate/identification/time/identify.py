@@ -104,23 +104,23 @@ def identify_flight(
     likelihood.refresh(likelihood.row.starts())
     accuracy.refuse_unseen(likelihood.row, likelihood.constant.scores(likelihood.row.starts())[2], where=where)
     optimum = by.search(likelihood, _most(question), question.progress)
-    found, row = by.conclude(table, likelihood, optimum, question)
+    best, row = by.conclude(table, likelihood, optimum, question)
     residual, began, k = None, vehicle, len(table.free)
-    if isinstance(likelihood, PredictionError) and question.residual and not estimates_of(found, vehicle)[1]:
+    if isinstance(likelihood, PredictionError) and question.residual and not estimates_of(best, vehicle)[1]:
         each = [Nuisance(*numbers) for numbers in np.array(likelihood.nuisances_of(row)).T.tolist()]
-        physics, air = found.table.without(found.optimum.at_bound), likelihood.noise_of(row)
-        residual = fit_residual(found.vehicle, pieces, each, air, horizon=horizon, axes=axes, physics=physics)
+        physics, air = best.table.without(best.optimum.at_bound), likelihood.noise_of(row)
+        residual = fit_residual(best.vehicle, pieces, each, air, horizon=horizon, axes=axes, physics=physics)
         if residual.kept and horizon is None:
-            alone = found
-            likelihood, found, row = _together(by, likelihood, row, residual, question)
-            residual, began = residual.at(found.vehicle, moved(alone, found)), begun(vehicle, residual)
-    optimum = found.optimum
-    every, problems = estimates_of(found, began)
+            alone = best
+            likelihood, best, row = _together(by, likelihood, row, residual, question)
+            residual, began = residual.at(best.vehicle, moved(alone, best)), begun(vehicle, residual)
+    optimum = best.optimum
+    every, problems = estimates_of(best, began)
     parameters = tuple(estimate for estimate in every if not estimate.name.startswith(PREFIX))
     noise = likelihood.noise_of(row)
     problems += [*smoothed_outputs(pieces, flights), *noise_too_small(noise, flights)]
     if noise is not None:  # output error fits starts to its commands: others lose
-        apart = unrelated(lambda others: by.likelihood_of(found.table, others, question).constant.cost(row), pieces)
+        apart = unrelated(lambda others: by.likelihood_of(best.table, others, question).constant.cost(row), pieces)
         problems += [apart] if apart else []
         notes += [told] if (told := moving_air(noise)) else []
         notes += [] if question.rotor_line is None else coloured_by_resampling(flights)
@@ -131,7 +131,7 @@ def identify_flight(
     ]
     nuisances = likelihood.nuisances_of(row)
     nuisance = mean_nuisance(nuisances)
-    identified = _identified(found, noise, nuisance, began, every, pieces, by.method)
+    identified = _identified(best, noise, nuisance, began, every, pieces, by.method)
     settings: dict[str, Any] = {}
     if isinstance(likelihood, PredictionError):
         settings["filter by"] = likelihood.compiled_by
@@ -143,7 +143,7 @@ def identify_flight(
             identified = residual.vehicle.with_card(card)
         settings["residual"] = residual.told
         notes.append(residual.words)
-    own, plain = constants(found), found.scaled(found.plain)[:k, :k]
+    own, plain = constants(best), best.scaled(best.plain)[:k, :k]
     if vehicle.traits.balance is not None:
         trims = {name: [c.value for c in own if c.name == name] for name in {c.name for c in own}}
         notes += vehicle.traits.balance(
@@ -159,10 +159,10 @@ def identify_flight(
         nuisance=nuisance,
         names=table.names,
         covariance=plain,
-        covariance_corrected=found.scaled(found.corrected)[:k, :k],
+        covariance_corrected=best.scaled(best.corrected)[:k, :k],
         correlation=correlation_of(plain),
         directions=accuracy.blind_directions(
-            table.names, accuracy.marginal_information(optimum.information, found.prior, found.places[:k])
+            table.names, accuracy.marginal_information(optimum.information, best.prior, best.places[:k])
         ),
         details=FlightDetails(axes),
         history=optimum.history,
@@ -304,8 +304,8 @@ def _found_ahead(
     )
     ahead = minimise(criterion, start=criterion.start, iterations=_most(question), progress=question.progress)
     ahead = replace(ahead, converged=ahead.converged and optimum.converged)
-    found = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
-    return replace(found, corrected=TWICE * found.corrected), criterion.whole(ahead.row)
+    best = found_at(table, criterion, ahead, logs=likelihood.logs, lags=criterion.lags)
+    return replace(best, corrected=TWICE * best.corrected), criterion.whole(ahead.row)
 
 
 _TAKES = frozenset({"free", "ties", "fixed", "priors", "prior_card", "outputs", "iterations", "progress"})
@@ -354,7 +354,7 @@ def _without(pieces: list[Record], left_out: Sequence[tuple[float, float]]) -> l
 
 
 def _identified(
-    found: Found,
+    best: Found,
     noise: Noise | None,
     nuisance: Nuisance,
     vehicle: Vehicle,
@@ -364,7 +364,7 @@ def _identified(
 ) -> Vehicle:
     """The identified vehicle: the card with the new numbers, where they come from, and what the observer needs."""
     sources = ", ".join(piece.name for piece in pieces)
-    card = found.table.vehicle.card
+    card = best.table.vehicle.card
     for estimate in estimates:
         card = card.with_values(
             {estimate.name: estimate.value},
@@ -376,7 +376,7 @@ def _identified(
         name: parameter.value
         for name, parameter in card.parameters.items()
         if parameter.status != "identified"
-        and name not in found.table.held
+        and name not in best.table.held
         and parameter.value != vehicle.card.parameters[name].value
     }
     card = card.with_values(changed, status="assumed", source="held during the identification")
@@ -390,9 +390,9 @@ def _identified(
         },
     )
     observer = {"nuisance": {k: float(v) for k, v in nuisance._asdict().items()}}
-    if found.table.of_records:
-        observer["trims"] = {f.name: 0.05 if f.sigma is None else f.sigma for f in found.table.of_records}
+    if best.table.of_records:
+        observer["trims"] = {f.name: 0.05 if f.sigma is None else f.sigma for f in best.table.of_records}
     if noise is not None:
         observer["noise"] = {k: float(v) for k, v in noise._asdict().items()}
     card = replace(card, title=f"{vehicle.card.title}, identified from {sources}", observer=observer, path="")
-    return found.table.vehicle.with_card(card)
+    return best.table.vehicle.with_card(card)

@@ -131,8 +131,8 @@ class RecordRun:
         begin = begun_moved(model, run.numbers, self.seen, directions)
         late, series = by_command * scale[own : own + m, None, None], (self.readings, run.commands, self.voltage)
         went = FilterRun(run.innovations, run.states, run.roots)
-        found = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, late), free=k)
-        return found, np.asarray(begin.gain.covariance)
+        slopes = moved(model, run.begin, begin, run.numbers, directions, series, went, (own, late), free=k)
+        return slopes, np.asarray(begin.gain.covariance)
 
     def _commands_moved(self, run: Filtered) -> Array:
         """Slopes of the arriving commands by each of the record's own numbers (nuisances, n, n_inputs)."""
@@ -193,8 +193,8 @@ def traced_run(
         return model.step(x, acting, commanded, parameters, volts)
 
     first = first_state(model, x, jnp.stack([jnp.asarray(value, dtype=float) for value in nuisance]))
-    _, (found, states) = model.run(first, y, advance, (reaching, voltage), noise, nuisance, gain)
-    return found, gain.covariance, states
+    _, (innovations, states) = model.run(first, y, advance, (reaching, voltage), noise, nuisance, gain)
+    return innovations, gain.covariance, states
 
 
 def traced_innovations(plan: FilterPlan, data: Any, row: Any) -> tuple[Any, Any, FilterState]:
@@ -215,8 +215,8 @@ def traced_cost(plan: FilterPlan, data: Mapping[str, Any], row: jax.Array) -> An
         plan, row: as `traced_innovations` takes them.
         data: its data, and "counted" (records, n).
     """
-    found, covariances, _ = traced_innovations(plan, data, row)
+    innovations, covariances, _ = traced_innovations(plan, data, row)
     roots = jnp.linalg.cholesky(covariances)
-    white = jax.vmap(lambda L, nu: jax.scipy.linalg.solve_triangular(L, nu.T, lower=True).T)(roots, found)
+    white = jax.vmap(lambda L, nu: jax.scipy.linalg.solve_triangular(L, nu.T, lower=True).T)(roots, innovations)
     logarithms = jnp.log(jnp.diagonal(roots, axis1=1, axis2=2)).sum(axis=-1)
     return jnp.where(data["counted"], losses(white, jnp).sum(axis=-1) + logarithms[:, None], 0.0).sum()

@@ -72,9 +72,9 @@ def fit_in_frequency(
     sigma = np.sqrt(np.mean(np.concatenate([np.abs(y) ** 2 for _, _, _, y in pieces]), axis=0)) + 1e-300
 
     def errors(numbers: Array) -> Complex:
-        found = model.with_values(dict(zip(model.free, map(float, numbers[:k]), strict=True)))
+        trial = model.with_values(dict(zip(model.free, map(float, numbers[:k]), strict=True)))
         ends = numbers[k:].reshape(len(pieces), 2, n)
-        parts = [_answer(found, rows, names, piece, end) for piece, end in zip(pieces, ends, strict=True)]
+        parts = [_answer(trial, rows, names, piece, end) for piece, end in zip(pieces, ends, strict=True)]
         return np.concatenate([piece[3] - part for piece, part in zip(pieces, parts, strict=True)])
 
     def residuals(numbers: Array) -> Array:

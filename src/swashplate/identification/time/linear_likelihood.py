@@ -163,7 +163,7 @@ class OutputErrors(TimeErrors):
     def _ahead(self, batch: Batch, ahead: Ahead) -> list[Any]:
         """Errors ahead of every record for a batch of rows, (n_batch, starts, horizons, outputs) each."""
         steps = np.array(ahead.steps)
-        found = []
+        by_record = []
         for (x, phi, c, gain, measured, drive), starts in zip(self._loops(batch), ahead.starts, strict=True):
             after = np.asarray(_states()(x, phi, c, gain, measured, drive))[:, np.array(starts, dtype=int)]
             told = []
@@ -172,8 +172,8 @@ class OutputErrors(TimeErrors):
                 if step in ahead.steps:
                     told.append(measured[k].transpose(1, 0, 2) - np.einsum("pij,psj->psi", c, after))
                 after = np.einsum("pij,psj->psi", phi, after) + drive[k].transpose(1, 0, 2)
-            found.append(np.stack(told, axis=2))
-        return found
+            by_record.append(np.stack(told, axis=2))
+        return by_record
 
     def _stepped(self, row: Array, places: Places | None = None) -> Any:
         """A row's numbers, plain and with a complex step in each, or in some."""
@@ -186,13 +186,13 @@ class OutputErrors(TimeErrors):
         values = self.model.numbers(dict(zip(self.model.free, numbers, strict=False)))
         n, m, k = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
         shapes = {"M": (n, n), "F": (n, n), "G": (n, m), "H0": (k, n), "H1": (k, n), "D": (k, m)}
-        found = {s: np.zeros(shape, dtype=np.complex128) for s, shape in shapes.items()}
-        found["M"] += np.eye(n)
+        matrices = {s: np.zeros(shape, dtype=np.complex128) for s, shape in shapes.items()}
+        matrices["M"] += np.eye(n)
         for e in self.model.elements:
-            found[e.matrix][e.row, e.column] = e.expression(values)
-        a, b = np.linalg.solve(found["M"], found["F"]), np.linalg.solve(found["M"], found["G"])
-        h1 = found["H1"][self.rows_of]
-        return a, b, found["H0"][self.rows_of] + h1 @ a, found["D"][self.rows_of] + h1 @ b, h1
+            matrices[e.matrix][e.row, e.column] = e.expression(values)
+        a, b = np.linalg.solve(matrices["M"], matrices["F"]), np.linalg.solve(matrices["M"], matrices["G"])
+        h1 = matrices["H1"][self.rows_of]
+        return a, b, matrices["H0"][self.rows_of] + h1 @ a, matrices["D"][self.rows_of] + h1 @ b, h1
 
     def _systems(self, batch: Batch) -> tuple[Any, ...]:
         return tuple(np.stack(part) for part in zip(*(self._matrices(numbers) for numbers in batch), strict=True))
@@ -267,12 +267,12 @@ class OutputErrors(TimeErrors):
         return np.stack(columns, axis=1)
 
     def _column(self, batch: Batch, pattern: str, names: Sequence[str]) -> Any:
-        found = np.zeros((len(batch), len(names)), dtype=np.complex128)
+        columns = np.zeros((len(batch), len(names)), dtype=np.complex128)
         for i, name in enumerate(names):
             place = self._place.get(pattern.format(name))
             if place is not None:
-                found[:, i] = batch[:, place]
-        return found
+                columns[:, i] = batch[:, place]
+        return columns
 
 
 def _size(p: ModelParameter) -> float:

@@ -146,7 +146,7 @@ def linear_result(
     seconds: float,
 ) -> Result[StateSpaceModel, TimeDetails]:
     """A solved likelihood of a model's records as a result; arguments as `vehicle_result` has them."""
-    found = result_of(
+    result = result_of(
         solved,
         model=lambda estimates: model.with_values({n: estimates[n].value for n in model.free}),
         start=model,
@@ -157,7 +157,7 @@ def linear_result(
         settings={**settings, "records": [piece.name for piece in solved.likelihood.records]},
         seconds=seconds,
     )
-    return replace(found, warnings=(*found.warnings, *torn(found.estimates, model)))
+    return replace(result, warnings=(*result.warnings, *torn(result.estimates, model)))
 
 
 def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
@@ -179,14 +179,14 @@ def torn(estimates: Sequence[Estimate], start: StateSpaceModel) -> list[str]:
 
 
 def _delay_of(model: StateSpaceModel, outputs: Sequence[str], input: str) -> Expression | None:
-    found = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
-    if len(found) > 1:
+    late = {e.text: e for o in outputs if (e := model.delays.get(f"{o}/{input}", model.delays.get(input))) is not None}
+    if len(late) > 1:
         raise IdentificationError(
-            f"has different delays to different outputs ({', '.join(found)}).",
+            f"has different delays to different outputs ({', '.join(late)}).",
             channel=input,
             hint="Give the input one delay; the fit in time delays inputs.",
         )
-    return next(iter(found.values()), None)
+    return next(iter(late.values()), None)
 
 
 @dataclass(frozen=True)

@@ -177,8 +177,8 @@ class PredictionError:
         asked = np.asarray(row, dtype=np.float64).tobytes()
         if asked not in self._kept:
             given = self.table.card_row, np.array(self.noise, dtype=np.float64), row * self.row.scale
-            found = [run.filtered(*given) for run in self._runs]
-            self._kept = dict([*self._kept.items(), (asked, found)][-_KEPT:])
+            filtered = [run.filtered(*given) for run in self._runs]
+            self._kept = dict([*self._kept.items(), (asked, filtered)][-_KEPT:])
         return self._kept[asked]
 
     def errors_ahead(self, row: Array, ahead: Ahead) -> list[Array]:

@@ -71,8 +71,8 @@ def along(
         return in_c.along(begin, numbers, (readings, commands, voltage))
     state, n, parts = first_state(model, begin.x, numbers.nuisance), len(readings), []
     for rows in stretches(readings, commands, voltage):
-        state, found = _along(model, state, begin.gain, numbers, *rows)
-        parts.append(found)
+        state, part = _along(model, state, begin.gain, numbers, *rows)
+        parts.append(part)
     return FilterRun(*whole(parts, n))
 
 
@@ -249,10 +249,10 @@ def along_moved(
     parts = []
     for step, (read,), pushed in zip(steps, stretches(readings), _stretches_of(_filled(commands)), strict=True):
         pushing = (pushed, further)
-        state, moving, found = _along_moved(
+        state, moving, slopes = _along_moved(
             model, (state, begin.gain), (moving, moved.gain), numbers, to, read, step, pushing
         )
-        parts.append(found)
+        parts.append(slopes)
     return np.concatenate(parts, axis=1)[: len(directions.parameters), : len(readings)]
 
 
@@ -280,14 +280,14 @@ def _along_moved(
             return led + by_place @ (jnp.concatenate([x, acting]) - place)
 
         told = (led, step.place, by_place)
-        end, (found, _) = model.run(state, readings, advance, told, Noise(*noise), Nuisance(*nuisance), gain)
-        return end, found
+        end, (innovations, _) = model.run(state, readings, advance, told, Noise(*noise), Nuisance(*nuisance), gain)
+        return end, innovations
 
     still = jax.tree.map(lambda rows: jnp.zeros(rows.shape[1:]), pushes)
     at = (*here, numbers.noise, numbers.nuisance, *still)
     to = (*moved, directions.noise, directions.nuisance, *pushes)
-    (end, _), (end_moved, found) = jax.vmap(lambda d: jax.jvp(run, at, d), out_axes=((None, None), 0))(to)
-    return end, end_moved, found
+    (end, _), (end_moved, slopes) = jax.vmap(lambda d: jax.jvp(run, at, d), out_axes=((None, None), 0))(to)
+    return end, end_moved, slopes
 
 
 # ---- blocks and stretches ------------------------------------------------------------------------------------------

@@ -171,9 +171,9 @@ def fit_residual(
         return nothing
     away, covariance = shrunk(told, strength, others)
     k = len(beside)
-    found, sigma = away[k:] / size, np.sqrt(np.diag(covariance))[k:] / size
+    factors, sigma = away[k:] / size, np.sqrt(np.diag(covariance))[k:] / size
     checked = [
-        _AheadErrors(each, horizon).cost(found) if horizon else _cost(each, np.concatenate([away[:k], found]))
+        _AheadErrors(each, horizon).cost(factors) if horizon else _cost(each, np.concatenate([away[:k], factors]))
         for each in likelihoods
     ]
     if not sum(checked) < sum(block.start for block in told):
@@ -181,9 +181,9 @@ def fit_residual(
     row = likelihoods[0].row
     low, high = row.bounds()
     at = np.clip(row.starts()[:k] + away[:k], low[:k], high[:k]) * row.scale[:k]
-    told_by = table.identified(np.concatenate([at, found]))
+    told_by = table.identified(np.concatenate([at, factors]))
     card = wider.card.with_values({name: value for name, value in told_by.items() if name not in names})
-    for name, value, spread in zip(names, found.tolist(), sigma.tolist(), strict=True):
+    for name, value, spread in zip(names, factors.tolist(), sigma.tolist(), strict=True):
         source = f"residual by {len(told)} blocks, ridge {strength:.3g}"
         card = card.with_values({name: value}, status="identified", sigma=spread, source=source)
     made_of, along = wider.with_card(card), (columns, _accelerations(likelihoods))
@@ -298,10 +298,10 @@ class _AheadErrors:
             errors = self.errors(np.zeros(len(likelihood.table.free)))
             self.size = np.sqrt(np.mean(errors**2, axis=0)) * self._steps.size
 
-    def errors(self, found: Array) -> Array:
+    def errors(self, factors: Array) -> Array:
         """(starts, horizons, outputs)."""
         model, piece, ahead = self._likelihood.model, self._likelihood.pieces[0], int(self._steps[-1])
-        parameters = np.array(self._likelihood.table.layout.values(self._likelihood.table.card_row, found))
+        parameters = np.array(self._likelihood.table.layout.values(self._likelihood.table.card_row, factors))
         numbers = self._run.numbers._replace(parameters=parameters)
         n = piece.time.size + ahead
         told = lengthened(self._run.commands, n), lengthened(piece.voltage, n)
@@ -310,8 +310,8 @@ class _AheadErrors:
         measured = piece.outputs[self._starts[:, None] + self._steps]
         return np.asarray((measured - np.moveaxis(predicted, 0, -1)) / self.size)
 
-    def cost(self, found: Array) -> float:
-        return 0.5 * float(np.sum(self.errors(found) ** 2))
+    def cost(self, factors: Array) -> float:
+        return 0.5 * float(np.sum(self.errors(factors) ** 2))
 
     def block(self, scaled: Array, size: Array, start: float) -> LeftOutBlock:
         here = self.errors(scaled / size)

@@ -34,9 +34,9 @@ def begun(vehicle: Vehicle, residual: LinearResidual) -> Vehicle:
     return with_residual(vehicle, counted_from(residual.vehicle))
 
 
-def begun_where_it_ended(row: Row, alone: Row, found: Array, residual: LinearResidual) -> Array:
+def begun_where_it_ended(row: Row, alone: Row, reached: Array, residual: LinearResidual) -> Array:
     """The scaled row with everything free: records and noise as found alone, physics and residual as found together."""
-    known = dict(zip(alone.names, (found * alone.scale).tolist(), strict=True))
+    known = dict(zip(alone.names, (reached * alone.scale).tolist(), strict=True))
     known |= {name: entry.value for name, entry in residual.vehicle.card.parameters.items() if name in row.names}
     return np.array([known[name] for name in row.names]) / row.scale
 

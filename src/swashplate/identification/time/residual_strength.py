@@ -67,10 +67,10 @@ def shrunk(told: Sequence[LeftOutBlock], strength: float, physics: Physics = ALO
     held = np.diag(np.concatenate([_FLOOR * np.diag(information)[:n], np.full(k - n, strength)]))
     held[:n, :n] += physics.information
     free = k if np.isfinite(strength) else n
-    found, covariance = np.zeros(k), np.zeros((k, k))
+    coefficients, covariance = np.zeros(k), np.zeros((k, k))
     covariance[:free, :free] = np.linalg.inv(information[:free, :free] + held[:free, :free])
-    found[:free] = -covariance[:free, :free] @ slope[:free]
-    return found, covariance
+    coefficients[:free] = -covariance[:free, :free] @ slope[:free]
+    return coefficients, covariance
 
 
 def chosen_strength(told: Sequence[LeftOutBlock], physics: Physics = ALONE) -> tuple[float, float, float]:
@@ -79,7 +79,7 @@ def chosen_strength(told: Sequence[LeftOutBlock], physics: Physics = ALONE) -> t
 
     def gains(strength: float) -> Array:
         learnt = [shrunk([*told[:i], *told[i + 1 :]], strength, physics)[0] for i in range(len(told))]
-        return np.array([block.gain(found) for block, found in zip(told, learnt, strict=True)])
+        return np.array([block.gain(coefficients) for block, coefficients in zip(told, learnt, strict=True)])
 
     alone = gains(np.inf) if len(physics.pull) else np.zeros(len(told))
     gained = np.array([gains(strength) - alone for strength in STRENGTHS])

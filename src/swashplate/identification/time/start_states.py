@@ -45,14 +45,14 @@ def mean_velocity(vehicle: Vehicle, record: Record) -> Array:
     value, rate = ({name: rows[:, i] for i, name in enumerate(record.output_names)} for rows in slopes(record, places))
     c, s = np.cos(value["psi"]), np.sin(value["psi"])
     ahead, right = c * rate["x"] + s * rate["y"], c * rate["y"] - s * rate["x"]
-    found = np.array([ahead.mean(), right.mean(), rate["z"].mean()])
-    if np.linalg.norm(found) < _SLOW:
+    velocity = np.array([ahead.mean(), right.mean(), rate["z"].mean()])
+    if np.linalg.norm(velocity) < _SLOW:
         return at_rest
     try:
-        trim(vehicle, speed=found[0], lateral=found[1], climb=-found[2])
+        trim(vehicle, speed=velocity[0], lateral=velocity[1], climb=-velocity[2])
     except TrimError:
         return at_rest
-    return found
+    return velocity
 
 
 def steady_flight(
@@ -102,8 +102,8 @@ def _trim_by_newton(
         step = jnp.linalg.solve(slope, value)
         return reached[0] - step * jnp.minimum(1.0, STRIDE / jnp.max(jnp.abs(step[: 2 + len(middle)]))), slope
 
-    found = jax.lax.fori_loop(0, STEPS, newton, (start, jnp.eye(start.shape[0])))
-    z, slope = jax.lax.stop_gradient(found)
+    solved = jax.lax.fori_loop(0, STEPS, newton, (start, jnp.eye(start.shape[0])))
+    z, slope = jax.lax.stop_gradient(solved)
     z = z - jnp.linalg.solve(slope, unrest(equations, z, course, row, p)[0])
     return assemble(equations, z, course)
 
@@ -240,17 +240,17 @@ def _at_rest_inside(
         return rates(jnp.concatenate([body_row, inner]), inputs, parameters, surroundings)[body:]
 
     def slope(inner: Float[jax.Array, " inner"]) -> Any:
-        found = jax.jacfwd(unrest_inside)(inner, *still)
+        jacobian = jax.jacfwd(unrest_inside)(inner, *still)
         # A governor at its stop does not move: without this the slope could not be inverted.
-        return found - NUDGE * jnp.eye(inner.shape[0])
+        return jacobian - NUDGE * jnp.eye(inner.shape[0])
 
     def newton(_: Int[jax.Array, ""], reached: tuple[Any, Any]) -> tuple[Any, Any]:
         here = slope(reached[0])
         return reached[0] - jnp.linalg.solve(here, unrest_inside(reached[0], *still)), here
 
     template = jnp.array(list(leaves(vehicle.state))[body:])
-    found = jax.lax.fori_loop(0, INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
-    inner, last = jax.lax.stop_gradient(found)
+    solved = jax.lax.fori_loop(0, INNER_STEPS, newton, (template, jnp.eye(template.shape[0])))
+    inner, last = jax.lax.stop_gradient(solved)
     inner = inner - jnp.linalg.solve(last, unrest_inside(inner, row[:body], inputs, parameters, voltage))
     return jnp.concatenate([row[:body], inner])
 

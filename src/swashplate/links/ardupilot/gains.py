@@ -83,8 +83,8 @@ def written_gains(law: ArduPilotLaw) -> Parameters:
     names += ["PSC_ACCZ_P", "PSC_ACCZ_I", "H_COL_HOVER" if single else "MOT_THST_HOVER", "INS_GYRO_FILTER"]
     if k["INS_HNTCH_ENABLE"] > 0.5:
         names += [f"INS_HNTCH_{name}" for name in ("ENABLE", "FREQ", "BW", "ATT")]
-    found = {name: k[name] for name in names}
-    return found | renamed(found) | ({"INS_HNTCH_MODE": 0.0} if k["INS_HNTCH_ENABLE"] > 0.5 else {})
+    written = {name: k[name] for name in names}
+    return written | renamed(written) | ({"INS_HNTCH_MODE": 0.0} if k["INS_HNTCH_ENABLE"] > 0.5 else {})
 
 
 def read_parameter_file(path: str | Path) -> Parameters:
@@ -97,7 +97,7 @@ def read_parameter_file(path: str | Path) -> Parameters:
         lines = read_text(path).splitlines()
     except (OSError, ValueError) as error:
         raise LinkError(f"cannot be read ({error}).", where=path) from None
-    found: Parameters = {}
+    parameters: Parameters = {}
     for number, line in enumerate(lines, 1):
         parts = line.split("#", 1)[0].replace(",", " ").split()
         if not parts:
@@ -111,7 +111,7 @@ def read_parameter_file(path: str | Path) -> Parameters:
             ) from None
         if not math.isfinite(value):
             raise LinkError(f"line {number}: {name} is no finite number.", where=path)
-        found[name] = value
-    if not found:
+        parameters[name] = value
+    if not parameters:
         raise LinkError("holds no parameter.", where=path)
-    return found
+    return parameters

@@ -51,28 +51,28 @@ def parameters(mapping: ServoMapping, vehicle: Vehicle, hover: Trim) -> Paramete
         LinkError: for a swashplate that has no number in ArduPilot.
     """
     if isinstance(mapping, CoaxialMapping):
-        found: Parameters = {"FRAME_CLASS": COAXIAL}
+        values: Parameters = {"FRAME_CLASS": COAXIAL}
         for servo in (*mapping.servos, *mapping.motors):
             if servo.channel not in _MOTORS:
                 raise LinkError(f"output {servo.channel} is none of ArduPilot's coaxial frame.", channel="--servos")
-            found |= _output(servo, _MOTORS[servo.channel])
+            values |= _output(servo, _MOTORS[servo.channel])
     elif isinstance(mapping, TwinMapping):
-        found = _dual(mapping)
+        values = _dual(mapping)
     else:
-        found = _helicopter(mapping, vehicle, hover)
-    return found | {"SIM_RATE_HZ": 1200, "RNGFND1_TYPE": 100, "RPM1_TYPE": 10}
+        values = _helicopter(mapping, vehicle, hover)
+    return values | {"SIM_RATE_HZ": 1200, "RNGFND1_TYPE": 100, "RPM1_TYPE": 10}
 
 
-def parameter_file(found: Parameters, *, title: str) -> str:
+def parameter_file(values: Parameters, *, title: str) -> str:
     """The text of a file that SITL (`--defaults`, `--add-param-file`) and ground stations load."""
-    base = " and ".join(BASES[int(found["FRAME_CLASS"])])
+    base = " and ".join(BASES[int(values["FRAME_CLASS"])])
     head = f"# {' '.join(title.split())}: on top of ArduPilot's {base}, written by swash link ardupilot\n"
-    return head + "".join(f"{name},{_digits(value)}\n" for name, value in found.items())
+    return head + "".join(f"{name},{_digits(value)}\n" for name, value in values.items())
 
 
-def as_written(found: Mapping[str, float]) -> Parameters:
+def as_written(values: Mapping[str, float]) -> Parameters:
     """The numbers that an autopilot has after it has read them from a file."""
-    return {name: float(_digits(value)) for name, value in found.items()}
+    return {name: float(_digits(value)) for name, value in values.items()}
 
 
 def _digits(value: float) -> str:

@@ -180,11 +180,11 @@ def _check_free(kind: socket.SocketKind, port: int) -> None:
 
 
 def _runnable(binary: Path) -> Path:
-    found = binary.expanduser().absolute()
-    if not found.exists():
+    path = binary.expanduser().absolute()
+    if not path.exists():
         raise LinkError("there is no such file.", where=binary, channel="BINARY")
-    if not found.is_file():
+    if not path.is_file():
         raise LinkError("is no file, expected ArduCopter's SITL binary.", where=binary, channel="BINARY")
-    if not os.access(found, os.X_OK):
+    if not os.access(path, os.X_OK):
         raise LinkError("is not executable.", where=binary, channel="BINARY", hint=f"chmod +x {binary}")
-    return found
+    return path

@@ -189,8 +189,8 @@ class Trial:
             health.refusals.clear()
             self.autopilot.ask_readiness(interval=0.5)
 
-        found = self._asked(ask, lambda: health.ready is True and health.placed is True, longest=self.plan.ekf)
-        if not found:
+        ready = self._asked(ask, lambda: health.ready is True and health.placed is True, longest=self.plan.ekf)
+        if not ready:
             if not (health.refusals or last):  # simulated seconds can be over before a first answer is heard
                 ask()
                 until = time.monotonic() + _ANSWERED
@@ -252,10 +252,10 @@ class Trial:
         rows = np.array(self.pilot.seen[first:])
         place, height, lean = strayed(rows)
         held = height if hands == "height let go" else max(place, height)
-        found = f"place {place:.2f} m, height {height:.2f} m, lean {math.degrees(lean):.1f} deg"
+        motion = f"place {place:.2f} m, height {height:.2f} m, lean {math.degrees(lean):.1f} deg"
         what = "height" if hands == "height let go" else "place and height"
-        if not self._tell(f"hover in {name}", found, f"{what} within {limit:g} m", held <= limit) and held > 10.0:
-            raise TrialEndedError(f"hover in {name}: {found}.")
+        if not self._tell(f"hover in {name}", motion, f"{what} within {limit:g} m", held <= limit) and held > 10.0:
+            raise TrialEndedError(f"hover in {name}: {motion}.")
 
     def sweep(self, axis: str, chirp: Chirp) -> None:
         """From STABILIZE into System ID and back."""
@@ -303,8 +303,8 @@ class Trial:
             self.pause(2.0)
         now = self.pilot.seen[-1]
         lean = math.degrees(math.hypot(now.roll, now.pitch))
-        found = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if down else 'still armed'}"
-        self._tell("landing", found, "on the ground, upright, disarmed", down and abs(now.down) < 0.1 and lean < 10.0)
+        landed = f"{abs(now.down):.2f} m high, {lean:.1f} deg, {'disarmed' if down else 'still armed'}"
+        self._tell("landing", landed, "on the ground, upright, disarmed", down and abs(now.down) < 0.1 and lean < 10.0)
 
 
 def strayed(rows: Array) -> tuple[float, float, float]:

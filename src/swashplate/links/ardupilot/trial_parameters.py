@@ -22,18 +22,18 @@ def trial_parameters(vehicle: Parameters, chirp: Chirp) -> Parameters:
         vehicle: its own parameters, from `parameters`.
         chirp: any of the sweeps; SID_ parameters are hidden until SID_AXIS is set.
     """
-    found: Parameters = {f"FLTMODE{n}": 0.0 for n in range(1, 7)}  # modes come over MAVLink, whatever channel 5 says
+    values: Parameters = {f"FLTMODE{n}": 0.0 for n in range(1, 7)}  # modes come over MAVLink, whatever channel 5 says
     for n in _CHANNELS:
-        found |= {f"RC{n}_MIN": 1000.0, f"RC{n}_TRIM": 1000.0 if n == 3 else 1500.0, f"RC{n}_MAX": 2000.0}
-    found |= {"RC1_DZ": 0.0, "RC2_DZ": 0.0}  # the pilot here makes small corrections
+        values |= {f"RC{n}_MIN": 1000.0, f"RC{n}_TRIM": 1000.0 if n == 3 else 1500.0, f"RC{n}_MAX": 2000.0}
+    values |= {"RC1_DZ": 0.0, "RC2_DZ": 0.0}  # the pilot here makes small corrections
     for name, offsets in _MAGNETOMETERS.items():
-        found |= {f"COMPASS_OFS{name}_{axis}": value for axis, value in zip("XYZ", offsets, strict=True)}
+        values |= {f"COMPASS_OFS{name}_{axis}": value for axis, value in zip("XYZ", offsets, strict=True)}
     for unit in ("", "2"):  # not exactly those of a sensor that was never calibrated
         for axis in "XYZ":
-            found |= {f"INS_ACC{unit}OFFS_{axis}": 0.001, f"INS_ACC{unit}SCAL_{axis}": 1.001}
-    found |= {"BATT_MONITOR": 4.0}
+            values |= {f"INS_ACC{unit}OFFS_{axis}": 0.001, f"INS_ACC{unit}SCAL_{axis}": 1.001}
+    values |= {"BATT_MONITOR": 4.0}
     if vehicle["FRAME_CLASS"] in (SINGLE_ROTOR, DUAL):
         for axis, (target, error, most) in _FILTERS.items():
             name = f"ATC_RAT_{axis}"
-            found |= {f"{name}_FLTT": target, f"{name}_FLTE": error, f"{name}_FLTD": 0.0, f"{name}_IMAX": most}
-    return found | chirp.parameters()
+            values |= {f"{name}_FLTT": target, f"{name}_FLTE": error, f"{name}_FLTD": 0.0, f"{name}_IMAX": most}
+    return values | chirp.parameters()

@@ -118,8 +118,8 @@ class Flying:
 
     def observe(self, x: Array, k: NDArray[np.int64]) -> NDArray[np.float32]:
         """Observations of states (n, n_states) at steps (n,)."""
-        found = np.asarray(_observed(jnp.asarray(x), jnp.asarray(self.table)[k], self._angles))
-        return self._with_inner(found, x)
+        observed = np.asarray(_observed(jnp.asarray(x), jnp.asarray(self.table)[k], self._angles))
+        return self._with_inner(observed, x)
 
     def _with_inner(self, body: Array, x: Array) -> NDArray[np.float32]:
         if self.inner:
@@ -131,7 +131,7 @@ class Flying:
         self, x: Array, k: NDArray[np.int64], actions: NDArray[Any], p: Array
     ) -> tuple[Array, NDArray[np.float32], Array, NDArray[np.bool_]]:
         """States, observations, rewards and whether the limits were left, one step later, for n vehicles at once."""
-        found = _advance(
+        arrays = _advance(
             equations_of(self.vehicle),
             self.substeps,
             self.free,
@@ -150,7 +150,7 @@ class Flying:
                 "dt": self.dt,
             },
         )
-        states, observations, rewards, lost = (np.asarray(part) for part in found)
+        states, observations, rewards, lost = (np.asarray(part) for part in arrays)
         return states, self._with_inner(observations, states), rewards, lost
 
     @property

@@ -63,12 +63,12 @@ def trajectory(*, duration: float = 20.0, size: float = 2.0, period: float = 12.
     turning = 2.0 * np.pi / period
 
     def targets(time: Array) -> Array:
-        found = np.zeros((time.size, len(TARGET)))
+        rows = np.zeros((time.size, len(TARGET)))
         phase = turning * (time - 1.0 + np.exp(-time))  # the first second or so speeds up
         speed = turning * (1.0 - np.exp(-time))
-        found[:, 0], found[:, 3] = size * np.sin(phase), size * np.cos(phase) * speed
-        found[:, 1], found[:, 4] = 0.5 * size * np.sin(2.0 * phase), size * np.cos(2.0 * phase) * speed
-        return found
+        rows[:, 0], rows[:, 3] = size * np.sin(phase), size * np.cos(phase) * speed
+        rows[:, 1], rows[:, 4] = 0.5 * size * np.sin(2.0 * phase), size * np.cos(2.0 * phase) * speed
+        return rows
 
     return Task("trajectory", duration, targets, (1.0, 0.5, 2.0, np.inf, 0.5))
 
@@ -88,9 +88,9 @@ def sweep(
     maneuver = Maneuver("sweep", (axis,), duration, amplitude, (low, high))
 
     def targets(time: Array) -> Array:
-        found = np.zeros((time.size, len(TARGET)))
-        found[:, TARGET.index(axis)] = maneuver.signals(time)[axis]
-        return found
+        rows = np.zeros((time.size, len(TARGET)))
+        rows[:, TARGET.index(axis)] = maneuver.signals(time)[axis]
+        return rows
 
     return Task("sweep", duration, targets, (np.inf, 0.5, np.inf, 0.05, 0.5), level_limit=100.0)
 

@@ -112,9 +112,9 @@ def _soon_decoupled(moved: Array, vehicle: Vehicle) -> Array:
 def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:
     """Inputs by axis: those whose names say it, otherwise those that move the axes most."""
     names = vehicle.input_names
-    found: dict[str, Mapping[str, float]] = dict(vehicle.stick_axes)
+    by_axis: dict[str, Mapping[str, float]] = dict(vehicle.stick_axes)
     excited = {axis: axis for axis in STICKS}
-    if not set(STICKS) <= set(found):
+    if not set(STICKS) <= set(by_axis):
         if len(names) < len(STICKS):
             raise SwashError(
                 f"has the inputs {', '.join(names)}: too few for four sticks.",
@@ -126,5 +126,5 @@ def _directions(vehicle: Vehicle, soon: Array) -> tuple[Array, dict[str, str]]:
         strength = strength / np.maximum(np.max(strength, axis=1, keepdims=True), 1e-300)
         _, columns = linear_sum_assignment(strength, maximize=True)
         excited = {axis: names[column] for axis, column in zip(STICKS, columns, strict=True)}
-        found = {axis: {name: 1.0} for axis, name in excited.items()}
-    return np.array([[found[axis].get(name, 0.0) for axis in STICKS] for name in names]), excited
+        by_axis = {axis: {name: 1.0} for axis, name in excited.items()}
+    return np.array([[by_axis[axis].get(name, 0.0) for axis in STICKS] for name in names]), excited

@@ -236,13 +236,13 @@ def _leans(model: LinearModel, feedback: Array) -> tuple[float, float] | None:
     Speed is free, and its moments take a part of what is asked for. None where the hold without its feedback of speed
     hardly keeps an attitude: of an aircraft whose bar does (the coaxial structure), with the cyclic by hand.
     """
-    n, found = len(model.states), []
+    n, kept = len(model.states), []
     for name in ("phi", "theta"):
         k = model.states.index(name)
         held = np.zeros((n + 1, n + 1))
         held[:n, :n], held[:n, n] = model.A - model.B @ feedback, model.B @ feedback[:, k]
-        found.append(float(expm(held * _SOON)[k, n]))
-    return None if min(found) < _LEAST_KEPT else (LEAN / min(1.0, found[0]), LEAN / min(1.0, found[1]))
+        kept.append(float(expm(held * _SOON)[k, n]))
+    return None if min(kept) < _LEAST_KEPT else (LEAN / min(1.0, kept[0]), LEAN / min(1.0, kept[1]))
 
 
 _LEAST_KEPT = 0.4

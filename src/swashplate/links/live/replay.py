@@ -78,11 +78,11 @@ def drawn_as(flight: Flight, model: Vehicle | None) -> Vehicle:
         return model
     for name in (flight.provenance.vehicle, USUAL, HELICOPTER):
         try:
-            found = named_vehicle(name)
+            packaged = named_vehicle(name)
         except SwashError:
             continue
-        if all(entry in flight for entry in found.input_names):
-            return found
+        if all(entry in flight for entry in packaged.input_names):
+            return packaged
     raise FlightError(
         f"names no vehicle that is known, and its inputs fit none: {', '.join(flight.channels)}.",
         where=flight.provenance.source,
@@ -222,7 +222,7 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
     first start and between pieces. Delays, trims and lever arm are what the log tells the first."""
     model = models[0]
     noise, prior = observer_of(model)
-    found, begun = np.full((len(models), time.size, len(PREDICTED)), np.nan), np.full(time.size, np.nan)
+    states, begun = np.full((len(models), time.size, len(PREDICTED)), np.nan), np.full(time.size, np.nan)
     longest = 0.0
     for piece in records(flight, model):
         length = float(piece.time[-1] - piece.time[0])
@@ -235,7 +235,7 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
         nearest = np.clip(np.searchsorted(piece.time, time[inside] - 1e-6), 0, piece.time.size - 1)
         # The prediction is of the centre of gravity; the log shows the tracked point.
         carried = flight_at(flight, piece.time) - measured_states(piece, nuisance)
-        for one, own in zip(models, found, strict=True):
+        for one, own in zip(models, states, strict=True):
             made = predict(one, piece, noise=noise, nuisance=nuisance, horizon=ahead, every=ahead, settling=settling)
             rows = np.full((piece.time.size, len(PREDICTED)), np.nan)
             start = made.starts[0]
@@ -244,13 +244,13 @@ def _predicted(flight: Flight, models: Sequence[Vehicle], ahead: float, time: Ar
             own[inside] = (rows + carried)[nearest]
         place = np.searchsorted(made.starts, nearest) - 1  # a start itself belongs to the prediction before it
         begun[inside] = np.where(place >= 0, piece.time[made.starts[place]], np.nan)
-    if not np.any(np.isfinite(found)):
+    if not np.any(np.isfinite(states)):
         raise FlightError(
             f"the longest unbroken piece has {longest:.1f} s, expected at least {SHORTEST_CALIBRATION + 1:g} s for a "
             "prediction.",
             where=flight.provenance.source,
         )
-    return found, begun
+    return states, begun
 
 
 def _flown(
@@ -266,7 +266,7 @@ def _flown(
     waits = (late.get(name, 0.0) for name in model.input_names)
     inputs = np.stack([np.interp(time - d, time, u) for d, u in zip(waits, inputs.T, strict=True)], axis=1)
     step = float(np.median(np.diff(time)))
-    length, found = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
+    length, predicted = max(2, round(ahead / step)), np.full((time.size, len(PREDICTED)), np.nan)
     begun = np.full(time.size, np.nan)
     for first in range(0, time.size - length, length):
         part = slice(first, first + length + 1)
@@ -283,9 +283,9 @@ def _flown(
             )
         except DivergenceError:
             continue  # where the model leaves what it is good for, nothing is shown
-        found[first + 1 : first + length + 1] = flown.array(PREDICTED)[1:]
+        predicted[first + 1 : first + length + 1] = flown.array(PREDICTED)[1:]
         begun[first + 1 : first + length + 1] = time[first]
-    return found, begun
+    return predicted, begun
 
 
 def flight_at(flight: Flight, time: Array) -> Array:

@@ -28,36 +28,36 @@ def helicopter(picture: dict[str, Any], x: Array, parts: dict[str, Any], *, time
     top = min([hub[2] for hub in hubs] + ([picture["bar"]["hub"][2]] if picture["bar"] else []))
     skids = picture["skids"]
     length, width, depth = skids["length"], skids["width"], skids["depth"]
-    found: list[tuple[str, Any]] = [("body", [[0, 0, 0], [hubs[0][0], hubs[0][1], top]])]
+    lines: list[tuple[str, Any]] = [("body", [[0, 0, 0], [hubs[0][0], hubs[0][1], top]])]
     for side in (-width, width):
-        found.append(("body", [[-length, side, depth], [length, side, depth]]))
-        found += [("body", [[end, 0.2 * side, 0.1 * R], [end, side, depth]]) for end in (-0.5 * length, 0.5 * length)]
+        lines.append(("body", [[-length, side, depth], [length, side, depth]]))
+        lines += [("body", [[end, 0.2 * side, 0.1 * R], [end, side, depth]]) for end in (-0.5 * length, 0.5 * length)]
     ring = np.stack([0.5 * R * np.cos(_TURN), 0.0 * _TURN, 0.22 * R * np.sin(_TURN)], axis=1)
-    found += [("body", ring), ("body", ring[:, [0, 2, 1]] * [1.0, 0.75, 1.0])]
+    lines += [("body", ring), ("body", ring[:, [0, 2, 1]] * [1.0, 0.75, 1.0])]
     for rotor, told in zip(picture["rotors"], parts["rotors"], strict=True):
         alpha, beta, omega, *force = told
         turn = Rotation.from_euler("y", -rotor["tilt"]) * Rotation.from_euler("XYZ", [alpha, beta, 0.0])
         circle = np.stack([np.cos(_TURN), np.sin(_TURN), 0.0 * _TURN], axis=1) * rotor["radius"]
-        found.append(("disc", turn.apply(circle) + rotor["hub"]))
+        lines.append(("disc", turn.apply(circle) + rotor["hub"]))
         phase = rotor["sense"] * omega * time
         for k in range(rotor["blades"]):
             angle = phase + 2.0 * np.pi * k / rotor["blades"]
             tip = rotor["radius"] * np.array([np.cos(angle), np.sin(angle), 0.0])
-            found.append(("blade", np.array([np.zeros(3), turn.apply(tip)]) + rotor["hub"]))
-        found.append(("thrust", np.array([np.zeros(3), per * np.array(force)]) + rotor["hub"]))
+            lines.append(("blade", np.array([np.zeros(3), turn.apply(tip)]) + rotor["hub"]))
+        lines.append(("thrust", np.array([np.zeros(3), per * np.array(force)]) + rotor["hub"]))
     if picture["bar"] and parts["bar"]:
         turn = Rotation.from_euler("XYZ", [*parts["bar"], 0.0])
         angle = picture["rotors"][0]["sense"] * parts["rotors"][0][2] * time + 0.5 * np.pi
         end = picture["bar"]["radius"] * np.array([np.cos(angle), np.sin(angle), 0.0])
-        found.append(("bar", turn.apply(np.array([-end, end])) + picture["bar"]["hub"]))
+        lines.append(("bar", turn.apply(np.array([-end, end])) + picture["bar"]["hub"]))
     if picture["tail"]:
         hub, radius = np.array(picture["tail"]["hub"]), picture["tail"]["radius"]
-        found.append(("body", [[-0.3 * R, 0.0, -0.05 * R], hub]))
-        found.append(("tail", np.stack([radius * np.cos(_TURN), 0.0 * _TURN, radius * np.sin(_TURN)], axis=1) + hub))
+        lines.append(("body", [[-0.3 * R, 0.0, -0.05 * R], hub]))
+        lines.append(("tail", np.stack([radius * np.cos(_TURN), 0.0 * _TURN, radius * np.sin(_TURN)], axis=1) + hub))
         if parts["tail"]:
-            found.append(("thrust", [hub, hub + np.array([0.0, 3.0 * per * parts["tail"][1], 0.0])]))
+            lines.append(("thrust", [hub, hub + np.array([0.0, 3.0 * per * parts["tail"][1], 0.0])]))
     attitude = Rotation.from_euler("ZYX", [x[8], x[7], x[6]])
-    return [(kind, attitude.apply(np.asarray(points, dtype=np.float64)) + x[:3]) for kind, points in found]
+    return [(kind, attitude.apply(np.asarray(points, dtype=np.float64)) + x[:3]) for kind, points in lines]
 
 
 def ground(center: Array, cell: float, *, floor: float = 0.0, cells: int = 12) -> Lines:

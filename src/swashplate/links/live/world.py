@@ -239,7 +239,7 @@ class World:
         flying = [(craft, self._p, self.setting.decoupled != (name == "ghost")) for name, craft in self._crafts.items()]
         flying += [(c, p, self.setting.decoupled) for c, p in zip(self._fan, self._drawn, strict=True) if c is not None]
         for craft, p, decoupled in flying:
-            found = advance(
+            arrays = advance(
                 self._equations,
                 self.pilot.step,
                 self._substeps,
@@ -256,7 +256,7 @@ class World:
                 self._limits,
                 1.0 / self._rate,
             )
-            row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in found)
+            row, craft.past, craft.memory, craft.inputs = (np.asarray(part) for part in arrays)
             craft.x = row if self._linear else to_euler(row, craft.x)
         self._fan = [None if c is None or self._lost(c.x) else c for c in self._fan]
         own = self._crafts["own"]
@@ -347,7 +347,7 @@ class World:
     def doubts(self) -> tuple[str, ...]:
         """What the flight is not that the pilot may take it for, now: a place that is not held, a speed or a state
         beyond what the vehicle holds for, in sentences."""
-        own, found = self._crafts["own"], []
+        own, remarks = self._crafts["own"], []
         off = float(np.hypot(*(own.x[:2] - self._target[:2])))
         if self.setting.mode == "position" and off > _HELD_WITHIN:
             ends = [
@@ -360,11 +360,11 @@ class World:
             why = f": {', '.join(ends)} at the limit" if ends else ""
             if not ends and any(self.setting.wind):
                 why = ": the controller leans no more than it may, which is too little against this wind"
-            found.append(f"The place is not held, it is {off:.0f} m away{why}.")
+            remarks.append(f"The place is not held, it is {off:.0f} m away{why}.")
         if np.all(np.isfinite(own.x)):
             said = doubts(self.vehicle, own.x, own.inputs, self.environment())
-            found += [f"{words[:1].upper()}{words[1:]}." for words in said]
-        return tuple(found)
+            remarks += [f"{words[:1].upper()}{words[1:]}." for words in said]
+        return tuple(remarks)
 
     def environment(self) -> Environment:
         """The surroundings as the sliders have them, without gusts."""

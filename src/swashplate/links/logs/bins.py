@@ -58,13 +58,13 @@ def extremes(values: Array, bins: int) -> NDArray[np.int64]:
         low = np.where(finite, table, np.inf).argmin(axis=1)
         high = np.where(finite, table, -np.inf).argmax(axis=1)
     begin = np.arange(0, whole, size)
-    found = [begin + low, begin + high]
+    indices = [begin + low, begin + high]
     if whole < n:
         rest = values[whole:]
         finite_rest = np.isfinite(rest)
-        found.append(whole + np.array([np.argmin(np.where(finite_rest, rest, np.inf))]))
-        found.append(whole + np.array([np.argmax(np.where(finite_rest, rest, -np.inf))]))
-    return np.unique(np.concatenate(found))
+        indices.append(whole + np.array([np.argmin(np.where(finite_rest, rest, np.inf))]))
+        indices.append(whole + np.array([np.argmax(np.where(finite_rest, rest, -np.inf))]))
+    return np.unique(np.concatenate(indices))
 
 
 def trace(

@@ -80,10 +80,10 @@ class Desk:
             SwashError: where there is none.
         """
         with self._lock:
-            found = self._logs.get(number)
-        if found is None:
+            opened = self._logs.get(number)
+        if opened is None:
             raise SwashError(f"log {number} is not open.", hint="Open it again.")
-        return found
+        return opened
 
     def drop(self, number: int) -> None:
         """Take a log off the page."""
@@ -144,11 +144,11 @@ class Desk:
             SwashError: where the two share no motion, or what they share does not match.
         """
         one, other = self.log(first), self.log(second)
-        found = synchronise(one.ready, other.ready)
+        shift = synchronise(one.ready, other.ready)
         middle = 0.5 * (other.ready.start + other.ready.stop)
         return {
-            "offset": float(found.offset + found.drift * middle),
-            "words": str(found),
+            "offset": float(shift.offset + shift.drift * middle),
+            "words": str(shift),
             "code": code_lines.aligned(one.read, other.read).as_dict(),
         }
 
@@ -160,17 +160,17 @@ class Desk:
             SwashError: no such log or sweep, no channels for it, or another identification is running.
         """
         opened = self.log(number)
-        flight, found = opened.ready, opened.inspection
-        if found is None:
+        flight, inspection = opened.ready, opened.inspection
+        if inspection is None:
             raise SwashError("is still being checked.", where=opened.read.file, hint="Wait until its findings stand.")
-        if not sweep < len(found.sweeps):
+        if not sweep < len(inspection.sweeps):
             raise SwashError(f"has no sweep {sweep + 1}.", where=opened.read.file)
-        chosen = channels_of(flight, found.sweeps[sweep], input=input, output=output)
+        chosen = channels_of(flight, inspection.sweeps[sweep], input=input, output=output)
         with self._lock:
             others = [log for log in self._logs.values() if log is not opened and log.state == READY]
 
         def work(folder: Path, tell: Tell) -> Identified:
-            return identify_sweep(opened, found.sweeps[sweep], chosen, others=others, folder=folder, tell=tell)
+            return identify_sweep(opened, inspection.sweeps[sweep], chosen, others=others, folder=folder, tell=tell)
 
         return {"number": self.job.start(work), "channels": chosen._asdict()}
 

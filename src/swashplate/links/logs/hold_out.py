@@ -48,14 +48,14 @@ def hold_out(opened: Opened, sweep: Sweep, input: str, output: str, others: Sequ
     for other in others:
         apart = other.flight is not None and other.flight.provenance.sha256 != flight.provenance.sha256
         if apart and other.flight is not None and input in other.flight and output in other.flight:
-            found = _longest(other.flight, input, output, [], _MOVES * spread)
-            if found:
-                words = f"another log, {other.read.file}, {found[0]:.1f} to {found[1]:.1f} s"
-                return Part(other.read, *found, words, True, other.flight)
-    found = _longest(flight, input, output, [(begin, end)], _MOVES * spread)
-    if found:
-        words = f"another part of the log, {found[0]:.1f} to {found[1]:.1f} s"
-        return Part(opened.read, *found, words, True, flight)
+            stretch = _longest(other.flight, input, output, [], _MOVES * spread)
+            if stretch:
+                words = f"another log, {other.read.file}, {stretch[0]:.1f} to {stretch[1]:.1f} s"
+                return Part(other.read, *stretch, words, True, other.flight)
+    stretch = _longest(flight, input, output, [(begin, end)], _MOVES * spread)
+    if stretch:
+        words = f"another part of the log, {stretch[0]:.1f} to {stretch[1]:.1f} s"
+        return Part(opened.read, *stretch, words, True, flight)
     words = (
         "the sweep itself, which the fit has seen: this is NO verification. The log holds no other part in which "
         f"{input} moves for {_SHORTEST:g} s; open a second log, and it is used."
@@ -81,13 +81,13 @@ def _longest(
     low = max(float(flight.time(name)[0]) for name in (input, output))
     high = min(float(flight.time(name)[-1]) for name in (input, output))
     rising = sorted(float(edge) for edge in edges if low <= edge <= high)
-    found = []
+    stretches = []
     for start, stop in pairwise(rising):
         free = not any(start < end and begin < stop for begin, end in taken)
         whole = all(_whole(flight.time(name), start, stop) for name in (input, output))
         if stop - start >= _SHORTEST and free and whole and _spread(flight, input, start, stop) > least:
-            found.append((round(start + 0.001, 3), round(stop - 0.001, 3)))
-    return max(found, key=lambda pair: pair[1] - pair[0], default=None)
+            stretches.append((round(start + 0.001, 3), round(stop - 0.001, 3)))
+    return max(stretches, key=lambda pair: pair[1] - pair[0], default=None)
 
 
 def _whole(time: Array, start: float, stop: float) -> bool:

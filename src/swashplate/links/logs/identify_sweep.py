@@ -104,12 +104,12 @@ def identify_sweep(
 def _study(responses: Any, chosen: Channels, unseen: Flight, say: Callable[..., None]) -> tuple[Any, str]:
     """The fit with its verification and gains, and why there are no gains where there are none."""
     fit_tf = resolve("fit_tf")
-    found = fit_tf(responses, input=chosen.input, say=say)
-    form = str(found.material.transfer_functions[0].details.form.text)
-    held = (unseen,) if found.structure is not None else ()
+    study = fit_tf(responses, input=chosen.input, say=say)
+    form = str(study.material.transfer_functions[0].details.form.text)
+    held = (unseen,) if study.structure is not None else ()
     words, gains = "", True
     try:
-        resolve("suggest_gains")(found.fit, responses)
+        resolve("suggest_gains")(study.fit, responses)
     except SwashError as error:
         words, gains = f"{error.problem} {error.hint or ''}", False
     # Once more with the form that was chosen: the same fit, with what is asked of it.
@@ -162,21 +162,21 @@ def _fit(study: Any) -> dict[str, Any]:
 
 
 def _verified(study: Any, chosen: Channels, seen: Part) -> dict[str, Any] | None:
-    found = study.verification
-    if found is None:
+    verification = study.verification
+    if verification is None:
         return None
     factor, k = channel(chosen.output).shown_factor, 0
-    time = np.concatenate([trace.time for trace in found.traces])
+    time = np.concatenate([trace.time for trace in verification.traces])
     return {
         "on": seen.words,
         "unseen": seen.unseen,
-        "headline": list(found.headline),
-        "warnings": list(found.warnings),
-        "verdict": found.verdict if seen.unseen else "not a verification",
+        "headline": list(verification.headline),
+        "warnings": list(verification.warnings),
+        "verdict": verification.verdict if seen.unseen else "not a verification",
         "unit": channel(chosen.output).shown_unit,
         "time": time,
-        "flight": factor * np.concatenate([trace.flight[:, k] for trace in found.traces]),
-        "model": factor * np.concatenate([trace.model[:, k] for trace in found.traces]),
+        "flight": factor * np.concatenate([trace.flight[:, k] for trace in verification.traces]),
+        "model": factor * np.concatenate([trace.model[:, k] for trace in verification.traces]),
     }
 
 
@@ -195,13 +195,13 @@ def _gains(suggestion: Any) -> dict[str, Any]:
         ("after", "suggested", suggestion.figures_suggested),
     ):
         if which in steps:
-            found = steps[which]
+            answer = steps[which]
             answers[label] = {
-                "time": found.time,
-                "step": found.step,
-                "disturbance": np.degrees(found.disturbance),
-                "stable": found.stable,
-                "overshoot": found.overshoot,
+                "time": answer.time,
+                "step": answer.step,
+                "disturbance": np.degrees(answer.disturbance),
+                "stable": answer.stable,
+                "overshoot": answer.overshoot,
                 "phase_margin": _margin(figures.margins.phase_margin),
                 "gain_margin": _margin(figures.margins.gain_margin),
                 "delay_margin": [1e3 * number for number in _margin(figures.margins.delay_margin)],

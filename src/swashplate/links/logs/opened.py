@@ -152,7 +152,7 @@ class Opened:
 
     @property
     def _content(self) -> dict[str, Any]:
-        flight, found = self.ready, self.inspection
+        flight, look = self.ready, self.inspection
         origin = flight.provenance
         changes = [e for e in origin.events if e.kind == "parameter"]
         return {
@@ -164,10 +164,10 @@ class Opened:
             "simulated": origin.simulated,
             "options": self.read.options.words,
             "groups": self._groups,
-            "checked": found is not None,
-            "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(found.sweeps if found else ())],
-            "problems": [_with_remedy(text) for text in (found.problems if found else ())],
-            "notes": list(found.notes if found else origin.notes),
+            "checked": look is not None,
+            "sweeps": [{"number": i, **vars(s), "words": str(s)} for i, s in enumerate(look.sweeps if look else ())],
+            "problems": [_with_remedy(text) for text in (look.problems if look else ())],
+            "notes": list(look.notes if look else origin.notes),
             "modes": _modes(flight),
             "events": [
                 {"time": e.time, "kind": e.kind, "text": e.text} for e in origin.events if e.kind != "parameter"

@@ -36,10 +36,10 @@ class Remedy:
 
 def remedy(text: str) -> Remedy | None:
     """What a message says would mend it; None where it names no option of a reading."""
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for match in _UNIT.finditer(text):
         unit = match["unit"].rstrip(".")
         for name in (match["name"], *re.findall(r"\w+", match["more"] or "")):
-            found[name] = unit
+            units[name] = unit
     drop = _DROP in text
-    return Remedy(found, drop) if found or drop else None
+    return Remedy(units, drop) if units or drop else None

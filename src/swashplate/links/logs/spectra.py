@@ -23,7 +23,7 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
         FlightError: where the log lacks the channel, or has too few samples there.
     """
     flight = opened.ready
-    found = spectrum(flight, channel, start=start, stop=stop)
+    measured = spectrum(flight, channel, start=start, stop=stop)
     over = spectrogram(flight, channel, start=start, stop=stop, frames=_COLUMNS)
     picture = _pooled(over.density, _ROWS, _COLUMNS)
     level = 10.0 * np.log10(np.maximum(picture, np.finfo(np.float64).tiny))
@@ -46,10 +46,10 @@ def spectra(opened: Opened, channel: str, start: float, stop: float) -> dict[str
         rotor = {"channel": "", "speed": None, "words": f"{error.problem} {error.hint or ''}", "harmonics": []}
     return {
         "channel": channel,
-        "unit": found.unit,
-        "words": str(found),
-        "frequency": found.frequency[1:],
-        "density": np.maximum(found.density[1:], np.finfo(np.float64).tiny),
+        "unit": measured.unit,
+        "words": str(measured),
+        "frequency": measured.frequency[1:],
+        "density": np.maximum(measured.density[1:], np.finfo(np.float64).tiny),
         "picture": {
             "time": [float(over.time[0]), float(over.time[-1])],
             "frequency": [float(over.frequency[0]), float(over.frequency[-1])],

@@ -53,15 +53,15 @@ def compared(expected: Mapping[str, float], reading: ParameterReading) -> tuple[
 
 
 def _compared(name: str, expected: float, reading: ParameterReading) -> ComparedParameter:
-    found = reading.values.get(name)
+    value = reading.values.get(name)
     verdict: Verdict
-    if found is None:
+    if value is None:
         verdict = "absent" if reading.complete else "not read"
-    elif math.isclose(found, expected, rel_tol=_DIGITS, abs_tol=1e-6):
+    elif math.isclose(value, expected, rel_tol=_DIGITS, abs_tol=1e-6):
         verdict = "right"
     else:
         verdict = "yours" if name.startswith(_YOURS) else "wrong"
-    return ComparedParameter(name, expected, found, verdict)
+    return ComparedParameter(name, expected, value, verdict)
 
 
 def rate_problems(values: Mapping[str, float]) -> list[str]:

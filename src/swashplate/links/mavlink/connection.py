@@ -99,10 +99,10 @@ class Connection:
 
 
 def _opened(address: str, timeout: float) -> tuple[socket.socket, bool]:
-    found = _ADDRESS.fullmatch(address)
-    if found is None or int(found[3]) > 65_535:
+    match = _ADDRESS.fullmatch(address)
+    if match is None or int(match[3]) > 65_535:
         raise LinkError(f"'{address}' is no address, expected tcp:HOST:PORT or udp:HOST:PORT.", channel=_CHANNEL)
-    kind, host, port = found[1], found[2], int(found[3])
+    kind, host, port = match[1], match[2], int(match[3])
     if kind == "udp":
         try:
             return listen_udp(host, port), False

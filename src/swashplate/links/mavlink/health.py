@@ -108,15 +108,15 @@ class Health:
 
 def listen_to_health(connection: Connection, *, duration: float) -> Health:
     """Ask for the checks before arming, and listen for so long [s]."""
-    found = Health()
+    health = Health()
     for number in (_SYS_STATUS, _SYSTEM_TIME):
         _command(connection, _SET_MESSAGE_INTERVAL, number, _INTERVAL)
     _command(connection, _RUN_PREARM_CHECKS)
     until = time.monotonic() + duration
     while (left := until - time.monotonic()) > 0.0:
         for now, message in connection.receive(min(left, 0.2)):
-            found.take(now, message)
-    return found
+            health.take(now, message)
+    return health
 
 
 def _command(connection: Connection, number: int, *values: float) -> None:

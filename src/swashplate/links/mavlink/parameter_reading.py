@@ -82,39 +82,39 @@ def read_parameters(connection: Connection, *, packed: bool) -> ParameterReading
     Raises:
         LinkError: where none comes at all, or the connection breaks.
     """
-    found = ParameterReading()
+    reading = ParameterReading()
     connection.send("param_request_list", connection.system, AUTOPILOT)
     start = last = time.monotonic()
     vain = 0
-    while vain < ROUNDS and not found.complete and time.monotonic() - start < _LONGEST:
+    while vain < ROUNDS and not reading.complete and time.monotonic() - start < _LONGEST:
         for now, message in connection.receive(_SILENCE / 4.0):
-            if message.get_type() == "PARAM_VALUE" and found.take(message, packed=packed):
+            if message.get_type() == "PARAM_VALUE" and reading.take(message, packed=packed):
                 last, vain = now, 0
-        if time.monotonic() - last >= _SILENCE and not found.complete:
+        if time.monotonic() - last >= _SILENCE and not reading.complete:
             vain += 1
             last = time.monotonic()
-            _ask_again(connection, found)
-    if not found.values:
+            _ask_again(connection, reading)
+    if not reading.values:
         raise LinkError("the autopilot is there, but sends no parameters.", where=connection.address)
-    return found
+    return reading
 
 
-def _ask_again(connection: Connection, found: ParameterReading) -> None:
-    if not found.count:
+def _ask_again(connection: Connection, reading: ParameterReading) -> None:
+    if not reading.count:
         connection.send("param_request_list", connection.system, AUTOPILOT)
-    for index in found.missing[:_AT_ONCE]:
+    for index in reading.missing[:_AT_ONCE]:
         connection.send("param_request_read", connection.system, AUTOPILOT, b"", index)
 
 
-def ask_by_name(connection: Connection, found: ParameterReading, names: Iterable[str], *, packed: bool) -> None:
+def ask_by_name(connection: Connection, reading: ParameterReading, names: Iterable[str], *, packed: bool) -> None:
     """Ask thrice for parameters that a list may leave out (PX4 lists those in use only); what comes is added."""
     for _ in range(3):
-        absent = [name for name in names if name not in found.values]
+        absent = [name for name in names if name not in reading.values]
         for name in absent:
             connection.send("param_request_read", connection.system, AUTOPILOT, name.encode(), -1)
         until = time.monotonic() + _SILENCE
         while absent and (left := until - time.monotonic()) > 0.0:
             for _, message in connection.receive(left):
                 if message.get_type() == "PARAM_VALUE":
-                    found.take(message, packed=packed)
-            absent = [name for name in absent if name not in found.values]
+                    reading.take(message, packed=packed)
+            absent = [name for name in absent if name not in reading.values]

@@ -63,27 +63,27 @@ def px4_law(mapping: ServoMapping, vehicle: Vehicle, hover: Trim, *, rate: float
 def px4_gains(law: ArduPilotLaw) -> dict[str, float]:
     """A law's numbers by PX4's names."""
     k = law.parameters
-    found: dict[str, float] = {}
+    gains: dict[str, float] = {}
     for axis, name in zip(AXES, _AXES, strict=True):
-        found[f"MC_{name}_P"] = k[f"ATC_ANG_{axis}_P"]
-        found |= {f"MC_{name}RATE_{end}": k[f"ATC_RAT_{axis}_{end}"] for end in ("P", "I", "D", "FF")}
-        found[f"MC_{name[0]}R_INT_LIM"] = k[f"ATC_RAT_{axis}_IMAX"]
-    found["MPC_XY_P"] = k["PSC_POSXY_P"]
-    found |= {f"MPC_XY_VEL_{end}_ACC": k[f"PSC_VELXY_{end}"] for end in "PID"}
+        gains[f"MC_{name}_P"] = k[f"ATC_ANG_{axis}_P"]
+        gains |= {f"MC_{name}RATE_{end}": k[f"ATC_RAT_{axis}_{end}"] for end in ("P", "I", "D", "FF")}
+        gains[f"MC_{name[0]}R_INT_LIM"] = k[f"ATC_RAT_{axis}_IMAX"]
+    gains["MPC_XY_P"] = k["PSC_POSXY_P"]
+    gains |= {f"MPC_XY_VEL_{end}_ACC": k[f"PSC_VELXY_{end}"] for end in "PID"}
     lift = 0.1 * k["PSC_ACCZ_P"] * GRAVITY / law.hover
-    found |= {"MPC_Z_P": k["PSC_POSZ_P"], "MPC_Z_VEL_P_ACC": lift * k["PSC_VELZ_P"]}
-    found |= {"MPC_Z_VEL_I_ACC": lift * k["PSC_VELZ_I"], "MPC_Z_VEL_D_ACC": lift, "MPC_THR_HOVER": law.hover}
-    return found | {"IMU_GYRO_CUTOFF": k["INS_GYRO_FILTER"], "IMU_DGYRO_CUTOFF": k["ATC_RAT_RLL_FLTD"]}
+    gains |= {"MPC_Z_P": k["PSC_POSZ_P"], "MPC_Z_VEL_P_ACC": lift * k["PSC_VELZ_P"]}
+    gains |= {"MPC_Z_VEL_I_ACC": lift * k["PSC_VELZ_I"], "MPC_Z_VEL_D_ACC": lift, "MPC_THR_HOVER": law.hover}
+    return gains | {"IMU_GYRO_CUTOFF": k["INS_GYRO_FILTER"], "IMU_DGYRO_CUTOFF": k["ATC_RAT_RLL_FLTD"]}
 
 
-def px4_file(found: dict[str, float], *, title: str) -> str:
+def px4_file(values: dict[str, float], *, title: str) -> str:
     """The text of a .params file, as QGroundControl loads it: vehicle, component, name, value, type (9: a float)."""
     head = f"# {' '.join(title.split())}: outputs and gains, written by swash control gains\n"
     head += "# Vehicle-Id Component-Id Name Value Type\n"
     whole = ("CA_AIRFRAME", "CA_SP0_COUNT", "PWM_MAIN_FUNC", "PWM_MAIN_REV")
     lines = (
         f"1\t1\t{name}\t{round(value)}\t6\n" if name.startswith(whole) else f"1\t1\t{name}\t{round(value, 6):.9g}\t9\n"
-        for name, value in found.items()
+        for name, value in values.items()
     )
     return head + "".join(lines)
 

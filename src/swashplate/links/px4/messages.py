@@ -40,14 +40,14 @@ class Mavlink:
 
     def read(self, data: bytes) -> tuple[list[ActuatorControls], int]:
         """Actuator controls in the next bytes of the stream, and how many pieces of it were no messages."""
-        found, bad = [], 0
+        controls, bad = [], 0
         for message in self._reader.parse_buffer(data) or ():
             kind = message.get_type()
             if kind == "HIL_ACTUATOR_CONTROLS":
-                found.append(ActuatorControls(tuple(message.controls), bool(message.flags & _LOCKSTEP)))
+                controls.append(ActuatorControls(tuple(message.controls), bool(message.flags & _LOCKSTEP)))
             elif kind == "BAD_DATA":
                 bad += 1
-        return found, bad
+        return controls, bad
 
     def sensor(
         self, r: Readings, *, slow: bool, field_noise: Sequence[float] = (0.0, 0.0, 0.0), pressure_noise: float = 0.0

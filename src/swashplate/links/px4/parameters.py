@@ -32,20 +32,20 @@ def parameters(mapping: ServoMapping) -> dict[str, float]:
     angles: tuple[float, ...]
     if isinstance(mapping, CoaxialMapping):
         motors, servos, plate = mapping.motors, mapping.servos, len(mapping.servos)
-        angles, found = _COAXIAL_ANGLES, {"CA_AIRFRAME": float(COAXIAL)}
+        angles, values = _COAXIAL_ANGLES, {"CA_AIRFRAME": float(COAXIAL)}
     else:
         if isinstance(mapping, TwinMapping):
             raise LinkError(NO_TWIN, channel="--servos")
         motors, servos, plate = (mapping.throttle,), (mapping.tail, *mapping.swash), len(mapping.swash)
         low, high = ((pulse - CENTRE) / HALF for pulse in mapping.collective_pulse)
         angles = mapping.angles
-        found = {"CA_AIRFRAME": float(HELICOPTER)}
-        found |= {f"CA_HELI_PITCH_C{k}": low + 0.25 * k * (high - low) for k in range(5)}
-        found |= {f"CA_HELI_THR_C{k}": 1.0 for k in range(5)}  # a governor holds the rotor's speed
-        found |= {"COM_SPOOLUP_TIME": float(math.ceil(mapping.spool + RUN_UP)), **_UNHURRIED}
-    found["CA_SP0_COUNT"] = float(plate)
-    found |= {f"CA_SP0_ANG{k}": angle for k, angle in enumerate(angles)}
+        values = {"CA_AIRFRAME": float(HELICOPTER)}
+        values |= {f"CA_HELI_PITCH_C{k}": low + 0.25 * k * (high - low) for k in range(5)}
+        values |= {f"CA_HELI_THR_C{k}": 1.0 for k in range(5)}  # a governor holds the rotor's speed
+        values |= {"COM_SPOOLUP_TIME": float(math.ceil(mapping.spool + RUN_UP)), **_UNHURRIED}
+    values["CA_SP0_COUNT"] = float(plate)
+    values |= {f"CA_SP0_ANG{k}": angle for k, angle in enumerate(angles)}
     for first, outputs in ((_MOTOR, motors), (_SERVO, servos)):
-        found |= {f"PWM_MAIN_FUNC{s.channel}": float(first + k) for k, s in enumerate(outputs)}
+        values |= {f"PWM_MAIN_FUNC{s.channel}": float(first + k) for k, s in enumerate(outputs)}
     reversals = sum(1 << s.channel - 1 for s in (*motors, *servos) if s.reversed)
-    return found | {"PWM_MAIN_REV": float(reversals)}
+    return values | {"PWM_MAIN_REV": float(reversals)}

@@ -51,14 +51,14 @@ class Px4Session:
 
     def hear(self, data: bytes) -> bool:
         """Take bytes of the stream; whether controls were among them."""
-        found, bad = self._mavlink.read(data)
+        controls, bad = self._mavlink.read(data)
         if bad:
             self._notices.tell("bad data", "bytes that are no MAVLink message came in; they are ignored.")
-        if found:
-            self._controls = found[-1].values
-            self.lockstep = self.lockstep or found[-1].lockstep
+        if controls:
+            self._controls = controls[-1].values
+            self.lockstep = self.lockstep or controls[-1].lockstep
             self.exchanges += 1
-        return bool(found)
+        return bool(controls)
 
     def step(self) -> bytes:
         """Move by one frame under the latest controls. Returns the sensors to send."""

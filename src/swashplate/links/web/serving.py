@@ -28,20 +28,20 @@ def listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
         SwashError: for an address beyond this machine without `allow_remote`, an unknown host, or a port in use.
     """
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        resolved = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
         raise SwashError(f"'{host}' is no address of this machine.", channel="--host") from None
-    address = ipaddress.ip_address(found[4][0])
+    address = ipaddress.ip_address(resolved[4][0])
     if not address.is_loopback and not allow_remote:
         raise SwashError(
             f"{address} can be reached from other machines.",
             channel="--host",
             hint="Whoever reaches the page can do all that it does; if that is meant, add --allow-remote.",
         )
-    made = socket.socket(found[0], socket.SOCK_STREAM)
+    made = socket.socket(resolved[0], socket.SOCK_STREAM)
     try:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind(found[4])
+        made.bind(resolved[4])
         made.listen(64)
     except OSError as error:
         made.close()

@@ -144,7 +144,7 @@ def _rotors(
     pitches = blade_pitches(sticks, options.upper.sense)
     heights = (par.hub_height_upper, par.hub_height_lower)
     given = (shares.on_upper * own.induced_lower, shares.on_lower * own.induced_upper)
-    found, felt = [], []
+    rotors, felt = [], []
     for i, (disc, flow, switches) in enumerate(
         (
             (state.upper, state.inflow_upper, options.upper),
@@ -158,10 +158,10 @@ def _rotors(
         felt.append(near * given[i])
         through = Vector(air.x, air.y, air.z - felt[i])
         numbers = one_rotor(par, heights[i])
-        found.append(
+        rotors.append(
             main_rotor(through, body.rates, disc, flow, pitches[i], omega, numbers, density, xp, switches, above)
         )
-    return RotorsInWake(found[0], found[1], felt[0], felt[1], shares)
+    return RotorsInWake(rotors[0], rotors[1], felt[0], felt[1], shares)
 
 
 def loads(
@@ -223,13 +223,13 @@ def loads(
 def stops(par: Any, count: int) -> list[tuple[Scalar, Scalar]]:
     """Lowest and highest theta0, B1, A1, theta0d and, of six commands, B1d and A1d [rad]."""
     cyclic = (-par.cyclic_limit, par.cyclic_limit)
-    found = [
+    ends = [
         (par.collective_low, par.collective_high),
         cyclic,
         cyclic,
         (-par.differential_limit, par.differential_limit),
     ]
-    return [*found, *(cyclic for _ in range(count - len(found)))]
+    return [*ends, *(cyclic for _ in range(count - len(ends)))]
 
 
 def commands_of(options: CoaxialOptions) -> type[FourCommands] | type[SixCommands]:

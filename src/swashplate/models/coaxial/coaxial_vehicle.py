@@ -95,15 +95,15 @@ def doubts(vehicle: Vehicle, x: Array, u: Array, environment: Environment) -> di
     acting, par = acting_at(vehicle, list(x), list(u), environment), vehicle.values()
     air = state.body.velocity + local_to_body(environment.wind, state.body.attitude, _XP).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
-    rotors, found = acting.rotors, {}
+    rotors, by_kind = acting.rotors, {}
     for side, part, rotor, given, disc in (
         ("upper", acting.upper_rotor, rotors.upper, rotors.given_upper, state.upper),
         ("lower", acting.lower_rotor, rotors.lower, rotors.given_lower, state.lower),
     ):
         through = float(rotor.induced + given)
         for kind, words in rotor_doubts(part.force, air, through, omega, disc, par, environment).items():
-            found[f"{kind} {side}"] = f"{side} rotor: {words}"
-    return found
+            by_kind[f"{kind} {side}"] = f"{side} rotor: {words}"
+    return by_kind
 
 
 _AXES = (

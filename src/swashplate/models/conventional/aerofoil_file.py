@@ -168,9 +168,9 @@ def _blocks(text: str, where: str) -> dict[tuple[float, float], Array]:
             channel=f"line {lines[0][0]}",
             hint="Angles are in degrees, and their column says so.",
         )
-    found: dict[tuple[float, float], list[list[float]]] = {}
+    blocks: dict[tuple[float, float], list[list[float]]] = {}
     for line, row in _numbers(lines[1:], names, where):
-        block = found.setdefault((row["mach"], row["reynolds"]), [])
+        block = blocks.setdefault((row["mach"], row["reynolds"]), [])
         if block and not row["alpha_deg"] > block[-1][0]:
             raise CardError(
                 f"is {row['alpha_deg']:g} after {block[-1][0]:g} at Mach {row['mach']:g} and Reynolds number "
@@ -179,9 +179,9 @@ def _blocks(text: str, where: str) -> dict[tuple[float, float], Array]:
                 channel=f"line {line}, alpha_deg",
             )
         block.append([row["alpha_deg"], row["cl"], row["cd"], row.get("cm", 0.0)])
-    if not found:
+    if not blocks:
         raise CardError("has column names and no numbers.", where=where)
-    for (mach, reynolds), block in found.items():
+    for (mach, reynolds), block in blocks.items():
         if len(block) < _ANGLES or block[0][0] > -_ABOUT_ZERO or block[-1][0] < _ABOUT_ZERO:
             raise CardError(
                 f"at Mach {mach:g} and Reynolds number {reynolds:g} has {len(block)} angles from {block[0][0]:g} to "
@@ -191,7 +191,7 @@ def _blocks(text: str, where: str) -> dict[tuple[float, float], Array]:
                 channel="alpha_deg",
                 hint="A symmetric profile's table has negative angles too.",
             )
-    return {key: np.array(block) for key, block in found.items()}
+    return {key: np.array(block) for key, block in blocks.items()}
 
 
 def _numbers(
@@ -232,15 +232,15 @@ def _laid_out(block: Array, step: float) -> tuple[Array, Array]:
     )
     nodes = layout.angles()
     curves = [PchipInterpolator(whole[:, 0], whole[:, column]) for column in (1, 2, 3)]
-    found = [values for curve in curves for values in (curve(nodes), curve.derivative()(nodes))]
-    lift = found[0]
+    columns = [values for curve in curves for values in (curve(nodes), curve.derivative()(nodes))]
+    lift = columns[0]
     middle = int(np.argmin(np.abs(nodes)))
     up, down = middle, middle
     while up + 1 < nodes.size and lift[up + 1] > lift[up]:
         up += 1
     while down > 0 and lift[down - 1] < lift[down]:
         down -= 1
-    return np.stack(found, axis=1), np.radians([nodes[up], nodes[down]])
+    return np.stack(columns, axis=1), np.radians([nodes[up], nodes[down]])
 
 
 def _with_plate(block: Array) -> Array:

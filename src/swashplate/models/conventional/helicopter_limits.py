@@ -49,39 +49,39 @@ def doubts_by_kind(vehicle: Vehicle, x: Array, u: Array, environment: Environmen
     body = state.body
     air = body.velocity + local_to_body(environment.wind, body.attitude, xp).scaled(-1.0)
     omega = par.rotor_speed if state.rotor is None else state.rotor.omega
-    found = rotor_doubts(acting.main_rotor.force, air, float(acting.induced), omega, state.disc, par, environment)
+    doubts = rotor_doubts(acting.main_rotor.force, air, float(acting.induced), omega, state.disc, par, environment)
     if acting.main.blades is not None and omega >= _TURNING * par.rotor_speed:
         for kind in ("advance", "stall"):  # what a straight lift line leaves out is in the table
-            found.pop(kind, None)
-        found |= _blade_words(acting.main.seen, acting.main.blades)
-    return found
+            doubts.pop(kind, None)
+        doubts |= _blade_words(acting.main.seen, acting.main.blades)
+    return doubts
 
 
 def _blade_words(seen: Disc, blades: TabledBlades) -> dict[str, str]:
     """Where blade elements are beyond what their table or quasi-steady flow can say, in words by kind."""
-    at, found = blade_doubts(seen, blades), dict[str, str]()
+    at, doubts = blade_doubts(seen, blades), dict[str, str]()
     of = "of the disc outside a quarter of the radius"
     if at.stalled > _SHARE:
-        found["stall"] = (
+        doubts["stall"] = (
             f"the blades are beyond the angle of their largest lift on {at.stalled:.0%} {of}: loads there are the "
             "table's, and dynamic stall is left out"
         )
     if at.diverged > _SHARE:
-        found["divergence"] = (
+        doubts["divergence"] = (
             f"drag diverges on {at.diverged:.0%} {of} (it rises by more than 0.1 per Mach number; tips reach "
             f"Mach {at.mach:.2f})"
         )
     if at.reversed_flow > _SHARE:
-        found["advance"] = f"air meets the blades from behind on {at.reversed_flow:.0%} {of}: yawed flow is left out"
+        doubts["advance"] = f"air meets the blades from behind on {at.reversed_flow:.0%} {of}: yawed flow is left out"
     if at.beyond > _SHARE:
         (slow, fast), (small, large) = blades.table.span
         least, most = at.reynolds
         low, high = (round(float(np.degrees(angle)), 3) for angle in blades.table.measured)
-        found["table"] = (
+        doubts["table"] = (
             f"{at.beyond:.0%} {of} is outside the aerofoil table ({low:g} to {high:g} deg, Mach {slow:g} to {fast:g}, "
             f"Reynolds number {small:.2g} to {large:.2g}; here {least:.2g} to {most:.2g}, to Mach {at.mach:.2f})"
         )
-    return found
+    return doubts
 
 
 def rotor_doubts(
@@ -108,25 +108,25 @@ def rotor_doubts(
     loading = thrust / (environment.air_density * np.pi * par.rotor_radius**2 * tip**2) / solidity
     hover = float(np.sqrt(thrust / (2.0 * environment.air_density * np.pi * par.rotor_radius**2)))
     across = float(np.hypot(air.x, air.y))
-    found: dict[str, str] = {}
+    doubts: dict[str, str] = {}
     if 0.5 * hover < air.z < 2.0 * hover and across < hover:
-        found["vortex ring"] = (
+        doubts["vortex ring"] = (
             f"sinks at {air.z:.1f} m/s with {across:.1f} m/s across: the vortex ring ({0.5 * hover:.1f} to "
             f"{2.0 * hover:.1f} m/s below {hover:.1f} m/s of speed), where momentum theory is only a mean"
         )
     if across / tip > _ADVANCE:
-        found["advance"] = (
+        doubts["advance"] = (
             f"the advance ratio is {across / tip:.2f}, above {_ADVANCE}: reversed flow and stall are left out"
         )
     if loading > _LOADING:
-        found["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
+        doubts["stall"] = f"C_T / sigma is {loading:.3f}, above {_LOADING}: blades would stall, lift here is linear"
     through = (induced - float(air.z)) / tip
     if abs(through) > _THROUGH:
-        found["inflow"] = (
+        doubts["inflow"] = (
             f"air comes through the disc at {abs(through):.2f} of the tip speed, above {_THROUGH}: its angles at the "
             "blades are taken as small"
         )
     flap = max(abs(float(disc.a1)), abs(float(disc.b1)))
     if flap > _FLAPPING:
-        found["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"
-    return found
+        doubts["flapping"] = f"the disc flaps by {np.degrees(flap):.0f} deg: angles are taken as small"
+    return doubts

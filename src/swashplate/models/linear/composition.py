@@ -119,7 +119,7 @@ def document(text: str) -> dict[str, Any]:
         for name, (axis, speed) in _ACCELEROMETERS.items()
         if speed in states
     }
-    found: dict[str, Any] = {
+    model: dict[str, Any] = {
         "kind": "state-space",
         "name": "+".join(names),
         "title": f"Composed of {', '.join(names)}: {len(states)} states",
@@ -133,8 +133,8 @@ def document(text: str) -> dict[str, Any]:
         "delays": _delays(text, pairs, tuple(inputs), tuple(outputs), equations),
     }
     if "body" in names:
-        found["trim"] = {state: _TRIM_NAMES[state] for state in TRIM}
-    return found | {"parameters": _parameters(found)}
+        model["trim"] = {state: _TRIM_NAMES[state] for state in TRIM}
+    return model | {"parameters": _parameters(model)}
 
 
 def _delays(
@@ -146,7 +146,7 @@ def _delays(
 ) -> dict[str, str]:
     """One delay for each input, and one for each pair or entry that is named; an input whose all are has none left."""
     own: dict[str, str] = {}
-    entries = [f"{row}_dot/{name}" for row, found in equations.items() for name in found if name in inputs]
+    entries = [f"{row}_dot/{name}" for row, terms in equations.items() for name in terms if name in inputs]
     for pair in pairs:
         output, _, name = pair.partition("/")
         if pair not in entries and (output not in outputs or name not in inputs):
@@ -199,11 +199,11 @@ def _trust(names: Sequence[str]) -> str:
     return f"{text[0].upper()}{text[1:]}. Remove what the responses do not determine (--reduce)."
 
 
-def _parameters(found: dict[str, Any]) -> dict[str, Any]:
+def _parameters(model: dict[str, Any]) -> dict[str, Any]:
     """Every parameter that an expression uses, with its start value and where that comes from."""
-    texts = [text for part in ("equations", "left") for entries in found[part].values() for text in entries.values()]
-    texts += [*found["delays"].values(), *found.get("trim", {}).values()]
-    if any("specific_force" in output for output in found["outputs"].values()) and "body" in found["name"].split("+"):
+    texts = [text for part in ("equations", "left") for entries in model[part].values() for text in entries.values()]
+    texts += [*model["delays"].values(), *model.get("trim", {}).values()]
+    if any("specific_force" in output for output in model["outputs"].values()) and "body" in model["name"].split("+"):
         texts.append("g")
     made: dict[str, Any] = {}
     used = dict.fromkeys(n for text in texts for n in sorted(Expression(text).names))

@@ -58,15 +58,15 @@ def structure_of(model: Vehicle | StateSpaceModel) -> StateSpaceModel:
     Raises:
         CardError: for a vehicle of other equations.
     """
-    found = model.structure if isinstance(model, Vehicle) else model
-    if found is None:
+    structure = model.structure if isinstance(model, Vehicle) else model
+    if structure is None:
         assert isinstance(model, Vehicle)
         raise CardError(
             "has no matrices of named parameters, which this needs.",
             where=model.card.where,
             hint="Give a state-space file or `swashplate.structure(...)`; `swashplate.linearize` makes matrices.",
         )
-    return found
+    return structure
 
 
 def linear_vehicle(model: StateSpaceModel, *, limits: Mapping[str, tuple[float, float]] | None = None) -> Vehicle:
@@ -117,17 +117,17 @@ def _delays(model: StateSpaceModel) -> dict[str, dict[str, float]]:
     if model.entry_delays:
         return {BY_ENTRY: {name: float(model.delays[name](model.numbers())) for name in model.entry_delays}}
     every = {name: {model.delay(output, name) for output in model.outputs} or {0.0} for name in model.inputs}
-    if all(len(found) == 1 for found in every.values()):
-        return {SECTION: {name: max(0.0, *found) for name, found in every.items()}}
+    if all(len(delays) == 1 for delays in every.values()):
+        return {SECTION: {name: max(0.0, *delays) for name, delays in every.items()}}
     return {BY_OUTPUT: {f"{o}/{i}": max(0.0, model.delay(o, i)) for i in model.inputs for o in model.outputs}}
 
 
 def _ranges(model: StateSpaceModel) -> dict[str, tuple[float, float]]:
-    found = model.document.get("limits", {})
+    limits = model.document.get("limits", {})
     ranges = {}
     for name in model.inputs:
         usual = USUAL_RANGE.get(model.units.get(name, "1") or "1", 1.0)
-        low, high = found.get(name, (-usual, usual))
+        low, high = limits.get(name, (-usual, usual))
         if not low < 0.0 < high:
             raise CardError(
                 f"is {low:g} to {high:g}, expected a range about the trim, zero.",

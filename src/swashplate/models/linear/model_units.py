@@ -70,9 +70,9 @@ def _sorted(powers: dict[str, int]) -> Powers:
 def unit_words(model: StateSpaceModel) -> list[str]:
     """Entries whose unit is not what their equation asks for, in words; none where all fit or too little is known."""
     known = {name: unit for name, p in model.parameters.items() if p.unit and (unit := _Unit.of(p.unit)) is not None}
-    found = [words for e in model.elements if (words := _entry_words(model, e, known))]
+    wrong = [words for e in model.elements if (words := _entry_words(model, e, known))]
     return (
-        [f"units do not fit: {'; '.join(found)}. Is a number in other units, or in the wrong place?"] if found else []
+        [f"units do not fit: {'; '.join(wrong)}. Is a number in other units, or in the wrong place?"] if wrong else []
     )
 
 

@@ -43,8 +43,8 @@ def state_space(
         return plain
     of_pairs = {(o, i): late.get(f"{o}/{i}", late.get(i, 0.0)) for o in outputs for i in inputs}
     own = {i: {of_pairs[o, i] for o in outputs} for i in inputs}
-    if all(len(found) == 1 for found in own.values()):
-        before = control.append(*(_delay(found.pop(), pade) for found in own.values()))
+    if all(len(distinct) == 1 for distinct in own.values()):
+        before = control.append(*(_delay(distinct.pop(), pade) for distinct in own.values()))
         whole = plain * before
     else:  # outputs answer one input after different times: each input has its own copy of the model
         columns = []

@@ -175,10 +175,10 @@ class StateSpaceModel:
         """M, F, G, H0, H1 and D as numbers."""
         values = self.numbers()
         shapes = self._shapes
-        found = {name: np.eye(*shapes[name]) if name == "M" else np.zeros(shapes[name]) for name in MATRICES}
+        matrices = {name: np.eye(*shapes[name]) if name == "M" else np.zeros(shapes[name]) for name in MATRICES}
         for e in self.elements:
-            found[e.matrix][e.row, e.column] = float(e.expression(values))
-        return found
+            matrices[e.matrix][e.row, e.column] = float(e.expression(values))
+        return matrices
 
     @property
     def _shapes(self) -> dict[str, tuple[int, int]]:
@@ -282,10 +282,10 @@ class StateSpaceModel:
     @cached_property
     def _uses(self) -> dict[str, frozenset[str]]:
         """The free parameters behind every parameter."""
-        found: dict[str, frozenset[str]] = {n: frozenset([n]) for n in self.parameters if n not in self.tie_order}
+        uses: dict[str, frozenset[str]] = {n: frozenset([n]) for n in self.parameters if n not in self.tie_order}
         for name in self.tie_order:
-            found[name] = frozenset().union(*(found[used] for used in self._tie(name).names))
-        return found
+            uses[name] = frozenset().union(*(uses[used] for used in self._tie(name).names))
+        return uses
 
     def sensitivities(
         self, free: tuple[str, ...], numbers: Array, pairs: list[tuple[int, int, Array]]
@@ -354,13 +354,13 @@ class StateSpaceModel:
         self, free: tuple[str, ...], stepped: Mapping[str, Mapping[str, Any]]
     ) -> list[tuple[Element, Array]]:
         """The entries that move, each with its derivative by every free parameter."""
-        found = []
+        slopes = []
         for e in self.elements:
             behind = frozenset().union(*(self._uses[used] for used in e.expression.names))
             if behind & set(free):
                 row = [np.imag(e.expression(stepped[n])) / _STEP if n in behind else 0.0 for n in free]
-                found.append((e, np.array(row)))
-        return found
+                slopes.append((e, np.array(row)))
+        return slopes
 
     def __repr__(self) -> str:
         head = f"{self.name}: {len(self.states)} states, inputs {', '.join(self.inputs)}"

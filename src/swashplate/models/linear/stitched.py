@@ -80,16 +80,16 @@ def stitched(card: Card) -> Vehicle:
     if isinstance(n, bool) or not isinstance(n, int) or n < 2:
         raise CardError(f"is {n!r}, expected two or more.", where=where, channel="options.points")
     for one, other in (("inner_units", "inner"), ("input_units", "inputs"), ("low", "inputs"), ("high", "inputs")):
-        many, wanted = (len(found) if isinstance(found := options[name], list | tuple) else 0 for name in (one, other))
+        many, wanted = (len(parts) if isinstance(parts := options[name], list | tuple) else 0 for name in (one, other))
         if many != wanted:
             raise CardError(
                 f"has {many} entries, expected {wanted}, as many as {other}.", where=where, channel=f"options.{one}"
             )
     units = dict(zip(RigidBody._fields, BODY_UNITS, strict=True))
     units |= dict(zip((*inner, *inputs), (*options["inner_units"], *options["input_units"]), strict=True))
-    found = [name.removesuffix("_0").partition("_by_") for name in card.parameters if name.endswith("_0")]
+    parts = [name.removesuffix("_0").partition("_by_") for name in card.parameters if name.endswith("_0")]
     rows, columns = (*RATES, *inner), (*NEEDED, *inner, *inputs)
-    entries = tuple((row, column) for row, by, column in found if by and row in rows and column in columns)
+    entries = tuple((row, column) for row, by, column in parts if by and row in rows and column in columns)
     own = Stitches(n, inner, inputs, entries)
     expected: dict[str, str] = {}
     for k in range(n):

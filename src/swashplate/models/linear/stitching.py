@@ -56,13 +56,13 @@ def stitch_points(
         raise CardError(f"{len(points)} given, expected two or more, at different speeds.", channel="points")
     for model, name in zip(points[1:], names[1:], strict=True):
         _same(points[0], model, names[0], name)
-    found = [trim_of(model) for model in points]
+    trims = [trim_of(model) for model in points]
     inner = tuple(state for state in points[0].states if state not in RigidBody._fields)
-    told = [f"{state} counts from its trim." for state in _untold(found, inner, names)]
+    told = [f"{state} counts from its trim." for state in _untold(trims, inner, names)]
     every = sorted(
         (
             (_trimmed(m, n, trim, inner, points[0].inputs), m, trim)
-            for m, n, trim in zip(points, names, found, strict=True)
+            for m, n, trim in zip(points, names, trims, strict=True)
         ),
         key=lambda one: one[0].speed,
     )
@@ -210,13 +210,13 @@ def _limits(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], 
 
 def _delays(models: Sequence[StateSpaceModel], made: Sequence[TrimmedMatrices], told: list[str]) -> dict[str, float]:
     """One delay for every input [s], the mean of the points'; empty where no point has any."""
-    found = {}
+    delays = {}
     for name in made[0].inputs:
         late = np.array([model.delay(output, name) for model in models for output in model.outputs] or [0.0])
-        found[name] = max(0.0, float(late.mean()))
+        delays[name] = max(0.0, float(late.mean()))
         if np.ptp(late) > 1e-9:
             told.append(f"Delay of {name}: mean of {1e3 * late.min():.3g} to {1e3 * late.max():.3g} ms.")
-    return found if any(found.values()) else {}
+    return delays if any(delays.values()) else {}
 
 
 def _parameters(points: Sequence[SpeedPoint], options: Any, status: str) -> dict[str, Parameter]:
@@ -226,15 +226,15 @@ def _parameters(points: Sequence[SpeedPoint], options: Any, status: str) -> dict
     columns = (*points[0].columns, *points[0].inputs)
     numbers = [np.hstack([point.X, point.B]) for point in points]
     there = np.any([matrix != 0.0 for matrix in numbers], axis=0)
-    found = {}
+    parameters = {}
     for k, (point, matrix) in enumerate(zip(points, numbers, strict=True)):
         source = f"derived: {point.name}"
         for i, j in zip(*np.nonzero(there), strict=True):
             row, column = point.rows[i], columns[j]
             unit = entry_unit(units[row], units[column])
-            found[f"{entry_name(row, column)}_{k}"] = Parameter(float(matrix[i, j]), unit, source, status)
+            parameters[f"{entry_name(row, column)}_{k}"] = Parameter(float(matrix[i, j]), unit, source, status)
         for name, value in point.trim.items():
-            found[f"trim_{name}_{k}"] = Parameter(float(value), units[name], source, status)
+            parameters[f"trim_{name}_{k}"] = Parameter(float(value), units[name], source, status)
         for name, value in point.gradients.items():
-            found[f"gradient_{name}_{k}"] = Parameter(value, gradient_unit(units[name]), source, "derived")
-    return found
+            parameters[f"gradient_{name}_{k}"] = Parameter(value, gradient_unit(units[name]), source, "derived")
+    return parameters

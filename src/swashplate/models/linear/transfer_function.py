@@ -68,18 +68,18 @@ class Form:
         Raises:
             IdentificationError: with examples.
         """
-        found = re.fullmatch(r"(\d{1,2})/(\d{1,2})(?:([+-])(\d)s)?( no delay)?", text.strip())
-        if found is None:
+        match = re.fullmatch(r"(\d{1,2})/(\d{1,2})(?:([+-])(\d)s)?( no delay)?", text.strip())
+        if match is None:
             raise IdentificationError(
                 f"'{text}' is no form of a transfer function.",
                 hint='Examples: "1/2" (one zero, two poles, delay), "0/1+1s" (an integrator), "0/2 no delay", "2/1".',
             )
-        if max(int(found[1]), int(found[2])) > HIGHEST:
+        if max(int(match[1]), int(match[2])) > HIGHEST:
             raise IdentificationError(
                 f"'{text}' is of an order above {HIGHEST}, which no response tells.", hint="Take a form of lower order."
             )
-        origin = int(found[4] or 0) * (-1 if found[3] == "-" else 1)
-        return Form(int(found[1]), int(found[2]), origin, not found[5])
+        origin = int(match[4] or 0) * (-1 if match[3] == "-" else 1)
+        return Form(int(match[1]), int(match[2]), origin, not match[5])
 
 
 USUAL = (
@@ -228,8 +228,8 @@ class TransferFunctions(tuple[TransferFunction, ...]):
 
     def eigenvalues(self) -> Complex:
         """The poles that they share [1/s], fastest first."""
-        found = self[0].poles
-        return found[np.argsort(-np.abs(found), kind="stable")]
+        poles = self[0].poles
+        return poles[np.argsort(-np.abs(poles), kind="stable")]
 
     def log_slopes(self, output: str, input: str, omega: Array, free: Sequence[str]) -> tuple[Complex, Complex]:
         """One response (n,) and the derivatives of its logarithm by named parameters, shape (n, n_free).

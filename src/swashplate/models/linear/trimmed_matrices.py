@@ -136,11 +136,11 @@ def own_gradients(point: TrimmedMatrices, free: Sequence[str]) -> dict[str, floa
             channel="derivatives",
             hint='Take the differences of the trims: gradients="trims" (--gradients trims).',
         )
-    found = np.linalg.lstsq(system, -(point.A @ ahead)[point.rows], rcond=None)[0]
-    x = ahead + moves @ found[: moves.shape[1]]
+    solution = np.linalg.lstsq(system, -(point.A @ ahead)[point.rows], rcond=None)[0]
+    x = ahead + moves @ solution[: moves.shape[1]]
     slopes = {name: float(x[k] / x[0]) for k, name in enumerate((*NEEDED, *point.inner))}
     slopes |= dict.fromkeys(point.inputs, 0.0)
-    slopes |= {name: float(value / x[0]) for name, value in zip(free, found[moves.shape[1] :], strict=True)}
+    slopes |= {name: float(value / x[0]) for name, value in zip(free, solution[moves.shape[1] :], strict=True)}
     return {name: value for name, value in slopes.items() if name not in ("u", *STILL)}
 
 

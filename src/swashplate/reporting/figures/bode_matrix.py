@@ -79,13 +79,13 @@ def of_responses(
 
 def of_fit(fit: Fitted) -> Figure:
     """What a model was fitted to, and the model."""
-    found = {(t.output, t.input): t for t in fit.targets}
-    outputs, inputs = (list(dict.fromkeys(pair[k] for pair in found)) for k in (0, 1))
+    targets = {(t.output, t.input): t for t in fit.targets}
+    outputs, inputs = (list(dict.fromkeys(pair[k] for pair in targets)) for k in (0, 1))
     rows = []
     for output in outputs:
         row: list[Pair | None] = []
         for name in inputs:
-            t = found.get((output, name))
+            t = targets.get((output, name))
             if t is None:
                 row.append(None)
                 continue

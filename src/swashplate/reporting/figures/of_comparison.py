@@ -32,21 +32,21 @@ from swashplate.validation.verification import Verification
 _STYLES = ((BLUE, "dash"), (VERMILION, "dot"), (GREEN, "dashdot"), (PURPLE, "dash"), (ORANGE, "dot"))
 
 
-def section_of_comparison(found: ModelComparison) -> Section:
+def section_of_comparison(flown: ModelComparison) -> Section:
     """The lines, and how close each model comes."""
     rows = tuple(
-        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in found.found))
-        for name, fits in found.fits().items()
+        (Cell(name), *(Cell(f"{fits[who]:.1f}" if who in fits else "-", number=True) for who in flown.found))
+        for name, fits in flown.fits().items()
     )
-    table = Table("Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *found.found), rows)
-    told = tuple(Text(f"{n}: {t}", tone="caution") for n, v in found.found.items() for t in v.warnings)
-    return Section("comparison", "Models along the flight", (*told, _lines(found), table))
+    table = Table("Fit [%]: 100 (1 - rms error / rms of the flight about its mean)", ("output", *flown.found), rows)
+    told = tuple(Text(f"{n}: {t}", tone="caution") for n, v in flown.found.items() for t in v.warnings)
+    return Section("comparison", "Models along the flight", (*told, _lines(flown), table))
 
 
-def _lines(found: ModelComparison) -> Figure:
+def _lines(flown: ModelComparison) -> Figure:
     """Inputs, then flight and models of every output."""
-    first = next(iter(found.found.values()))
-    names = list(found.fits())
+    first = next(iter(flown.found.values()))
+    names = list(flown.fits())
     units = first.units
     titles = [quantity(n, channel(n).shown_unit or units.get(n, "")) for n in names]
     layout = stacked([inputs_title(first.inputs, units), *titles], height=112)
@@ -58,7 +58,7 @@ def _lines(found: ModelComparison) -> Figure:
         keys.append(Key(name, color))
     for number, name in enumerate(names, start=2):
         measured = False
-        for (who, v), (color, dash) in zip(found.found.items(), _STYLES * len(found.found), strict=False):
+        for (who, v), (color, dash) in zip(flown.found.items(), _STYLES * len(flown.found), strict=False):
             if all(o.output != name for o in v.outputs):
                 continue
             k = [o.output for o in v.outputs].index(name)
@@ -69,15 +69,15 @@ def _lines(found: ModelComparison) -> Figure:
                 time, values = joined(pieces)
                 places, values = kept(values), shown(name, values)
                 traces.append(line(time[places], values[places], name=words, color=ink, dash=style, axis=str(number)))
-    told = zip(found.found, _STYLES * len(found.found), strict=False)
-    keys += [Key(f"{who} ({_mean_fit(found.found[who]):.0f} %)", color, dash) for who, (color, dash) in told]
+    told = zip(flown.found, _STYLES * len(flown.found), strict=False)
+    keys += [Key(f"{who} ({_mean_fit(flown.found[who]):.0f} %)", color, dash) for who, (color, dash) in told]
     return Figure(
         "models",
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "Flight and models along the recorded inputs; in brackets the mean fit over the outputs. Biases and start "
         "states are solved for.",
-        f"{', '.join(names)} of the flight and of {', '.join(found.found)} over time.",
+        f"{', '.join(names)} of the flight and of {', '.join(flown.found)} over time.",
         keys=tuple(keys),
     )
 
@@ -86,34 +86,34 @@ def _mean_fit(v: Verification) -> float:
     return float(np.mean([o.fit for o in v.outputs]))
 
 
-def section_of_residuals(found: Residuals) -> Section:
+def section_of_residuals(left: Residuals) -> Section:
     """The verdict, and the correlations with their bounds."""
-    tone = "good" if found.complete else "bad"
+    tone = "good" if left.complete else "bad"
     rows = tuple(
         (Cell(c.output), Cell(c.input), Cell(f"{c.worst[1]:+.3f}", True), Cell(f"{c.worst[0]:.3g}", True),
          Cell(f"{c.limit:.3f}", True))
-        for c in found.cross
+        for c in left.cross
     )  # fmt: skip
     table = Table("Largest causal correlations", ("output", "input", "largest", "at [s]", "limit"), rows)
-    title = f"Residuals of {found.verification.model.name}"
+    title = f"Residuals of {left.verification.model.name}"
     cross = _correlations(
-        found.cross,
+        left.cross,
         "cross-correlation",
         "Correlation of residuals with inputs; at positive lags the input comes first. Outside the band (99 % for each "
         "lag) the input explains what the model left; what is left of zero is feedback.",
     )
     auto = _correlations(
-        found.auto, "autocorrelation", "Autocorrelation of the residuals; outside the band (99 % a lag) it is coloured."
+        left.auto, "autocorrelation", "Autocorrelation of the residuals; outside the band (99 % a lag) it is coloured."
     )
-    return Section("residuals", title, (Text(found.headline, tone=tone), cross, auto, table))
+    return Section("residuals", title, (Text(left.headline, tone=tone), cross, auto, table))
 
 
-def _correlations(found: tuple[Correlation, ...], identifier: str, caption: str) -> Figure:
-    titles = [f"{c.output} / {c.input}" if c.input else c.output for c in found]
+def _correlations(correlations: tuple[Correlation, ...], identifier: str, caption: str) -> Figure:
+    titles = [f"{c.output} / {c.input}" if c.input else c.output for c in correlations]
     columns = min(2, len(titles))
     layout = grid(titles, columns=columns, height=140, x_title="lag [s]", y_title="correlation [-]")
     traces = []
-    for i, c in enumerate(found):
+    for i, c in enumerate(correlations):
         number = "" if i == 0 else str(i + 1)
         low, high = float(c.lags[0]), float(c.lags[-1])
         edge = [c.bound, c.bound, -c.bound, -c.bound]

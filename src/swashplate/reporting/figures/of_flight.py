@@ -191,16 +191,16 @@ def of_spectra(panels: Sequence[Mapping[str, spectra.Spectrum]], names: Sequence
         names: of all flights, in the order of their colours.
     """
     drawn = [next(iter(panel.values())) for panel in panels]
-    told = [f"{name}: {found}" if len(names) > 1 else str(found) for panel in panels for name, found in panel.items()]
+    told = [f"{name}: {curve}" if len(names) > 1 else str(curve) for panel in panels for name, curve in panel.items()]
     titles = [f"{one.channel} [({unit_words(one.unit) or '1'})²/Hz]" for one in drawn]
     layout = over_frequency(titles, height=_PANEL + 20, unit="Hz")
     colors = {name: _COLORS[k % len(_COLORS)] for k, name in enumerate(names)}
     traces = []
     for i, panel in enumerate(panels):
         layout[f"yaxis{_number(i)}"] |= {"type": "log", "exponentformat": "power"}
-        for name, found in panel.items():
-            hover = f"{found.channel}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
-            over, density = found.frequency[1:], found.density[1:]
+        for name, curve in panel.items():
+            hover = f"{curve.channel}<br>%{{x:.4g}} Hz, %{{y:.3g}}"
+            over, density = curve.frequency[1:], curve.density[1:]
             traces.append(line(over, density, name=name, color=colors[name], axis=_number(i), hover=hover))
     return Figure(
         "spectrum",
@@ -224,20 +224,20 @@ def spectrogram(flight: Flight, *, channels: Sequence[str] | None = None) -> Fig
 
 def of_spectrograms(panels: Sequence[spectra.Spectrogram]) -> Figure:
     """Power over time and frequency, one panel each; dB below the strongest line."""
-    names = [found.channel for found in panels]
+    names = [measured.channel for measured in panels]
     layout = stacked([f"{name}: frequency [Hz]" for name in names], height=_PANEL + 60)
     layout["margin"] = {**layout["margin"], "r": 70}
     traces: list[dict[str, Any]] = []
-    for i, (name, found) in enumerate(zip(names, panels, strict=True)):
-        thin = max(1, -(-found.frequency.size // _ROWS))
-        rows = [found.density[k : k + thin].max(axis=0) for k in range(0, found.frequency.size, thin)]
+    for i, (name, measured) in enumerate(zip(names, panels, strict=True)):
+        thin = max(1, -(-measured.frequency.size // _ROWS))
+        rows = [measured.density[k : k + thin].max(axis=0) for k in range(0, measured.frequency.size, thin)]
         level = 10.0 * np.log10(np.maximum(np.array(rows), 1e-30))
         level -= level.max()
         traces.append(
             {
                 "type": "heatmap",
-                "x": numbers(found.time),
-                "y": numbers(found.frequency[::thin]),
+                "x": numbers(measured.time),
+                "y": numbers(measured.frequency[::thin]),
                 "z": [numbers(np.round(row, 1)) for row in level],
                 "zmin": -60,
                 "zmax": 0,
@@ -279,19 +279,19 @@ def section_of_flight(flight: Flight, *, channels: Sequence[str] | None = None) 
     return Section("flight", title, (*(Text(note, tone="caution") for note in notes), *figures, table))
 
 
-def section_of_inspection(found: Inspection) -> Section:
+def section_of_inspection(inspection: Inspection) -> Section:
     """Problems, what was recorded when, and the channels."""
-    head, *rows = found.channel_rows()
+    head, *rows = inspection.channel_rows()
     table = Table("Channels", head, tuple(tuple(Cell(cell) for cell in row) for row in rows))
-    problems = tuple(Text(problem, tone="caution") for problem in found.problems)
-    title = f"{found.source or '(unnamed)'}: {found.duration:.1f} s"
-    return Section("inspection", title, (*problems, _recorded(found), table))
+    problems = tuple(Text(problem, tone="caution") for problem in inspection.problems)
+    title = f"{inspection.source or '(unnamed)'}: {inspection.duration:.1f} s"
+    return Section("inspection", title, (*problems, _recorded(inspection), table))
 
 
-def _recorded(found: Inspection) -> Figure:
+def _recorded(inspection: Inspection) -> Figure:
     """From when to when each stream was recorded, and the sweeps in it."""
-    rows = [(s.name, s.start, s.stop, GREY) for s in found.streams if np.isfinite(s.start)]
-    rows += [(f"sweep of {s.channel}", s.start, s.stop, BLUE) for s in found.sweeps]
+    rows = [(s.name, s.start, s.stop, GREY) for s in inspection.streams if np.isfinite(s.start)]
+    rows += [(f"sweep of {s.channel}", s.start, s.stop, BLUE) for s in inspection.sweeps]
     names = list(dict.fromkeys(name for name, *_ in rows)) or ["nothing"]
     layout = base_layout(70 + 26 * len(names), left=120)
     layout["xaxis"] = axis("time [s]")
@@ -315,6 +315,6 @@ def _recorded(found: Inspection) -> Figure:
         {"data": traces, "layout": layout},
         int(layout["height"]),
         "What was recorded when, and the frequency sweeps found in it.",
-        f"Streams {', '.join(s.name for s in found.streams)} over time, with {len(found.sweeps)} sweeps.",
-        keys=(Key("recorded", GREY, "bar"), *((Key("frequency sweep", BLUE, "bar"),) if found.sweeps else ())),
+        f"Streams {', '.join(s.name for s in inspection.streams)} over time, with {len(inspection.sweeps)} sweeps.",
+        keys=(Key("recorded", GREY, "bar"), *((Key("frequency sweep", BLUE, "bar"),) if inspection.sweeps else ())),
     )

@@ -24,10 +24,10 @@ def section_of_trims(curve: TrimCurve) -> Section:
     return Section("trims", title, (*told, controls(curve), Table("Trims", tuple(columns), rows)))
 
 
-def section_of_derivatives(found: Derivatives, row: str = "M") -> Section:
+def section_of_derivatives(derivatives: Derivatives, row: str = "M") -> Section:
     """What each part of the vehicle contributes, the wanted row first, and the table."""
-    head, rows = found.rows(found.tables[0])
-    title = f"Derivatives of {found.vehicle.card.title} at {found.trims[0].speed:g} m/s"
+    head, rows = derivatives.rows(derivatives.tables[0])
+    title = f"Derivatives of {derivatives.vehicle.card.title} at {derivatives.trims[0].speed:g} m/s"
     table = Table("Derivatives", tuple(head), tuple(tuple(Cell(cell) for cell in line) for line in rows))
-    others = tuple(by_contributor(found, other) for other in "XYZLMN" if other != row)
-    return Section("derivatives", title, (by_contributor(found, row), *others, table))
+    others = tuple(by_contributor(derivatives, other) for other in "XYZLMN" if other != row)
+    return Section("derivatives", title, (by_contributor(derivatives, row), *others, table))

@@ -70,60 +70,60 @@ def _estimates(panels: Mapping[str, Mapping[str, tuple[float, float]]], caption:
     )
 
 
-def section_of_reconstruction(found: Reconstruction) -> Section:
+def section_of_reconstruction(reconstruction: Reconstruction) -> Section:
     """Biases and scale factors of each channel with their bounds."""
     panels: dict[str, dict[str, tuple[float, float]]] = {}
-    for name, estimate in found.biases.items():
+    for name, estimate in reconstruction.biases.items():
         known = channel(name)
         values = panels.setdefault(f"bias [{unit_words(known.shown_unit) or '-'}]", {})
         values[name] = (known.shown_factor * estimate.value, known.shown_factor * estimate.sigma)
-    if found.scales:
-        panels["error of scale [%]"] = {n: (100.0 * e.value, 100.0 * e.sigma) for n, e in found.scales.items()}
+    if reconstruction.scales:
+        panels["error of scale [%]"] = {n: (100.0 * e.value, 100.0 * e.sigma) for n, e in reconstruction.scales.items()}
     figure = (_estimates(panels, "Errors of the sensors."),) if panels else ()
-    return Section("reconstruction", "Errors of the sensors", (*figure, Text(str(found))))
+    return Section("reconstruction", "Errors of the sensors", (*figure, Text(str(reconstruction))))
 
 
-def section_of_equation(found: EquationError) -> Section:
+def section_of_equation(fit: EquationError) -> Section:
     """Coefficients with their bounds."""
-    values = dict(zip(found.names, zip(found.values.tolist(), found.sigmas.tolist(), strict=True), strict=True))
+    values = dict(zip(fit.names, zip(fit.values.tolist(), fit.sigmas.tolist(), strict=True), strict=True))
     figure = _estimates({"coefficient [own units]": values}, "Coefficients of the equation.")
-    return Section("equation", f"Equation error: R² = {found.determination:.4f}", (figure, Text(repr(found))))
+    return Section("equation", f"Equation error: R² = {fit.determination:.4f}", (figure, Text(repr(fit))))
 
 
 # ---- over frequency --------------------------------------------------------------------------------------------
-def section_of_spectrum(found: Spectrum) -> Section:
+def section_of_spectrum(curve: Spectrum) -> Section:
     """One channel's density over frequency."""
-    return Section("spectrum", f"Spectrum of {found.channel}", (of_spectra([{"": found}], [""]), Text(str(found))))
+    return Section("spectrum", f"Spectrum of {curve.channel}", (of_spectra([{"": curve}], [""]), Text(str(curve))))
 
 
-def section_of_spectrogram(found: Spectrogram) -> Section:
+def section_of_spectrogram(spectrogram: Spectrogram) -> Section:
     """One channel's power over time and frequency."""
-    return Section("spectrogram", f"Spectrogram of {found.channel}", (of_spectrograms([found]),))
+    return Section("spectrogram", f"Spectrogram of {spectrogram.channel}", (of_spectrograms([spectrogram]),))
 
 
-def section_of_harmonics(found: Harmonics) -> Section:
+def section_of_harmonics(harmonics: Harmonics) -> Section:
     """The channel's spectrum with the multiples of the rotor's speed marked, and the notches."""
-    drawn = of_spectra([{found.spectrum.channel: found.spectrum}], [found.spectrum.channel])
-    density = found.spectrum.density[1:]
+    drawn = of_spectra([{harmonics.spectrum.channel: harmonics.spectrum}], [harmonics.spectrum.channel])
+    density = harmonics.spectrum.density[1:]
     seen = density[density > 0.0]
     ends = [float(np.min(seen)), float(np.max(seen))] if seen.size else [1.0, 10.0]
     marks = [
         line([h.frequency, h.frequency], ends, name=f"{h.number} x", color=VERMILION, dash="dot", width=1.0)
-        for h in found.harmonics
+        for h in harmonics.harmonics
     ]
     spec: dict[str, Any] = {**drawn.spec, "data": [*marks, *drawn.spec["data"]]}
-    keys = (Key(found.spectrum.channel, BLUE), Key(f"multiples of {found.rotor}", VERMILION, "dot"))
-    caption = f"{drawn.caption} {found.words}"
+    keys = (Key(harmonics.spectrum.channel, BLUE), Key(f"multiples of {harmonics.rotor}", VERMILION, "dot"))
+    caption = f"{drawn.caption} {harmonics.words}"
     figure = Figure("harmonics", spec, drawn.height, caption, drawn.alt, keys=keys)
-    return Section("harmonics", f"Rotor vibration in {found.spectrum.channel}", (figure, Text(str(found))))
+    return Section("harmonics", f"Rotor vibration in {harmonics.spectrum.channel}", (figure, Text(str(harmonics))))
 
 
 # ---- over time -------------------------------------------------------------------------------------------------
-def section_of_planned(found: PlannedManeuver) -> Section:
+def section_of_planned(planned: PlannedManeuver) -> Section:
     """What is flown over time, and its design rules."""
-    series = sampled(found.maneuver, rate=found.rate, chirp=found.chirp)
+    series = sampled(planned.maneuver, rate=planned.rate, chirp=planned.chirp)
     figure = over_time([Flight({"maneuver": series})], channels=[str(name) for name in series.data_vars])
-    return Section("maneuver", f"Maneuver: {found.maneuver.kind}", (figure, _table("Design rules", *found.rows())))
+    return Section("maneuver", f"Maneuver: {planned.maneuver.kind}", (figure, _table("Design rules", *planned.rows())))
 
 
 def section_of_pieces(pieces: Sequence[Maneuver], *, rate: float) -> Section:
@@ -136,18 +136,18 @@ def section_of_pieces(pieces: Sequence[Maneuver], *, rate: float) -> Section:
     return Section("pieces", "What is flown", tuple(drawn))
 
 
-def section_of_steps(found: RateSteps) -> Section:
+def section_of_steps(steps: RateSteps) -> Section:
     """The rate after a step of its target, and after a disturbance."""
     layout = stacked(["over target [-]", "disturbed [own unit]"], height=150)
     traces = [
-        line(found.time, found.step, name="step", color=BLUE),
-        line(found.time, found.disturbance, name="disturbance", color=BLUE, axis="2"),
+        line(steps.time, steps.step, name="step", color=BLUE),
+        line(steps.time, steps.disturbance, name="disturbance", color=BLUE, axis="2"),
     ]
-    verdict = "Stable" if found.stable else "UNSTABLE: do not fly these gains"
-    words = f"{verdict}; overshoot {100.0 * found.overshoot:.0f} %, settles at {found.settled:.3g}."
+    verdict = "Stable" if steps.stable else "UNSTABLE: do not fly these gains"
+    words = f"{verdict}; overshoot {100.0 * steps.overshoot:.0f} %, settles at {steps.settled:.3g}."
     alt = "The rate over time, after a step of the target and after a disturbance of 0.1 of the command."
     figure = Figure("steps", {"data": traces, "layout": layout}, int(layout["height"]), words, alt)
-    return Section("steps", "Steps of a rate loop", (figure, Text(words, tone="plain" if found.stable else "bad")))
+    return Section("steps", "Steps of a rate loop", (figure, Text(words, tone="plain" if steps.stable else "bad")))
 
 
 # ---- autopilots ------------------------------------------------------------------------------------------------

@@ -71,18 +71,18 @@ def _of_report(page: Report, shown: Any) -> Section:
     return Section("shown", page.title, (*words, *picture, *rest, summary))
 
 
-def section_of_responses(found: FrequencyResponse) -> Section:
+def section_of_responses(responses: FrequencyResponse) -> Section:
     """Coherent bands of every pair, and Bode plots of those that have one."""
     rows = []
-    for output in found.outputs:
-        for name in found.inputs:
-            band = found.band(output, name)
+    for output in responses.outputs:
+        for name in responses.inputs:
+            band = responses.band(output, name)
             ends = "none" if band is None else f"{band[0] / TWO_PI:.3g} - {band[1] / TWO_PI:.3g}"
             rows.append((Cell(f"{output} / {name}"), Cell(ends)))
-    told = tuple(Text(text, tone="caution") for text in (*found.problems, *found.warnings))
+    told = tuple(Text(text, tone="caution") for text in (*responses.problems, *responses.warnings))
     table = Table("Where they may be used", ("output / input", "coherent band [Hz]"), tuple(rows))
-    title = f"Frequency responses ({found.method}): {found.omega.size} lines"
-    return Section("responses", title, (*told, bode_matrix.of_responses(found), table))
+    title = f"Frequency responses ({responses.method}): {responses.omega.size} lines"
+    return Section("responses", title, (*told, bode_matrix.of_responses(responses), table))
 
 
 # ---- the verbs behind the methods ------------------------------------------------------------------------------
@@ -102,18 +102,18 @@ def _chosen(shown: Any, name: str | None) -> Figure:
     Raises:
         SwashError: a name that it has not, or an object without figures.
     """
-    found = figures_of(shown)
-    if not found:
+    figures = figures_of(shown)
+    if not figures:
         raise SwashError("has nothing to draw.", channel=type(shown).__name__)
     if name is None:
-        return next(iter(found.values()))
-    if name not in found:
+        return next(iter(figures.values()))
+    if name not in figures:
         raise SwashError(
-            f"is no figure of it; there are {', '.join(found)}.",
+            f"is no figure of it; there are {', '.join(figures)}.",
             channel=name,
-            hint=nearest(name, found) or None,
+            hint=nearest(name, figures) or None,
         )
-    return found[name]
+    return figures[name]
 
 
 def _title(shown: Any) -> str:

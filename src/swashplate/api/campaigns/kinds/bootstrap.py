@@ -52,10 +52,10 @@ class BootstrapKind:
             Attempt.at(partial(settings.fitted, model, _drawn(cut, portion, row), biases=settings.biases))
             for row in range(portion.count)
         ]
-        found = outcome_columns(attempts) | {"pieces": np.full(portion.count, len(cut))}
+        columns = outcome_columns(attempts) | {"pieces": np.full(portion.count, len(cut))}
         for name in settings.free_of(model):
-            found[name], found[f"{name}.sigma"] = np.array([attempt.estimate(name) for attempt in attempts]).T
-        return found
+            columns[name], columns[f"{name}.sigma"] = np.array([attempt.estimate(name) for attempt in attempts]).T
+        return columns
 
     def replay(
         self, settings: BootstrapCampaign, portion: Portion, files: Mapping[str, Path], row: int

@@ -65,8 +65,8 @@ class CrossValidationKind:
             scores = {f"{s.channel}@{s.horizon:g}s": s.fit for s in judged.scores if s.predictor == "model"}
         else:
             scores = {output.output: output.fit for output in judged.outputs}
-        found: dict[str, Any] = {"left_out": portion.of, **{f"{_SCORE}{name}": fit for name, fit in scores.items()}}
-        table = outcome_columns([Attempt(fit)]) | {name: np.array([value]) for name, value in found.items()}
+        row: dict[str, Any] = {"left_out": portion.of, **{f"{_SCORE}{name}": fit for name, fit in scores.items()}}
+        table = outcome_columns([Attempt(fit)]) | {name: np.array([value]) for name, value in row.items()}
         for name in settings.free_of(settings.model(files)):
             table |= {name: np.array([fit[name].value]), f"{name}.sigma": np.array([fit[name].best_sigma])}
         return table

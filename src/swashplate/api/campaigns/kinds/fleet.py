@@ -82,8 +82,8 @@ class FleetKind:
         facts: dict[str, Any] = {"duration": math.nan, "sweeps": -1, "problems": ""}
         numbers: dict[str, float] = dict.fromkeys(("cost", "coherence", *names), math.nan)
         verdict = self._judge(settings, path, files, facts, numbers)
-        found: dict[str, Any] = {"log": path.name, "verdict": verdict, **facts, **numbers}
-        return {name: np.array([value]) for name, value in found.items()}
+        row: dict[str, Any] = {"log": path.name, "verdict": verdict, **facts, **numbers}
+        return {name: np.array([value]) for name, value in row.items()}
 
     def replay(
         self, settings: FleetCampaign, portion: Portion, files: Mapping[str, Path], row: int
@@ -120,10 +120,10 @@ class FleetKind:
             raw = self._read(settings, path, files)
         except SwashError as error:
             return f"cannot be read: {error.problem}"
-        found = inspect(raw)
-        facts |= {"duration": float(found.duration), "sweeps": len(found.sweeps), "problems": "; ".join(found.problems)}
-        if found.damage:
-            return f"damaged: {'; '.join(found.damage)}"
+        look = inspect(raw)
+        facts |= {"duration": float(look.duration), "sweeps": len(look.sweeps), "problems": "; ".join(look.problems)}
+        if look.damage:
+            return f"damaged: {'; '.join(look.damage)}"
         try:
             fit = self._fit(settings, raw, numbers)
         except SwashError as error:

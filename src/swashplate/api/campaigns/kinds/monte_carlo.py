@@ -107,10 +107,10 @@ class FlightsKind:
     def run(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path]) -> Columns:
         many = self._flown(settings, portion, files)
         spread = many.spread
-        found: Columns = {"lost_after": spread.lost_after, "lost": np.isfinite(spread.lost_after).astype(np.int64)}
-        found |= {name: np.asarray(values, dtype=np.float64) for name, values in spread.values.items()}
-        found["place_rms"] = spread.place_rms
-        return found | {f"drawn.{name}": np.asarray(v, dtype=np.float64) for name, v in many.drawn.items()}
+        columns: Columns = {"lost_after": spread.lost_after, "lost": np.isfinite(spread.lost_after).astype(np.int64)}
+        columns |= {name: np.asarray(values, dtype=np.float64) for name, values in spread.values.items()}
+        columns["place_rms"] = spread.place_rms
+        return columns | {f"drawn.{name}": np.asarray(v, dtype=np.float64) for name, v in many.drawn.items()}
 
     def replay(self, settings: FlightsCampaign, portion: Portion, files: Mapping[str, Path], row: int) -> Flight:
         many = self._flown(settings, portion, files)
@@ -170,14 +170,14 @@ def _designed(vehicle: str, choices: bytes) -> Controller:
 
 
 def _limits(given: Mapping[str, float]) -> Limits:
-    found = Limits()
+    limits = Limits()
     for name, value in given.items():
         if name not in SHOWN or not value >= 0.0:
             raise CampaignError(
                 f"{name} = {value:g} is no limit; expected positive numbers of {', '.join(SHOWN)}.", channel="limits"
             )
-        found = replace(found, **{name: value / SHOWN[name][1] if value else math.inf})
-    return found
+        limits = replace(limits, **{name: value / SHOWN[name][1] if value else math.inf})
+    return limits
 
 
 MONTE_CARLO = FlightsKind()

@@ -69,11 +69,11 @@ class MultiStartKind:
         seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
         starts = [start_values(model, names, factor=settings.factor, seed=seed) for seed in seeds]
         attempts = [Attempt.at(partial(_fitted, settings, started(model, names, begin), data)) for begin in starts]
-        found = outcome_columns(attempts)
+        columns = outcome_columns(attempts)
         for k, name in enumerate(names):
-            found[f"start.{name}"] = np.array([start[k] for start in starts])
-            found[name] = np.array([attempt.estimate(name)[0] for attempt in attempts])
-        return found
+            columns[f"start.{name}"] = np.array([start[k] for start in starts])
+            columns[name] = np.array([attempt.estimate(name)[0] for attempt in attempts])
+        return columns
 
     def replay(
         self, settings: MultiStartCampaign, portion: Portion, files: Mapping[str, Path], row: int

@@ -81,12 +81,12 @@ class RecoveryKind:
         exact = values_of(truth, names)
         seeds = [seed_of(portion.seed, row) for row in range(portion.count)]
         attempts = [Attempt.at(partial(self._fitted, settings, truth, names, files, seed)) for seed in seeds]
-        found = outcome_columns(attempts)
+        columns = outcome_columns(attempts)
         for name, true in zip(names, exact, strict=True):
             value, sigma = np.array([attempt.estimate(name) for attempt in attempts]).T
             with np.errstate(divide="ignore", invalid="ignore"):
-                found |= {name: value, f"{name}.sigma": sigma, f"{name}.off": (value - true) / sigma}
-        return found
+                columns |= {name: value, f"{name}.sigma": sigma, f"{name}.off": (value - true) / sigma}
+        return columns
 
     def replay(
         self, settings: RecoveryCampaign, portion: Portion, files: Mapping[str, Path], row: int

@@ -52,11 +52,11 @@ class SweepKind:
     schema = SweepCampaign
 
     def files(self, settings: SweepCampaign) -> Sequence[NamedFile]:
-        found: dict[str, NamedFile] = {}
+        by_text: dict[str, NamedFile] = {}
         for choice in choices(settings):
             kind, inner = _inner(settings, choice)
-            found |= {file.text: file._replace(entry=f"each.{file.entry}") for file in kind.files(inner)}
-        return tuple(found.values())
+            by_text |= {file.text: file._replace(entry=f"each.{file.entry}") for file in kind.files(inner)}
+        return tuple(by_text.values())
 
     def parts(self, settings: SweepCampaign, folder: Path) -> tuple[Portion, ...]:
         if not settings.over or not all(settings.over.values()):
@@ -97,15 +97,15 @@ class SweepKind:
                 continue
             kind, inner = _inner(settings, choice)
             rows = {name: values[here] for name, values in table.items() if name not in names}
-            found = kind.findings(inner, rows | {"number": table["number"][here] - table["number"][here].min()})
-            careful += [f"{words_of(choice)}: {words}" for words in found.careful]
-            parts.append(found)
-            middles = [_middle(rows[name], factor) for name, (_, factor) in found.shown.items()]
+            findings = kind.findings(inner, rows | {"number": table["number"][here] - table["number"][here].min()})
+            careful += [f"{words_of(choice)}: {words}" for words in findings.careful]
+            parts.append(findings)
+            middles = [_middle(rows[name], factor) for name, (_, factor) in findings.shown.items()]
             values = tuple(str(_plain(choice[name])) for name in names)
-            told = (words.partition(" (")[0] for _, words, _ in found.summary)
+            told = (words.partition(" (")[0] for _, words, _ in findings.summary)
             cells.append((*values, str(int(here.sum())), *told, *middles))
-            if found.counted in rows:
-                shares.append((choice, int(np.sum(rows[found.counted] == 1)), int(here.sum())))
+            if findings.counted in rows:
+                shares.append((choice, int(np.sum(rows[findings.counted] == 1)), int(here.sum())))
         if not parts:
             return CampaignFindings((), {})
         first = parts[0]
@@ -144,14 +144,14 @@ def curves(shares: Sequence[tuple[dict[str, Any], int, int]], *, what: str) -> t
     along = max(numbers, key=lambda name: len(tried[name]), default="")
     if not along or len(tried[along]) < 2:
         return ()
-    found: dict[str, list[tuple[float, float, float, float]]] = {}
+    curve_points: dict[str, list[tuple[float, float, float, float]]] = {}
     for choice, count, of in sorted(shares, key=lambda share: float(share[0][along])):
         low, high = share_interval(count, of)
         others = words_of({name: value for name, value in choice.items() if name != along})
-        found.setdefault(others, []).append((choice[along], 100.0 * count / of, 100.0 * low, 100.0 * high))
+        curve_points.setdefault(others, []).append((choice[along], 100.0 * count / of, 100.0 * low, 100.0 * high))
     unit = _UNITS.get(along.rpartition(".")[2])
     along = f"{along} [{unit}]" if unit else along
-    return tuple(ChoiceCurve(f"{what} [%]", along, name, tuple(points)) for name, points in found.items())
+    return tuple(ChoiceCurve(f"{what} [%]", along, name, tuple(points)) for name, points in curve_points.items())
 
 
 def _inner(settings: SweepCampaign, choice: dict[str, Any]) -> tuple[CampaignKind, Any]:

@@ -130,16 +130,16 @@ def known(given: Mapping[str, float], *, frame: str) -> dict[str, float]:
     Raises:
         ControllerError: for a part of the rate controller that the law has not, where it is switched on.
     """
-    found = {**DEFAULTS, **BASE[frame]}
+    values = {**DEFAULTS, **BASE[frame]}
     for name, value in given.items():
         if name.startswith(("ATC_RAT_", "PSC_")) and name.endswith(_REFUSED) and value != 0.0:
             raise ControllerError(f"is {value:g}; the rebuilt law has no such part, expected 0.", channel=name)
         own, factor = RENAMED.get(name, (name, 1.0))
-        if own in found:
-            found[own] = factor * float(value)
-    return found
+        if own in values:
+            values[own] = factor * float(value)
+    return values
 
 
-def renamed(found: Mapping[str, float]) -> dict[str, float]:
+def renamed(parameters: Mapping[str, float]) -> dict[str, float]:
     """The same parameters by 4.7's names, of those that it calls otherwise."""
-    return {new: found[old] / factor for new, (old, factor) in RENAMED.items() if old in found}
+    return {new: parameters[old] / factor for new, (old, factor) in RENAMED.items() if old in parameters}
