@@ -134,14 +134,16 @@ def model_document(model: Any) -> Any:
     return {"kind": "transfer-functions", "functions": [encode(one) for one in model]}
 
 
-def model_from(document: Any, *, where: str, at: str, equations: Vehicle | None) -> Any:
+def model_from(document: object, *, where: str, at: str, equations: Vehicle | None) -> Any:
     """The model of a document.
 
     Raises:
         DocumentError: for another kind of document, naming the entry.
         CardError: for a model that cannot be made again.
     """
-    kind = document.get("kind") if isinstance(document, dict) else None
+    if not isinstance(document, dict):
+        raise DocumentError("is None, expected a kind of model.", where=where, channel=f"{at}.kind")
+    kind = document.get("kind")
     if kind == "vehicle":
         path = document.get("path", "")
         card = card_from({k: v for k, v in document.items() if k != "path"}, path=where)
