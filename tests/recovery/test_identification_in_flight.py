@@ -130,6 +130,8 @@ def _coax() -> Vehicle:
 
 
 HOURS = float(os.environ.get("SWASH_ALARM_HOURS", "10"))
+STATED = 1.0
+"""False alarms an hour in gusts, of which the how-to says that there are fewer (95 % of confidence)."""
 PIECE = 600.0
 """Seconds that are simulated at a time."""
 WATCH = """
@@ -205,10 +207,10 @@ def test_false_alarms_are_rare(watched: ctypes.CDLL, gust: float) -> None:
             f" alarms where it is {LIMIT:g} sigmas off for {0.01 * HOLD:g} s.",
             "columns": ["alarms", "hours", "most sigmas", "alarms an hour are fewer than (95 %)"],
             "rows": [[alarms, counted, worst.value, most]],
-            "passed": alarms == 0 or bool(gust),
+            "passed": most < STATED if gust else alarms == 0,
         },
     )
-    assert alarms == 0 or gust
+    assert most < STATED if gust else alarms == 0
 
 
 COUPLED = 0.25
