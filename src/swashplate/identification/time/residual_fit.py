@@ -4,7 +4,8 @@ Noise, filtered states and the records' constants stay where the fit has them; t
 Gauss-Newton from zero on what the fit itself made small: its innovations, or its errors some time ahead. Of innovations
 the physics moves too: while it stood alone, it took over what the residual is for. Each coefficient is held towards
 zero, in units in which one makes an acceleration as large as the disturbance that the filter saw; how hard, blocks left
-out say (`residual_strength`).
+out say (`residual_strength`). A block begins without the accelerations that its flight has of its own (`push_*`): its
+drifts find them (docs/decisions/0143).
 
 Blocks tell chance from what is always there, not what causes it. Of innovations, only accelerations of axes that a
 flight moves by itself have coefficients: elsewhere a steady error of a log looks like an effect of what the controller
