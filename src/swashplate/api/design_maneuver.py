@@ -18,14 +18,13 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.flights.maneuvers.composed import composed
 from swashplate.flights.maneuvers.multisine import dealt
 from swashplate.flights.maneuvers.series import AXES, DEFAULT_AMPLITUDE, Maneuver, parse
-from swashplate.identification.design.information import (
-    sensed,
-)
+from swashplate.identification.design.information import sensed
 from swashplate.identification.design.powers import best_powers
 from swashplate.models.vehicle import Vehicle
 from swashplate.registry import listed
 from swashplate.simulation.closed_loop import Controller
 from swashplate.simulation.trim import Trim
+from swashplate.validation.validate import observer_of
 
 LIMITS = ("amplitude", "attitude", "rate", "place", "battery", "seconds")
 """What may be limited: deflection [1], attitude from trim [deg], body rates [deg/s], distance [m], a battery's flight
@@ -78,7 +77,8 @@ def design_maneuver(
         robust: "average" over draws of the prior, or for the "worst" of them.
         spread: the unknowns are drawn within this share about the model's; 0 trusts the model.
         draws: how many, the model itself among them.
-        noise: of air and sensors; what fits begin with where None.
+        noise: of air and sensors. Where None, what the model's own identification found; else (and where that estimated
+            a wind, beside which the gusts say too little) what fits of indoor flights begin with.
         controller: of the closed loop; the hold of the vehicle's kind where None.
         rate: of the series and of the log [Hz].
         seed: of the draws.
@@ -95,7 +95,7 @@ def design_maneuver(
     if aim is not None and (chosen != "A" or not spread > 0.0):
         raise ManeuverError("is for the criterion A, and for unknowns with a spread above zero.", channel="aim")
     moved = _axes_of(vehicle, axes)
-    seconds, noise = kept["seconds"], noise or Noise()
+    seconds, (expected, source) = kept["seconds"], _expected_noise(vehicle, noise)
     if "battery" in kept and seconds + 2.0 * LEAD > kept["battery"]:
         raise ManeuverError(
             f"{seconds:g} s and {2.0 * LEAD:g} s of hover are more than the battery's {kept['battery']:g} s.",
@@ -117,7 +117,7 @@ def design_maneuver(
     known = np.diag(np.append(np.full(len(unknown), max(spread, 0.05) ** -2.0), 1.0))
     wanted = None if aim is None else aim_of(aim, models, unknown, controller or usual_hold)
     seen = [sensed(one, unknown) for one in models]
-    told = DesignDraws(models, seen, unknown, noise, rate, controller or usual_hold, wanted, values, known)
+    told = DesignDraws(models, seen, unknown, expected, rate, controller or usual_hold, wanted, values, known)
     say("probing the closed loop")
     numbers = np.concatenate(lines)
     owner = np.repeat(np.arange(len(moved)), [own.size for own in lines])
@@ -167,6 +167,7 @@ def design_maneuver(
         len(models),
         spread,
         rate,
+        noise=source,
         aim=aim or "",
         units=units,
         before=before,
@@ -222,6 +223,16 @@ def _checked(criterion: str, robust: str, spread: float, draws: int, band: tuple
         raise ManeuverError(
             f"is {band[0]:g} to {band[1]:g} Hz, expected it to rise to at most {0.4 * rate:g} Hz.", channel="band"
         )
+
+
+def _expected_noise(vehicle: Vehicle, noise: Noise | None) -> tuple[Noise, str]:
+    """Noise to design for, and in words whose it is."""
+    if noise is not None:
+        return noise, "as given"
+    learnt = observer_of(vehicle)[0]
+    if not vehicle.card.observer.get("noise") or learnt.wind > 0.0:
+        return Noise(), "usual indoors"
+    return learnt, "of the model's flights"
 
 
 def _axes_of(vehicle: Vehicle, axes: Sequence[str] | None) -> tuple[str, ...]:

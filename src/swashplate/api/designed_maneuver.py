@@ -61,6 +61,7 @@ class DesignedManeuver(Shown):
         buys: seconds of the designed one, and the bounds then.
         limits: that were kept. criterion, robust, draws, spread: see `design_maneuver`.
         rate: of the series [Hz].
+        noise: whose noise of air and sensors the bounds are for, in words.
         aim: what it is for instead of the unknowns; "" for none.
         units: of each number of the aim, what a relative error of one is. before: what is not known without a flight.
     """
@@ -75,6 +76,7 @@ class DesignedManeuver(Shown):
     draws: int
     spread: float
     rate: float
+    noise: str = "usual indoors"
     aim: str = ""
     units: Mapping[str, float] = field(default_factory=dict)
     before: Mapping[str, float] = field(default_factory=dict)
@@ -159,7 +161,7 @@ class DesignedManeuver(Shown):
             f"  [ ] beyond {limits['attitude']:g} deg, {limits['rate']:g} deg/s or {limits['place']:g} m; "
             "an input at its limit for a second; a sound that is new; battery low",
             "After",
-            f"  [ ] the bounds should be {', '.join(bounds)}",
+            f"  [ ] the bounds should be {', '.join(bounds)} (noise {self.noise})",
         ]
         return "\n".join(lines)
 
@@ -202,6 +204,7 @@ class DesignedManeuver(Shown):
             "aim": self.aim,
             "before": dict(self.before),
             "criterion": self.criterion,
+            "noise": self.noise,
             "robust": self.robust,
             "draws": self.draws,
             "spread": self.spread,

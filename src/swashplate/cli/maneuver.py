@@ -149,7 +149,8 @@ def design(
 ) -> None:
     """Design a multisine for unknown parameters, in the closed loop, and compare it with a sweep and a 3-2-1-1.
 
-    Prints the expected bounds of each, how they improve with each second, and a flight card. If no maneuver within
+    Prints the expected bounds of each, how they improve with each second, and a flight card. The bounds are for the
+    noise that the model's own identification found, or else for that of usual indoor flights. If no maneuver within
     the limits determines all parameters, the exit code is 2, and the reason is printed.
     """
     import swashplate as sp

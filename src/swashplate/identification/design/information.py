@@ -119,12 +119,15 @@ def output_noise(model: Sensed, frequency: Array, noise: Noise, *, rate: float) 
     w = 2.0 * np.pi * frequency
     white = on_axes(noise.white_horizontal, noise.white_vertical, noise.white_tilt, noise.white_yaw)
     gust = on_axes(noise.gust_horizontal, noise.gust_vertical, noise.gust_tilt, noise.gust_yaw)
-    tau = on_axes(noise.tau_gust_force, noise.tau_gust_force, noise.tau_gust_moment, noise.tau_gust_moment)
-    drift = on_axes(noise.drift_force, noise.drift_force, noise.drift_moment, noise.drift_moment)
+    force, moment = noise.tau_gust_force, noise.tau_gust_moment  # yaw and heave may have their own
+    tau = on_axes(force, noise.tau_gust_vertical or force, moment, noise.tau_gust_yaw or moment)
+    force, moment = noise.drift_force, noise.drift_moment
+    drift = on_axes(force, noise.drift_vertical or force, moment, noise.drift_yaw or moment)
     power = [a**2 + b**2 / (w**2 + t**-2.0) + c**2 / w**2 for a, b, t, c in zip(white, gust, tau, drift, strict=True)]
     way = _resolvent(model, w)[:, model.outputs][:, :, model.disturbed]
     spread = np.einsum("fij,jf,fkj->fik", way, np.array(power), way.conj())
-    sensors = np.array([noise.sensor_position] * 3 + [noise.sensor_angle] * 3) ** 2 / rate
+    angle, heading = noise.sensor_angle, noise.sensor_heading or noise.sensor_angle
+    sensors = np.array([noise.sensor_position] * 3 + [angle, angle, heading]) ** 2 / rate
     return np.asarray(spread + np.diag(sensors))
 
 

@@ -59,6 +59,16 @@ def test_the_noise_of_a_fast_line_is_the_sensors() -> None:
     assert slow[0, 0].real > 100.0 * found[0, 0].real  # gusts
 
 
+@pytest.mark.parametrize(
+    ("own", "louder", "same"), [("drift_yaw", 5, 2), ("drift_vertical", 2, 5), ("sensor_heading", 5, 2)]
+)
+def test_yaw_and_heave_may_have_noise_of_their_own(own: str, louder: int, same: int) -> None:
+    """What is zero is shared, as in the likelihoods."""
+    usual, loud = (output_noise(coax(), LINES, n, rate=100.0) for n in (Noise(), Noise()._replace(**{own: 30.0})))
+    assert np.all(loud[:, louder, louder].real > 1.1 * usual[:, louder, louder].real)
+    np.testing.assert_allclose(loud[:, same, same], usual[:, same, same], rtol=0.05)
+
+
 def test_bounds_know_what_nothing_tells() -> None:
     np.testing.assert_allclose(bounds_from(np.diag([4.0, 100.0, 0.0])), [0.5, 0.1])
     assert bounds_from(np.diag([4.0, 0.0, 1.0]))[1] == np.inf
