@@ -55,7 +55,7 @@ def flown_in_gusts(
 ) -> Flight:
     """The same in horizontal gusts: Ornstein-Uhlenbeck, standard deviation `sigma` [m/s], fading in `fade` [s].
 
-    `hover_hold` leaves roll and pitch to themselves, an open loop in what is identified; `state_hold` keeps all states.
+    `hover_hold` is fed with true states, and holds roll and pitch weakly with its servos.
     """
     random = np.random.default_rng(seed)
     keep = np.exp(-1.0 / (rate * fade))

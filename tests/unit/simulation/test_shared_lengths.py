@@ -31,7 +31,7 @@ def test_the_last_row_is_repeated() -> None:
 
 def test_flights_of_other_lengths_and_delays_are_the_same_and_compile_once() -> None:
     vehicle = sp.vehicle("coax")
-    control = sp.state_hold(vehicle, sp.trim(vehicle))
+    control = sp.state_hold(vehicle, sp.trim(vehicle), effort=0.03)
     flown = [
         sp.simulate_closed_loop(
             vehicle, control, duration=seconds, reference={"z": -0.2}, rate=100.0, delays=0.03, start=sp.trim(vehicle)
@@ -50,7 +50,7 @@ def test_flights_of_other_lengths_and_delays_are_the_same_and_compile_once() -> 
 
 def test_a_batch_keeps_the_samples_that_were_asked_for() -> None:
     vehicle = sp.vehicle("coax")
-    control = sp.state_hold(vehicle, sp.trim(vehicle))
+    control = sp.state_hold(vehicle, sp.trim(vehicle), effort=0.03)
     batch = simulate_closed_loops(vehicle, control, duration=0.5, size=2, rate=100.0, keep=4)
     assert len(batch.time) == round(0.5 * control.rate) // 4
 
@@ -58,7 +58,7 @@ def test_a_batch_keeps_the_samples_that_were_asked_for() -> None:
 def test_any_number_of_vehicles_and_any_delay_fly_one_program() -> None:
     """What is compiled knows neither how many fly, nor how long, nor how late up to the next power of two."""
     vehicle = sp.vehicle("coax")
-    control, start = sp.state_hold(vehicle, sp.trim(vehicle)), sp.trim(vehicle)
+    control, start = sp.state_hold(vehicle, sp.trim(vehicle), effort=0.03), sp.trim(vehicle)
     places, batches, compiled = np.linspace(-0.3, 0.3, 9), [], []
     for size, seconds, delay in ((9, 0.6, 0.03), (3, 0.5, 0.04), (1, 0.6, 0.035)):
         wind = {"wind_north": places[:size]} if size > 1 else {"wind_north": places[0]}

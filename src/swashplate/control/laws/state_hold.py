@@ -33,6 +33,9 @@ _ALLOWED = {
 }
 """Deviations [m, m/s, rad, rad/s] that weigh as much as a tenth of an input's range (Bryson's rule)."""
 
+_GROWS = 1.001
+"""A sampled loop whose deviations grow more than this from sample to sample does not hold; a free place has 1."""
+
 
 @dataclass(frozen=True)
 class StateHold:
@@ -64,7 +67,7 @@ def state_hold(
         spans: their ranges [unit of the inputs], shape (k,); those of the inputs' limits if not given.
 
     Raises:
-        SwashError: where no gain exists that holds it.
+        SwashError: where no gain exists that holds it, or none at this rate.
     """
     model = linearize(vehicle, trim)
     held = {name for name, _ in vehicle.trim_held}
@@ -90,6 +93,16 @@ def state_hold(
     K = along @ (((effort * spans) ** 2)[:, None] * B.T @ cost)
     if trim.speed or trim.lateral or trim.climb or trim.turn:
         K[:, :2] = 0.0
+    n, m = model.B.shape
+    held_over = scipy.linalg.expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) / rate)
+    grows = float(np.abs(np.linalg.eigvals(held_over[:n, :n] - held_over[:n, n:] @ K)).max())
+    if grows > _GROWS:
+        raise SwashError(
+            f"the state feedback is too fast for {rate:g} samples a second: from one to the next a deviation grows "
+            f"{grows:.2f} times, expected to fade.",
+            where=vehicle.name,
+            hint="Give a higher rate=, or a smaller effort=.",
+        )
     step = partial(state_hold_step, inputs=len(vehicle.input_names), states=len(weights))
     return StateHold(rate, np.zeros(1), np.concatenate([K.ravel(), trim.inputs, trim.state]), _hashable(step))
 
