@@ -47,11 +47,15 @@ class StateHold:
     step: Step
 
 
+_RATES = (50.0, 100.0, 200.0, 400.0)
+"""Of a hold whose rate is not given [Hz]."""
+
+
 def state_hold(
     vehicle: Vehicle,
     trim: Trim,
     *,
-    rate: float = 50.0,
+    rate: float | None = None,
     effort: float = 0.1,
     along: Array | None = None,
     spans: Array | None = None,
@@ -61,7 +65,7 @@ def state_hold(
     Args:
         vehicle: any with a rigid body.
         trim: what to hold; inputs that it held itself (a throttle) stay.
-        rate: how often it runs [Hz].
+        rate: how often it runs [Hz]; the slowest of 50, 100, 200 and 400 that its gains allow, if not given.
         effort: share of an input's range that weighs as much as the allowed deviations.
         along: combinations of inputs that it moves, shape (n_inputs, k); each input alone if not given.
         spans: their ranges [unit of the inputs], shape (k,); those of the inputs' limits if not given.
@@ -93,18 +97,25 @@ def state_hold(
     K = along @ (((effort * spans) ** 2)[:, None] * B.T @ cost)
     if trim.speed or trim.lateral or trim.climb or trim.turn:
         K[:, :2] = 0.0
-    n, m = model.B.shape
-    held_over = scipy.linalg.expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) / rate)
-    grows = float(np.abs(np.linalg.eigvals(held_over[:n, :n] - held_over[:n, n:] @ K)).max())
-    if grows > _GROWS:
+    rates = _RATES if rate is None else (rate,)
+    growths = [_growth(model.A, model.B, K, each) for each in rates]
+    slowest = next((each for each, grows in zip(rates, growths, strict=True) if grows <= _GROWS), None)
+    if slowest is None:
         raise SwashError(
-            f"the state feedback is too fast for {rate:g} samples a second: from one to the next a deviation grows "
-            f"{grows:.2f} times, expected to fade.",
+            f"the state feedback is too fast for {rates[-1]:g} samples a second: from one to the next a deviation "
+            f"grows {growths[-1]:.2f} times, expected to fade.",
             where=vehicle.name,
             hint="Give a higher rate=, or a smaller effort=.",
         )
     step = partial(state_hold_step, inputs=len(vehicle.input_names), states=len(weights))
-    return StateHold(rate, np.zeros(1), np.concatenate([K.ravel(), trim.inputs, trim.state]), _hashable(step))
+    return StateHold(slowest, np.zeros(1), np.concatenate([K.ravel(), trim.inputs, trim.state]), _hashable(step))
+
+
+def _growth(A: Array, B: Array, K: Array, rate: float) -> float:
+    """By how much the worst deviation grows from one sample to the next, with commands held between them."""
+    n, m = B.shape
+    held_over = scipy.linalg.expm(np.block([[A, B], [np.zeros((m, n + m))]]) / rate)
+    return float(np.abs(np.linalg.eigvals(held_over[:n, :n] - held_over[:n, n:] @ K)).max())
 
 
 def _hashable(step: Step) -> Step:
