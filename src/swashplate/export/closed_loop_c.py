@@ -33,7 +33,7 @@ void body_fly(int n, int every, int depth, double dt, const int *place, const in
               const double *start, const double *p, const double *limits, double *sent, const double *around,
               const double *voltage, const double *wanted, const double *added, const double *draws, double *states,
               double *inputs) {
-  static double work[N_LONGEST], after[N_MEMORY + N_INPUTS];
+  double work[N_LONGEST], after[N_MEMORY + N_INPUTS]; /* on the stack: several threads may fly */
   int whole[N_WHOLE], i, j, k;
   const double *arguments[N_ARGUMENTS];
   double *results[N_RESULTS], x[N_STATES], told[N_TOLD], measured[N_MEASURED];

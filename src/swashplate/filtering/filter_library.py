@@ -76,8 +76,5 @@ def filter_library(model: StochasticModel) -> FilterLibrary | None:
         return None
     try:
         return FilterLibrary(model)
-    except (
-        SwashError,
-        OSError,
-    ):  # equations that are not printed, a compiler that refuses, a library that does not load
+    except (SwashError, OSError):  # no C of these equations, a compiler that refuses, a library that does not load
         return None

@@ -86,7 +86,7 @@ def validate(
         calibration: seconds at the start of each record.
         close_loop: axes ("yaw", "heave") whose controller, as those seconds tell it, also predicts in the place of the
             recorded command, which answers gusts that no prediction knows.
-        draws: models that the fit cannot tell from this one (`fit.draw(20, seed=1)`). Each predicts too; bands of their
+        draws: models that the fit cannot tell from this one (`fit.draw(39, seed=1)`). Each predicts too; bands of their
             spread, of the start, of the gusts to come and of the sensors' noise are held against the flights.
         progress: called with the number of records done and their number.
 

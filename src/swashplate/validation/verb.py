@@ -78,7 +78,7 @@ def validate(
         every: seconds between starts.
         calibration: seconds at the start of each record that tell its delays and trims.
         close_loop: axes ("yaw", "heave") whose controller also predicts in the place of the recorded command.
-        draws: models that the fit cannot tell from this one (`fit.draw(20, seed=1)`), for bands of what is not known.
+        draws: models that the fit cannot tell from this one (`fit.draw(39, seed=1)`), for bands of what is not known.
         outputs: channels to compare, for models that are flown along the inputs; all that both have where None.
         progress: called with the number of records done and their number.
 

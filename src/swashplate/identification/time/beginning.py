@@ -47,7 +47,7 @@ _BODY = len(RigidBody._fields)
 _ASIDE = 2e-3
 """How far to either side of a row slopes are taken, in scaled units, by four points: exact to 1e-10."""
 
-_IMAGINARY = 1e-30
+IMAGINARY = 1e-30
 """Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
 
 _PUSHES = np.array([Nuisance._fields.index(name) for name in PUSHES])
@@ -216,8 +216,8 @@ def _measured_slopes(model: StochasticModel, x: Array, nuisance: Nuisance) -> Ar
     names = model.vehicle.state_names
     measured = np.tile(np.eye(len(names))[[names.index(name) for name in model.output_names]], (len(x), 1, 1))
     for place in (names.index(name) for name in ("phi", "theta", "psi")):
-        turned = x + 1j * _IMAGINARY * np.eye(len(names))[place]
-        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / _IMAGINARY
+        turned = x + 1j * IMAGINARY * np.eye(len(names))[place]
+        measured[:, :, place] = np.imag(model.measure(turned.T, nuisance, _ComplexArrays())).T / IMAGINARY
     return measured
 
 

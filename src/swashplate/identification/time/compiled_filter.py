@@ -16,11 +16,8 @@ from swashplate.arrays import Array
 from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterGain, FilterState, StochasticModel
 from swashplate.filtering.filter_library import FilterLibrary, filter_library, flat
-from swashplate.identification.time.beginning import Begun, FilterNumbers, first_state, numbers_and_constants
+from swashplate.identification.time.beginning import IMAGINARY, Begun, FilterNumbers, first_state, numbers_and_constants
 from swashplate.simulation.dynamics import CONSTANTS
-
-_IMAGINARY = 1e-30
-"""Step of a slope by complex numbers, exact to rounding (Squire and Trapp 1998)."""
 
 
 class FilterRun(NamedTuple):
@@ -109,7 +106,7 @@ class CompiledFilter:
 
     def _given_moved(self, gain: FilterGain, numbers: FilterNumbers, directions: FilterNumbers) -> Array:
         rows, count = _gain(gain), len(directions.noise)
-        passing = np.imag(self._passing(numbers.noise + 1j * _IMAGINARY * directions.noise)) / _IMAGINARY
+        passing = np.imag(self._passing(numbers.noise + 1j * IMAGINARY * directions.noise)) / IMAGINARY
         return np.concatenate([rows.reshape(count, -1), directions.nuisance, passing], axis=1)
 
     def _passing(self, noise: Array) -> Array:

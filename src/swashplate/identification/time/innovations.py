@@ -22,6 +22,7 @@ from swashplate.filtering.nuisance import Nuisance
 from swashplate.identification.core.parameters import Layout
 from swashplate.identification.core.robust import losses
 from swashplate.identification.time.beginning import (
+    IMAGINARY,
     Begun,
     FilterNumbers,
     FirstMotion,
@@ -33,9 +34,6 @@ from swashplate.identification.time.beginning import (
 )
 from swashplate.identification.time.compiled_filter import FilterRun
 from swashplate.identification.time.record_filter import along, moved
-
-_COMPLEX = 1e-30
-"""Step of a slope by complex numbers, exact to rounding for ties, which are rational (Squire and Trapp 1998)."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +120,8 @@ class RecordRun:
             np.zeros((p, len(run.numbers.inputs))),
         )
         for i in range(k):
-            step = numbers[:k] + 1j * _COMPLEX * (np.arange(k) == i)
-            directions.parameters[i] = np.imag(np.array(self.plan.layout.values(card, step))) / _COMPLEX
+            step = numbers[:k] + 1j * IMAGINARY * (np.arange(k) == i)
+            directions.parameters[i] = np.imag(np.array(self.plan.layout.values(card, step))) / IMAGINARY
         directions.nuisance[np.arange(own, own + m), _places(Nuisance, self.plan.nuisances)] = 1.0
         directions.noise[np.arange(p - noises.size, p), noises] = run.numbers.noise[noises]
         directions.inputs[own : own + m] = by_command[:, : starting_samples(model.dt)].mean(axis=1)
