@@ -146,18 +146,14 @@ def _identified(model: Vehicle) -> Vehicle | StateSpaceModel:
     return model if model.structure is None else model.structure
 
 
-def _entries(model: Vehicle) -> Mapping[str, Any]:
-    return model.card.parameters if model.structure is None else model.structure.parameters
-
-
 def values_of(model: Vehicle, names: Sequence[str]) -> Array:
     """Values of a model's numbers (p,)."""
-    return np.array([_entries(model)[name].value for name in names], dtype=np.float64)
+    return np.array([model.numbers[name].value for name in names], dtype=np.float64)
 
 
 def spreads_of(model: Vehicle, names: Sequence[str]) -> Array:
     """Standard deviations of a model's numbers (p,), one where none is known."""
-    return np.array([getattr(_entries(model)[name], "sigma", None) or 1.0 for name in names], dtype=np.float64)
+    return np.array([getattr(model.numbers[name], "sigma", None) or 1.0 for name in names], dtype=np.float64)
 
 
 def within_bounds(model: Vehicle, names: Sequence[str], values: Array) -> Array:
