@@ -193,7 +193,8 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
         (("count = 4", "counts = 4"), "counts: is not known here"),
         (("gusty.nc", "missing.nc"), "flights: there is no file 'missing.nc'. It is looked for in"),
         (("seed = 3", "factor = 0.5"), "factor, same: expected factor above 1"),
-        (('flights = ["gusty.nc"]', ""), "expected either flights or responses"),
+        (('flights = ["gusty.nc"]', ""), "c.toml: flights: expected either flights or responses"),
+        (('"roll.toml"', '"rool"'), "rool: is neither a vehicle's name nor a file"),
     ],
 )
 def test_a_file_that_is_none_is_refused(place: Path, tmp_path: Path, change: tuple[str, str], said: str) -> None:
