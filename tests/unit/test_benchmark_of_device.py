@@ -45,5 +45,15 @@ def test_a_coax_in_float32_stays_with_float64_for_a_second() -> None:
     assert found.flops > 1e3
 
 
+def test_crazyflow_computes_before_jax_is_switched_to_double_precision(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    found = device.Measured("a card", 4, 100, 2e9, 1e-5, 1.0, 1.0)
+    monkeypatch.setattr(device, "measure", lambda *_, **__: (told.append("ours"), found)[1])
+    monkeypatch.setattr(device, "crazyflow", lambda **asked: (told.append(f"theirs {asked['steps']}"), 3.0)[1])
+    monkeypatch.setattr("sys.argv", ["device", "--crazyflow", "--seconds", "2"])
+    device.main()
+    assert told == ["theirs 200", "ours"]
+
+
 def test_what_is_not_installed_is_said() -> None:
     assert device.crazyflow(vehicles=2, steps=1) == "crazyflow is not installed: not compared"

@@ -177,25 +177,21 @@ def _planned(text: str, place: Path, *, where: str) -> CampaignPlan:
     if settings.count < 1 or (settings.batch is not None and settings.batch < 1):
         raise CampaignError("is less than one.", where=where, channel="count" if settings.count < 1 else "batch")
     files = {}
-    for entry, name, or_name in kind.files(settings):
-        path = place / name
-        if is_file(path):
-            files[name] = path.read_bytes()
-        elif not or_name:
-            raise CampaignError(
-                f"there is no file '{name}'.", where=where, channel=entry, hint=f"It is looked for in {place}."
-            )
+    try:
+        for entry, name, or_name in kind.files(settings):
+            if is_file(place / name):
+                files[name] = (place / name).read_bytes()
+            elif or_name:
+                vehicle_of(name)  # says what there is
+            else:
+                raise CampaignError(f"there is no file '{name}'.", channel=entry, hint=f"It is looked for in {place}.")
+        parts = kind.parts(settings, place)
+    except SwashError as error:  # as in a worker, where the file's name is not known
+        raise CampaignError(error.problem, where=error.where or where, channel=error.channel, hint=error.hint) from None
     if sum(map(len, files.values())) > _LARGEST:
         raise CampaignError(
             f"its files have more than {_LARGEST >> 20} MiB, and every task takes them along.", where=where
         )
-    try:
-        for _, name, or_name in kind.files(settings):
-            if or_name and name not in files:
-                vehicle_of(name)  # says what there is
-        parts = kind.parts(settings, place)
-    except SwashError as error:  # as in a worker, where the file's name is not known
-        raise CampaignError(error.problem, where=error.where or where, channel=error.channel, hint=error.hint) from None
     whole = msgspec.to_builtins(settings)
     tasks = made_tasks(str(document["of"]), matters(whole), parts, files=files, program=program())
     return CampaignPlan(text, place, str(document["of"]), whole, tasks)
