@@ -14,7 +14,7 @@ from swashplate.api.campaigns.flown import vehicle_of
 from swashplate.api.campaigns.kind import CampaignSettings, NamedFile
 from swashplate.api.campaigns.tasks import Columns
 from swashplate.arrays import Array
-from swashplate.errors import SwashError
+from swashplate.errors import CampaignError, SwashError
 from swashplate.flights.flight import Flight
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.parameters import parameterize
@@ -45,8 +45,15 @@ class FitCampaign(CampaignSettings, forbid_unknown_fields=True, kw_only=True, fr
 
         Raises:
             IdentificationError, CardError: for names that the model does not have.
+            CampaignError: for names beside a state-space model, whose file says itself what is free.
         """
         if model.structure is not None:
+            if self.free is not None:
+                raise CampaignError(
+                    f"is {self.free!r}, and '{model.structure.name}' is a state-space model.",
+                    channel="free",
+                    hint="Leave it out: what its file does not call fixed is free.",
+                )
             return model.structure.free
         return parameterize(model, "full" if self.free is None else self.free, ties=self.ties).names
 
