@@ -125,6 +125,20 @@ def slopes(record: Record, places: Array) -> tuple[Array, Array]:
     return np.array(values), np.array(rates)
 
 
+def slopes_ahead(record: Record) -> tuple[Array, Array]:
+    """What `slopes` would say of the first sample of a record that begins at any of its samples but the last few.
+
+    Returns:
+        Measured channels and their rates by the line through what follows, each (places, outputs).
+    """
+    reach = min(max(2, round(_SPAN / record.dt)), record.time.size - 1)
+    line = np.linalg.pinv(np.vander(record.dt * np.arange(reach + 1), 2, increasing=True))
+    values, rates = np.moveaxis(
+        np.lib.stride_tricks.sliding_window_view(record.outputs, reach + 1, axis=0) @ line.T, 2, 0
+    )
+    return values, rates
+
+
 def start_state(
     vehicle: Vehicle,
     output_names: tuple[str, ...],
