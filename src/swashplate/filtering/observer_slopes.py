@@ -15,8 +15,8 @@ from swashplate.arrays import Array
 from swashplate.filtering.matrix_operations import JaxMatrices
 from swashplate.filtering.observer import Numbers, ObserverPlan
 from swashplate.physics.backend import Backend
-from swashplate.physics.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.compilation import RUN_RARELY
+from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.dynamics import enable_double_precision
 
 OfObserver = Callable[[ObserverPlan, Numbers, Sequence[Any], Sequence[Any], Backend], list[Any]]

@@ -18,9 +18,9 @@ from swashplate.models.nesting import rebuild
 from swashplate.models.surroundings import environment_of
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.backend import JaxBackend
-from swashplate.physics.dual import CANNOT, DUAL, slopes_of
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import RUN_RARELY, compile_small_loops_whole
+from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation.trigonometry import vector_backend
 
 Rates = Callable[[Any, Any, Any, Environment], Any]

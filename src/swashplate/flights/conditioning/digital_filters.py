@@ -6,6 +6,8 @@ their numbers to rounding (the tests compare them).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.linalg.blas import dtbsv
 
@@ -85,16 +87,12 @@ def savitzky_golay(values: Array, length: int, order: int, *, derivative: int = 
         derivative: 0 for the values themselves.
         step: between samples, for derivatives.
     """
-    n, half = len(values), length // 2
+    half, last = length // 2, len(values) - length + 1
     table = np.vander(np.arange(-half, half + 1.0), order + 1, increasing=True)
-    fitted = np.linalg.pinv(table)  # coefficients from samples
-    factor = float(np.prod(np.arange(1, derivative + 1))) / step**derivative
-    columns = values.reshape(n, -1).T
-    inside = [np.convolve(column, factor * fitted[derivative][::-1], mode="valid") for column in columns]
-    made = np.empty((n, len(columns)))
-    made[half : n - half] = np.stack(inside, axis=1)
-    for end, first in ((slice(0, half), slice(0, length)), (slice(n - half, n), slice(n - length, n))):
-        places = np.arange(-half, 0.0) if end.start == 0 else np.arange(1.0, half + 1)
-        whole = [np.polynomial.Polynomial(fitted @ column[first]).deriv(derivative) for column in columns]
-        made[end] = np.stack([polynomial(places) for polynomial in whole], axis=1) / step**derivative
-    return made.reshape(values.shape)
+    derived = np.zeros_like(table)
+    factor = np.array([math.perm(k, derivative) for k in range(derivative, order + 1)], dtype=np.float64)
+    derived[:, derivative:] = factor * table[:, : order + 1 - derivative]
+    weights = derived @ np.linalg.pinv(table) / step**derivative  # at each place of a window, from the values there
+    inner = sum(weight * values[k : k + last] for k, weight in enumerate(weights[half]))
+    ends = weights[:half] @ values[:length], weights[half + 1 :] @ values[-length:]
+    return np.concatenate([ends[0], inner, ends[1]])

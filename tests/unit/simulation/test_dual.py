@@ -12,8 +12,8 @@ import pytest
 
 import swashplate as sp
 from swashplate.physics.backend import JaxBackend
-from swashplate.physics.dual import CANNOT, DUAL, slopes_of
 from swashplate.simulation import dynamics
+from swashplate.simulation.dual import CANNOT, DUAL, slopes_of
 
 RULES: dict[str, Callable[[Any, Any, Any], Any]] = {
     "sums": lambda a, b, xp: 2.0 + a - b - 1.0 + (3.0 - a) + (-b) + (+a),
