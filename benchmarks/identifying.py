@@ -31,11 +31,15 @@ WARM = {"output-error": 5.0, "prediction-error": 12.0}
 COLD = 60.0
 FIRST = {
     "identify, cold": 10.0,
-    "identify, warm": 8.0,
-    "validate, cold": 8.0,
-    "validate, warm": 7.0,
+    "identify, warm": 5.0,
+    "validate, cold": 6.0,
+    "validate, warm": 6.0,
     "identify helicopter, cold": 20.0,
     "identify helicopter, warm": 12.0,
+    "control design, cold": 2.0,
+    "control design, warm": 2.0,
+    "control check, cold": 4.5,
+    "control check, warm": 4.0,
 }
 """Seconds of processor time of whole commands, from the start of the program to its report."""
 FIRST_MEMORY = 0.8
@@ -89,7 +93,7 @@ def cold(method: str) -> Span:
 
 
 def first_answers(logged: sp.Flight) -> list[Span]:
-    """`swash identify` and `swash validate` as a user calls them, first with nothing compiled, then again.
+    """`swash identify`, `validate`, `control design` and `check` as a user calls them, nothing compiled, then again.
 
     Of a CoaX, and `identify` of a helicopter (the docs' Raptor 50), whose equations find roots.
     """
@@ -102,12 +106,16 @@ def first_answers(logged: sp.Flight) -> list[Span]:
         judge = ["--model", str(folder / "fit" / "model.toml"), *seen, "--out", str(folder / "judged")]
         fly = ["--maneuver", "multisine:roll+pitch,0.6-5Hz,20s,0.02", "--sensors", "clean"]
         flown = ["--vehicle", "raptor50", "--flight", str(folder / "heli.nc"), "--free", "rotor"]
+        law = str(folder / "law.toml")
+        check = ["control", "check", "coax", "--controller", law, "--out", str(folder / "check")]
         _used(["simulate", "--vehicle", "raptor50", *fly, "--out", str(folder / "heli.nc")], folder / "flying")
         spans = []
         for what, words in (
             ("identify", ["identify", *fit]),
             ("validate", ["validate", *judge]),
             ("identify helicopter", ["identify", *flown, "--out", str(folder / "heli")]),
+            ("control design", ["control", "design", "coax", "--out", law]),
+            ("control check", check),
         ):
             for state in ("cold", "warm"):  # a cache of its own: as if nothing had been compiled before
                 took, clock, memory = _used(words, folder / what.replace(" ", "-"))
