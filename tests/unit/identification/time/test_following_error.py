@@ -18,6 +18,7 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
+from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.following_error import (
     _AWAY,
     _BODY,
@@ -29,7 +30,6 @@ from swashplate.identification.time.following_error import (
     _spread_inside,
 )
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.validation.calibration import first_part
 
 
 @lru_cache(maxsize=1)
