@@ -35,13 +35,13 @@ from swashplate.filtering.disturbed_model import Nuisance, stochastic_model
 from swashplate.filtering.nuisance import PUSHES
 from swashplate.flights.readers.read import read
 from swashplate.identification.core.records import Record, records
+from swashplate.identification.time.calibration import CALIBRATION, calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.nesting import rebuild
 from swashplate.models.vehicle import Vehicle
 from swashplate.physics.environment import Environment
 from swashplate.simulation.compilation import enable_compilation_cache, lengthened
 from swashplate.simulation.dynamics import enable_double_precision, jax_backend
-from swashplate.validation.calibration import CALIBRATION, calibrate
 from swashplate.validation.metrics import fit_percent
 from swashplate.validation.prediction import Predictions, naive, predict
 from swashplate.validation.validate import observer_of, started_from

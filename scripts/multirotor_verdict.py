@@ -29,12 +29,12 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import PUSHES, Nuisance
 from swashplate.identification.core.records import Record
+from swashplate.identification.time.calibration import CALIBRATION, calibrate
 from swashplate.identification.time.kinematics import PREDICTED, measured_states
 from swashplate.models.vehicle import Vehicle
 from swashplate.simulation.compilation import enable_compilation_cache
 from swashplate.simulation.dynamics import enable_double_precision
 from swashplate.validation.black_box import ceiling
-from swashplate.validation.calibration import CALIBRATION, calibrate
 from swashplate.validation.flight_floors import motion_of
 from swashplate.validation.metrics import fit_percent
 from swashplate.validation.prediction import predict

@@ -20,6 +20,7 @@ from swashplate.filtering.disturbed_model import N_DISTURBANCES, FilterState
 from swashplate.identification.core.parameters import parameterize
 from swashplate.identification.core.records import records
 from swashplate.identification.time.beginning import seen_at_start
+from swashplate.identification.time.calibration import first_part
 from swashplate.identification.time.following_error import (
     _AWAY,
     _SHARES,
@@ -31,7 +32,6 @@ from swashplate.identification.time.following_error import (
 )
 from swashplate.identification.time.start_states import slopes_ahead
 from swashplate.simulation.compilation import QUICK_TO_COMPILE
-from swashplate.validation.calibration import first_part
 
 
 @lru_cache(maxsize=1)
