@@ -27,7 +27,7 @@ class Battery(NamedTuple):
     voltage_sag: Scalar
 
 
-class Motors(NamedTuple):
+class MotorWarmth(NamedTuple):
     """How warm the motors' windings are: 0 as before the start, 1 as in a long hover."""
 
     warmth: Scalar
@@ -40,7 +40,7 @@ class MultirotorState(NamedTuple):
     body: RigidBody
     drive: Any
     battery: Battery | None
-    motors: Motors | None = None
+    motors: MotorWarmth | None = None
 
 
 class MultirotorLoads(NamedTuple):
@@ -50,7 +50,7 @@ class MultirotorLoads(NamedTuple):
     moment: Vector
     drive: Any
     battery: Battery | None
-    motors: Motors | None
+    motors: MotorWarmth | None
 
 
 def place(par: Any, number: int) -> Vector:
@@ -67,12 +67,12 @@ def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
     )
 
 
-def faster_when_cold(par: Any, motors: Motors | None) -> Scalar:
+def faster_when_cold(par: Any, motors: MotorWarmth | None) -> Scalar:
     """Speed [rad/s] that motors add to `steady_speed` as long as they are not warm."""
     return 0.0 if motors is None else par.o_cold * (1.0 - motors.warmth)
 
 
-def warming(par: Any, motors: Motors, thrust: Scalar) -> Scalar:
+def warming(par: Any, motors: MotorWarmth, thrust: Scalar) -> Scalar:
     """Rate of the warmth [1/s] towards the square of the thrust over the weight.
 
     Current is torque, torque goes with thrust, and its square heats the windings. Their resistance rises by 0.4 % a
@@ -82,7 +82,9 @@ def warming(par: Any, motors: Motors, thrust: Scalar) -> Scalar:
     return (load * load - motors.warmth) / par.tau_warm
 
 
-def speed_rates(par: Any, speeds: Any, commands: Any, voltage: Scalar, motors: Motors | None = None) -> list[Scalar]:
+def speed_rates(
+    par: Any, speeds: Any, commands: Any, voltage: Scalar, motors: MotorWarmth | None = None
+) -> list[Scalar]:
     """Accelerations of the rotors [rad/s^2]: eq. 15, and slower for what all do alike.
 
     While rotors speed up together, their motors draw the current of it through one battery, whose voltage falls for as
@@ -148,7 +150,7 @@ def loads(
             + rotor.gyroscopic_moment(body.rates, par.inertia_drive, omega, sense)
         )
     lost = None if battery is None else Battery(sag_rate(par, battery.voltage_sag, drive, env, xp))
-    warmer = None if motors is None else Motors(warming(par, motors, lift))
+    warmer = None if motors is None else MotorWarmth(warming(par, motors, lift))
     return MultirotorLoads(force, moment, type(drive)(*rates), lost, warmer)
 
 

@@ -13,7 +13,7 @@ from swashplate.models.card import Card
 from swashplate.models.choices import Choice, Free, PhysicalEffect
 from swashplate.models.multirotor import (
     Battery,
-    Motors,
+    MotorWarmth,
     MultirotorState,
     derivatives,
     faster_when_cold,
@@ -181,7 +181,7 @@ def settled(
     the weight for `running` seconds."""
     if not warming:
         return {f"omega_{i}": steady_speed(par, command, voltage) for i, command in enumerate(inputs, start=1)}
-    motors = Motors(1.0 - np.e ** (-running / par.tau_warm))
+    motors = MotorWarmth(1.0 - np.e ** (-running / par.tau_warm))
     cold = faster_when_cold(par, motors)
     speeds = {f"omega_{i}": steady_speed(par, command, voltage) + cold for i, command in enumerate(inputs, start=1)}
     return speeds | motors._asdict()
@@ -319,7 +319,7 @@ def multirotor(card: Card) -> Vehicle:
             RigidBody(*(0.0,) * 12),
             drive(*(0.0,) * len(senses)),
             Battery(0.0) if battery else None,
-            Motors(0.0) if warming else None,
+            MotorWarmth(0.0) if warming else None,
         ),
         inputs=inputs,
         parameters=parameters,

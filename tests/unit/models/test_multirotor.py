@@ -20,8 +20,8 @@ from swashplate.filtering.disturbances import Noise
 from swashplate.filtering.disturbed_model import stochastic_model
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.flight import Flight, Provenance, stream
-from swashplate.identification.core.records import POSE, records
-from swashplate.identification.time.beginning import FilterNumbers, FirstMotion, begun
+from swashplate.identification.core.records import POSE, Record, records
+from swashplate.identification.time.beginning import FilterNumbers, begun, seen_at_start
 from swashplate.models.card import Card, Parameter, packaged_cards
 from swashplate.models.catalogue import from_card
 from swashplate.models.vehicle import Vehicle
@@ -248,7 +248,10 @@ def test_a_record_begins_with_motors_as_warm_as_its_time_says() -> None:
     told = settled(vehicle.inputs(*inputs), par, 3.7, None, 6.0)  # type: ignore[misc]
     assert told["warmth"] == pytest.approx(warmth, abs=1e-3)
     assert told["omega_1"] == pytest.approx(states["omega_1"] + par.o_cold * (1.0 - told["warmth"]), rel=1e-12)
-    begin = FirstMotion(np.zeros(6), np.zeros(6), np.zeros(3), np.array([3.7, 3.7]), 6.0)
+    n = 200
+    still, volts = np.zeros((n, len(POSE))), np.full(n, 3.7)
+    piece = Record("made", 6.0 + dt * np.arange(n), np.tile(inputs, (n, 1)), still, volts, POSE, voltage_known=True)
+    begin = seen_at_start(vehicle, piece)
     noises = (np.array(row, dtype=np.float64) for row in (par, Noise(), Nuisance(), inputs))
     first = begun(stochastic_model(vehicle, POSE, 0.01), FilterNumbers(*noises), begin)
     assert first.x[-1] == pytest.approx(told["warmth"], rel=1e-12)

@@ -170,7 +170,7 @@ def measured_start(
     inputs: Float[jax.Array | np.ndarray, "... inputs"],
     voltage: Float[jax.Array | np.ndarray, ...],
     xp: Backend,
-    running: Any = 0.0,
+    running: Float[jax.Array | np.ndarray, ...] | float = 0.0,
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
 
