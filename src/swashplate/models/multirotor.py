@@ -67,9 +67,9 @@ def steady_speed(par: Any, command: Scalar, voltage: Scalar) -> Scalar:
     )
 
 
-def faster_when_cold(par: Any, motors: MotorWarmth | None) -> Scalar:
+def faster_when_cold(par: Any, motors: MotorWarmth) -> Scalar:
     """Speed [rad/s] that motors add to `steady_speed` as long as they are not warm."""
-    return 0.0 if motors is None else par.o_cold * (1.0 - motors.warmth)
+    return par.o_cold * (1.0 - motors.warmth)
 
 
 def warming(par: Any, motors: MotorWarmth, thrust: Scalar) -> Scalar:
@@ -92,8 +92,10 @@ def speed_rates(
     of resistance R, the time constant of what is common is longer by n d^2 R / Rm, as a share: `tau_shared` [s]. A
     log of ten voltages a second shows the lower voltage of a new steady state, and not this.
     """
-    cold = faster_when_cold(par, motors)
-    away = [steady_speed(par, command, voltage) + cold - omega for omega, command in zip(speeds, commands, strict=True)]
+    away = [steady_speed(par, command, voltage) - omega for omega, command in zip(speeds, commands, strict=True)]
+    if motors is not None:
+        cold = faster_when_cold(par, motors)
+        away = [one + cold for one in away]
     common = sum(away) / len(away)
     together = common / (par.tau_drive + par.tau_shared)
     return [drive_train.drive_train_rate(common, one, par.tau_drive) + together for one in away]
