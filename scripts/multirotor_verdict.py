@@ -134,7 +134,10 @@ def closed(
     speeds = np.zeros((len(starts), 4))
     keep = float(np.exp(-record.dt / vehicle.card.parameters["tau_drive"].value))
     held = np.stack(
-        [list(settled(u, vehicle.values(), v, None).values()) for u, v in zip(reaching, record.voltage, strict=True)]
+        [
+            list(settled(u, vehicle.values(), v, None, 0.0).values())
+            for u, v in zip(reaching, record.voltage, strict=True)
+        ]
     )
     speed = held[0]
     for k in range(int(starts.max()) + 1):

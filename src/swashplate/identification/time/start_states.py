@@ -149,11 +149,12 @@ def start_state(
     rate: Float[jax.Array, " outputs"],
     inputs: Float[jax.Array, " inputs"],
     voltage: Float[jax.Array, ""],
+    running: Float[jax.Array, ""] | float = 0.0,
 ) -> Any:
     """`measured_start`, with the inner states where they would rest (traceable).
 
     Args:
-        value, rate, inputs, voltage: as `measured_start` takes them.
+        value, rate, inputs, voltage, running: as `measured_start` takes them.
     """
     row = measured_start(
         vehicle,
@@ -164,6 +165,7 @@ def start_state(
         rate=rate,
         inputs=inputs,
         voltage=voltage,
+        running=running,
         xp=jax_backend(),
     )
     if vehicle.traits.settled is not None:
@@ -182,6 +184,7 @@ def measured_start(
     inputs: Float[jax.Array | np.ndarray, "... inputs"],
     voltage: Float[jax.Array | np.ndarray, ...],
     xp: Backend,
+    running: Float[jax.Array | np.ndarray, ...] | float = 0.0,
 ) -> Any:
     """A flat state: pose and its rates from the measurement, inner states by `Traits.settled`, where there is one.
 
@@ -189,6 +192,7 @@ def measured_start(
         parameters, nuisance: numbers, or rows of them for as many states.
         value, rate: measured channels and their time derivatives at the start.
         inputs: commands that reach the vehicle around the start, trims included, (..., inputs).
+        running: seconds since the flight's time zero.
         xp: the operations.
     """
     here = {name: value[i] for i, name in enumerate(output_names)}
@@ -223,7 +227,11 @@ def measured_start(
     settled = vehicle.traits.settled
     if settled is not None:
         known |= settled(
-            vehicle.inputs(*(inputs[..., i] for i in range(len(vehicle.input_names)))), parameters, voltage, attitude
+            vehicle.inputs(*(inputs[..., i] for i in range(len(vehicle.input_names)))),
+            parameters,
+            voltage,
+            attitude,
+            running,
         )
     entries = [xp.arrays.asarray(known.get(name, 0.0)) for name in vehicle.state_names]
     return xp.arrays.stack(xp.arrays.broadcast_arrays(*entries), axis=-1)
