@@ -69,7 +69,7 @@ class Punctual:
 
 
 def measure(*, short: bool) -> list[Punctual]:
-    """Both kinds of page for 60 s; the first alone for 5 s in the short form and without Chromium, which tests drive."""
+    """Both kinds of page for 60 s; the first alone for 5 s in the short form and without Chromium."""
     seconds = 5.0 if short else 60.0
     readings = [_reading(seconds)]
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
