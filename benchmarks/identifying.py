@@ -31,14 +31,14 @@ WARM = {"output-error": 5.0, "prediction-error": 12.0}
 COLD = 60.0
 FIRST = {
     "identify, cold": 10.0,
-    "identify, warm": 5.0,
+    "identify, warm": 4.0,
     "validate, cold": 6.0,
     "validate, warm": 6.0,
     "identify helicopter, cold": 20.0,
     "identify helicopter, warm": 12.0,
-    "control design, cold": 2.0,
+    "control design, cold": 1.55,
     "control design, warm": 2.0,
-    "control check, cold": 4.5,
+    "control check, cold": 3.9,
     "control check, warm": 4.0,
 }
 """Seconds of processor time of whole commands, from the start of the program to its report."""

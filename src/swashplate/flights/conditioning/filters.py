@@ -9,7 +9,6 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.errors import FlightError
 from swashplate.flights.conditioning.attitude import continuous
-from swashplate.flights.conditioning.digital_filters import both_ways, butterworth, forwards
 from swashplate.flights.flight import Flight
 from swashplate.flights.schema import QUATERNION
 from swashplate.flights.storage import timed
@@ -37,6 +36,8 @@ def filtered(
     Raises:
         FlightError: the corner is not below half the rate, or the record is too short.
     """
+    from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+
     band = isinstance(cutoff, tuple)
     corners = np.atleast_1d(np.asarray(cutoff, dtype=np.float64))
     if not (np.all(corners > 0) and np.all(corners < rate / 2) and np.all(np.diff(corners) > 0)):
@@ -52,8 +53,11 @@ def filtered(
             f"{needed} samples ({needed / rate:.3f} s) at {rate:g} Hz.",
             hint="Use a longer record, or condition with cutoff=0 (no filter).",
         )
-    sections = butterworth(order, cutoff, rate=rate)
-    return both_ways(sections, values) if zero_phase else forwards(sections, values)
+    sos = butter(order, cutoff, btype="bandpass" if band else "lowpass", fs=rate, output="sos")
+    if not zero_phase:
+        rest = sosfilt_zi(sos).reshape(sos.shape[0], 2, *(1,) * (values.ndim - 1)) * values[0]
+        return np.asarray(sosfilt(sos, values, axis=0, zi=rest)[0], dtype=np.float64)
+    return np.asarray(sosfiltfilt(sos, values, axis=0), dtype=np.float64)
 
 
 def within(values: Array, *, rate: float, band: tuple[float, float]) -> Array:

@@ -7,7 +7,6 @@ import numpy as np
 from swashplate.arrays import Array
 from swashplate.filtering.nuisance import Nuisance
 from swashplate.flights.conditioning.attitude import euler_from_quaternion
-from swashplate.flights.conditioning.digital_filters import savitzky_golay
 from swashplate.flights.schema import RATES
 from swashplate.identification.core.records import Record
 from swashplate.physics.backend import ArrayBackend
@@ -36,6 +35,8 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     so each uses samples after its own time too: this is what predictions are held against, never what they start from.
     Rates are a gyroscope's where the record has them, smoothed over five samples.
     """
+    from scipy.signal import savgol_filter
+
     names = list(record.output_names)
     pose = record.outputs[:, [names.index(name) for name in ("x", "y", "z", "phi", "theta", "psi")]].copy()
     pose[:, 3] -= float(nuisance.level_phi)
@@ -51,8 +52,8 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     lever = Vector(float(nuisance.lever_x), float(nuisance.lever_y), float(nuisance.lever_z))
     pose[:, :3] -= np.stack(body_to_local(lever, Euler(*pose[:, 3:].T), _XP), axis=1)
     length = samples_smoothed(record.dt, window)
-    smooth = savitzky_golay(pose, length, 3)
-    slope = savitzky_golay(pose, length, 3, derivative=1, step=record.dt)
+    smooth = savgol_filter(pose, length, 3, axis=0)
+    slope = savgol_filter(pose, length, 3, deriv=1, delta=record.dt, axis=0)
     phi, theta = smooth[:, 3], smooth[:, 4]
     phi_dot, theta_dot, psi_dot = slope[:, 3], slope[:, 4], slope[:, 5]
     velocity = np.stack(local_to_body(Vector(*slope[:, :3].T), Euler(*smooth[:, 3:].T), _XP), axis=1)
@@ -66,5 +67,5 @@ def measured_states(record: Record, nuisance: Nuisance, *, window: float = WINDO
     )
     if set(RATES) <= set(names):
         gyro = record.outputs[:, [names.index(name) for name in RATES]]
-        rates = savitzky_golay(gyro, 5, 2)
+        rates = savgol_filter(gyro, 5, 2, axis=0)
     return np.concatenate([smooth[:, :3], velocity, smooth[:, 3:], rates], axis=1)
