@@ -25,9 +25,9 @@ _NEAR = 8.0
 _INSIDE = 0.5
 """Sigmas that the bent scale's middle keeps from a bound on which the optimum lies."""
 
-_UNSEEN, _BLEND = 1.0, 0.3
+_UNSEEN, _BLEND, _SHARE = 1.0, 0.3, 0.8
 """How far below the optimum the logarithm of a noise is that the data no longer see (its variance is a seventh there),
-and how wide the change to the prior's width is."""
+and how wide the change to the prior's width is; in sigmas at most `_SHARE`, so that the optimum keeps its width."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ def whitening(row: Row, optimum: Array, covariance: Array) -> dict[str, Array]:
         "below": below,
         "above": above,
         "wider": np.where(logarithmic & np.isfinite(wide), np.maximum(wide / sigma, 1.0), 1.0) - 1.0,
-        "scale": row.scale,
+        "unseen": _UNSEEN / row.scale,
+        "blend": np.minimum(_BLEND / row.scale, _SHARE * sigma),
         "root": sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)),
         "mean": row.column("mean") / row.scale,
         "prior": row.prior_information,
@@ -77,9 +78,9 @@ def unbent(data: Mapping[str, Any], z: Array | jax.Array, xp: ModuleType) -> tup
         data: from `whitening`. z: whitened numbers (p,). xp: NumPy, or JAX's.
     """
     away = data["root"] @ z
-    small = (-away * data["scale"] - _UNSEEN) / _BLEND
+    small = (-away - data["unseen"]) / data["blend"]
     slope = 1.0 + data["wider"] * xp.exp(-xp.logaddexp(0.0, -small))
-    away = away - data["wider"] * _BLEND / data["scale"] * xp.logaddexp(0.0, small)
+    away = away - data["wider"] * data["blend"] * xp.logaddexp(0.0, small)
     a, b = data["gap_low"], data["gap_high"]
     up, down = xp.exp(away / a), xp.exp(-away / b)
     both = data["below"] & data["above"]
